@@ -1,0 +1,94 @@
+//! The seam between callers and implementations: a batch of pairs in, a result per pair out.
+
+use crate::{ContactPatch, ContactPixel, Params, Surface, VirtualCamera};
+use glamx::{Pose3, Vec3};
+use thiserror::Error;
+
+/// How the camera of a pair is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum View {
+    /// This camera, in the frame of the first surface. One view.
+    Fixed(VirtualCamera),
+    /// Aimed by the normals of the contact zone (up to three views where they point several ways,
+    /// as in a corner).
+    Aim {
+        /// Direction in the frame of the first surface in which the second one lies, or should be
+        /// pushed, if the normals do not tell; need not be of unit length. Zero: from the bounds.
+        toward_b: Vec3,
+        /// Axis of the pair's main view in the frame before: kept while the zone's normals agree
+        /// with it within [`AXIS_HYSTERESIS`](crate::AXIS_HYSTERESIS), so that the pixel grid
+        /// does not flicker.
+        last_axis: Option<Vec3>,
+    },
+}
+
+/// One pair to be compared.
+#[derive(Clone, Copy)]
+pub struct PairQuery<'a> {
+    /// First surface, in its own frame, which is the frame of all results.
+    pub a: Surface<'a>,
+    /// Second surface, in its own frame.
+    pub b: Surface<'a>,
+    /// From the frame of `b` into the frame of `a`.
+    pub a_from_b: Pose3,
+    /// Where to look from.
+    pub view: View,
+    /// Parameters of the comparison.
+    pub params: Params,
+}
+
+/// What the comparison of one pair found. All vectors are in the frame of the first surface.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PairResult {
+    /// Whether the surfaces intersect.
+    pub collides: bool,
+    /// Least signed gap in metres over all pixels that both surfaces cover (negative:
+    /// penetration), or `None` where no pixel is shared within reach.
+    pub gap: Option<f32>,
+    /// Axes of the views, unit length, from `b` towards `a`; empty after an early rejection.
+    pub axes: Vec<Vec3>,
+    /// Pixels where the surfaces are within [`Params::prediction`] or penetrate.
+    pub contacts: Vec<ContactPixel>,
+    /// The contact pixels grouped and reduced to what a solver needs, deepest patch first.
+    pub patches: Vec<ContactPatch>,
+}
+
+impl PairResult {
+    /// Empties the result, keeping its memory.
+    pub fn clear(&mut self) {
+        self.collides = false;
+        self.gap = None;
+        self.axes.clear();
+        self.contacts.clear();
+        self.patches.clear();
+    }
+}
+
+/// Why a backend could not finish a batch.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum BackendError {
+    /// A pair cannot be compared in the way asked for.
+    #[error("pair {pair} of the batch: {reason}")]
+    Unsupported {
+        /// Index into the batch.
+        pair: usize,
+        /// What is not supported, and what to do instead.
+        reason: &'static str,
+    },
+}
+
+/// Compares batches of pairs. All implementations give the same results (integer stages equal
+/// exactly, float ones within a stated bound).
+pub trait Backend: Send {
+    /// Short name for reports: "cpu", …
+    fn name(&self) -> &str;
+
+    /// Compares every pair of the batch; `results` gets one entry a pair, in order. Entries that
+    /// are already there are reused, so that a warm caller allocates nothing.
+    fn compare(
+        &mut self,
+        batch: &[PairQuery<'_>],
+        results: &mut Vec<PairResult>,
+    ) -> Result<(), BackendError>;
+}

@@ -1,0 +1,46 @@
+//! From contact pixels to contact patches.
+
+use glamx::Vec3;
+
+/// A pixel in which both surfaces are close or penetrate. Vectors are in the frame of the first
+/// surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactPixel {
+    /// Column and row in the view's pixel grid.
+    pub pixel: [i32; 2],
+    /// Index of the view in [`PairResult::axes`](crate::PairResult::axes).
+    pub view: u32,
+    /// Point on the first surface, metres.
+    pub point_a: Vec3,
+    /// Point on the second surface, metres; on the same ray as `point_a`.
+    pub point_b: Vec3,
+    /// Outward unit normal of the first surface (towards the second).
+    pub normal_a: Vec3,
+    /// Outward unit normal of the second surface (towards the first).
+    pub normal_b: Vec3,
+    /// Signed distance between the surfaces along the normal, metres; negative: penetration.
+    pub gap: f32,
+}
+
+/// One point of a [`ContactPatch`]. Vectors are in the frame of the first surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactPoint {
+    /// Point on the first surface, metres.
+    pub point_a: Vec3,
+    /// Point on the second surface, metres: `point_a + gap * normal`.
+    pub point_b: Vec3,
+    /// Signed distance along the patch's normal, metres; negative: penetration.
+    pub gap: f32,
+}
+
+/// Most points in one patch: what a solver manifold takes.
+pub const PATCH_POINTS: usize = 4;
+
+/// Neighbouring contact pixels of like normal, reduced to a few points chosen for depth and extent.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ContactPatch {
+    /// Unit normal from the first surface towards the second, in the frame of the first.
+    pub normal: Vec3,
+    /// One to [`PATCH_POINTS`] points.
+    pub points: arrayvec::ArrayVec<ContactPoint, PATCH_POINTS>,
+}

@@ -1,0 +1,75 @@
+//! What can be wrong with a cloud, and what to do about it.
+
+use thiserror::Error;
+
+/// Why a [`PointCloud`](crate::PointCloud) could not be built.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CloudError {
+    /// No point is left (after non-finite ones were dropped).
+    #[error(
+        "the cloud has no points ({dropped} non-finite ones were dropped): give at least one finite point"
+    )]
+    Empty {
+        /// Points dropped because a coordinate was NaN or infinite.
+        dropped: usize,
+    },
+    /// A coordinate is NaN or infinite and the builder was told to refuse such points.
+    #[error(
+        "point {index} has a NaN or infinite coordinate ({count} such points): filter them, or build with NonFinite::Drop"
+    )]
+    NonFinite {
+        /// The first such point.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A radius is zero, negative, NaN or infinite.
+    #[error("the radius of point {index} is {radius}: radii must be finite and greater than zero")]
+    BadRadius {
+        /// The first such point.
+        index: usize,
+        /// Its radius in metres.
+        radius: f32,
+    },
+    /// An attribute has another number of entries than there are points.
+    #[error("{attribute} has {actual} entries for {expected} points: give one per point")]
+    LengthMismatch {
+        /// The attribute: "radii", "normals", "colors", "y", …
+        attribute: &'static str,
+        /// Number of points.
+        expected: usize,
+        /// Number of entries.
+        actual: usize,
+    },
+    /// More points than an index can address.
+    #[error("{count} points are more than the limit of {limit}: split or thin the cloud")]
+    TooManyPoints {
+        /// Points given.
+        count: usize,
+        /// Most points that one cloud can have.
+        limit: usize,
+    },
+    /// Near this coordinate, `f32` steps are coarse against the point radius.
+    #[error(
+        "point {index} has coordinate {coordinate}, where f32 steps are too coarse for its radius {radius}: move the cloud's origin nearer and put the offset into the body's pose"
+    )]
+    CoordinateTooLarge {
+        /// The first such point.
+        index: usize,
+        /// The coordinate in metres.
+        coordinate: f32,
+        /// The point's radius in metres.
+        radius: f32,
+    },
+    /// A parameter of the builder is outside its range.
+    #[error("{parameter} is {value}: {expected}")]
+    BadParameter {
+        /// Name of the builder's parameter.
+        parameter: &'static str,
+        /// The value given.
+        value: f32,
+        /// What is allowed.
+        expected: &'static str,
+    },
+}

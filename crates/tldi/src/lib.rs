@@ -1,0 +1,33 @@
+//! Thickened layered depth images (TLDI) of point clouds: collision, gap and contacts between
+//! unstructured point sets that may be all new in every frame.
+//!
+//! This crate knows nothing of physics engines, GPUs or file formats; `rapier3d-tldi` connects it
+//! to rapier.
+
+mod aabb;
+mod backend;
+mod builder;
+mod camera;
+mod cloud;
+mod contacts;
+mod error;
+mod params;
+mod surface;
+#[allow(clippy::module_inception, reason = "the image is the crate's namesake")]
+mod tldi;
+
+pub use crate::tldi::{Facing, Layer, Tldi};
+pub use aabb::Aabb;
+pub use backend::{Backend, BackendError, PairQuery, PairResult, View};
+pub use builder::{CloudBuilder, NonFinite, Positions};
+pub use camera::{Projection, VirtualCamera};
+pub use cloud::{BLOCK, PointCloud, Radii};
+pub use contacts::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS};
+pub use error::CloudError;
+pub use glamx;
+pub use params::{Params, Variant};
+pub use surface::{RayHit, RaySurface, Surface};
+
+/// A view axis is kept from frame to frame while the zone's normals agree with it within this
+/// angle, in radians (10°).
+pub const AXIS_HYSTERESIS: f32 = 0.1745;

@@ -1,0 +1,93 @@
+//! The one definition of every tuning parameter, shared by all backends.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Which construction of the layers and which comparison a pair uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Variant {
+    /// Flat cylinders, stacks, Gaussian blending, range overlap with compression ρ: the method of
+    /// Radwan, Ohrhallinger and Wimmer (Graphics Interface 2014), kept as the baseline.
+    Paper,
+    /// Oriented splats and sign change: sharper by an order of magnitude, needs no closed surface.
+    #[default]
+    Oriented,
+}
+
+/// Parameters of one pair, as plain bytes with the same layout in Rust and in WGSL.
+///
+/// Lengths are in metres (more exactly, in the unit of the coordinates); "radius" means the mean
+/// point radius r̄ of the pair's coarser cloud.
+///
+/// ```
+/// use tldi::Params;
+/// let params = Params::for_radius(0.01);
+/// assert_eq!(params.pixel_size, 0.01);
+/// assert_eq!(bytemuck::bytes_of(&params).len(), 32);
+/// ```
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Params {
+    /// Edge of a pixel at the surface, in metres. Coarser than r̄ loses detail, finer costs time
+    /// and lets noise through; r̄ was best (design notes, "What was tried", 3).
+    pub pixel_size: f32,
+    /// Fragments of one pixel whose depths differ by no more than this belong to one layer, in
+    /// metres. Two balls of radius r̄ overlap in depth up to 2 r̄.
+    pub merge_gap: f32,
+    /// Contacts with a gap up to this are reported, in metres (rapier's prediction distance).
+    pub prediction: f32,
+    /// Share of a splat's slope that extrapolates its depth to the pixel centre, 0 to 1.
+    pub slope_damping: f32,
+    /// Compression of depth ranges before they are compared (paper, section 5), 0 to 1 of their
+    /// length. Only [`Variant::Paper`] reads it.
+    pub rho: f32,
+    /// Depth segments in a stack's occupancy mask (paper, section 4.2). Only [`Variant::Paper`]
+    /// reads it.
+    pub stack_segments: u32,
+    /// The [`Variant`]: 0 is `Paper`, 1 is `Oriented`.
+    pub variant: u32,
+    /// Keeps the size a multiple of 16 bytes, as uniform buffers want it. Always 0.
+    pub _padding: u32,
+}
+
+impl Params {
+    /// The default variant for a mean point radius in metres.
+    pub fn for_radius(radius: f32) -> Self {
+        Self {
+            pixel_size: radius,
+            merge_gap: 2.0 * radius,
+            prediction: 2.0 * radius,
+            slope_damping: 0.7,
+            rho: 0.05,
+            stack_segments: 128,
+            variant: 1,
+            _padding: 0,
+        }
+    }
+
+    /// The paper's variant for a mean point radius in metres.
+    pub fn paper(radius: f32) -> Self {
+        Self {
+            variant: 0,
+            ..Self::for_radius(radius)
+        }
+    }
+
+    /// The variant these parameters select.
+    pub fn variant(&self) -> Variant {
+        if self.variant == 0 {
+            Variant::Paper
+        } else {
+            Variant::Oriented
+        }
+    }
+
+    /// The same parameters with another prediction distance in metres.
+    pub fn with_prediction(self, prediction: f32) -> Self {
+        Self { prediction, ..self }
+    }
+
+    /// The same parameters with another pixel edge in metres.
+    pub fn with_pixel_size(self, pixel_size: f32) -> Self {
+        Self { pixel_size, ..self }
+    }
+}

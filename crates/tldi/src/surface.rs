@@ -1,0 +1,59 @@
+//! What takes part in a comparison: a cloud, or a surface that answers rays exactly.
+
+use crate::{Aabb, PointCloud};
+use glamx::Vec3;
+
+/// Where a ray crosses a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// Distance from the ray's origin, in metres (the direction has unit length).
+    pub distance: f32,
+    /// Outward unit normal of the surface, in the frame of the ray. A ray enters where it points
+    /// against the direction and leaves where it points along it.
+    pub normal: Vec3,
+}
+
+/// A surface known exactly (a primitive, a mesh, a height field): it is seen through rays, one a
+/// pixel, so that it has layers like a cloud.
+pub trait RaySurface: Sync {
+    /// Bounds in the surface's own frame; may be infinite (a half-space).
+    fn bounds(&self) -> Aabb;
+
+    /// Appends every crossing of the ray `origin + t · direction`, `0 ≤ t ≤ max_distance`, in the
+    /// surface's own frame, in order of `t`. `direction` has unit length.
+    fn crossings(&self, origin: Vec3, direction: Vec3, max_distance: f32, hits: &mut Vec<RayHit>);
+
+    /// Signed distance of `point` to the surface (negative inside, where there is an inside) and
+    /// the outward unit normal at the nearest point of the surface.
+    fn project(&self, point: Vec3) -> (f32, Vec3);
+
+    /// Whether the surface bounds a volume, so that its normals tell inside from outside.
+    fn is_closed(&self) -> bool;
+}
+
+/// One side of a pair.
+#[derive(Clone, Copy)]
+pub enum Surface<'a> {
+    /// A point cloud in its own frame.
+    Cloud(&'a PointCloud<'a>),
+    /// An exact surface in its own frame.
+    Exact(&'a dyn RaySurface),
+}
+
+impl Surface<'_> {
+    /// Bounds in the surface's own frame, point radii not included.
+    pub fn bounds(&self) -> Aabb {
+        match self {
+            Surface::Cloud(cloud) => cloud.bounds(),
+            Surface::Exact(surface) => surface.bounds(),
+        }
+    }
+
+    /// Mean point radius in metres; 0 for an exact surface.
+    pub fn mean_radius(&self) -> f32 {
+        match self {
+            Surface::Cloud(cloud) => cloud.mean_radius(),
+            Surface::Exact(_) => 0.0,
+        }
+    }
+}

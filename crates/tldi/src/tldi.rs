@@ -1,0 +1,99 @@
+//! The thickened layered depth image itself.
+
+use crate::VirtualCamera;
+use glamx::Vec3;
+
+/// Which way a layer faces along its ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(i8)]
+pub enum Facing {
+    /// The ray enters the body: the outward normal points towards the camera.
+    Entry = -1,
+    /// Normals are not oriented: either may be.
+    Unknown = 0,
+    /// The ray leaves the body.
+    Exit = 1,
+}
+
+/// One surface along one pixel's ray. Depths are metres along the view's z axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Layer {
+    /// Nearest depth of what was merged into the layer.
+    pub near: f32,
+    /// Farthest depth of what was merged into the layer.
+    pub far: f32,
+    /// Depth of the surface.
+    pub depth: f32,
+    /// Unit normal in the view frame; outward where `facing` is known, else towards the camera.
+    /// Zero where the variant does not estimate one.
+    pub normal: Vec3,
+    /// Which way the layer faces.
+    pub facing: Facing,
+    /// Blended colour, linear in the 8-bit values; alpha is 0 where the cloud has no colours.
+    pub color: [u8; 4],
+}
+
+/// A thickened layered depth image: for every pixel of a rectangle the layers along its ray, in
+/// order of depth.
+///
+/// Memory: 4 bytes a pixel and one [`Layer`] per layer, whatever the number of points.
+#[derive(Clone, Debug)]
+pub struct Tldi {
+    /// The camera the image was seen from.
+    pub camera: VirtualCamera,
+    /// Column and row of the first pixel, in the camera's pixel coordinates.
+    pub origin: [i32; 2],
+    /// Number of columns and rows.
+    pub size: [u32; 2],
+    /// Layers of pixel `k` are `layers[offsets[k]..offsets[k + 1]]`, row by row.
+    pub(crate) offsets: Vec<u32>,
+    pub(crate) layers: Vec<Layer>,
+}
+
+impl Default for Tldi {
+    fn default() -> Self {
+        Self {
+            camera: VirtualCamera::along(Vec3::Z, 1.0),
+            origin: [0, 0],
+            size: [0, 0],
+            offsets: vec![0],
+            layers: Vec::new(),
+        }
+    }
+}
+
+impl Tldi {
+    /// The layers of the pixel in column `i`, row `j` (counted from [`Tldi::origin`]), in order of
+    /// depth.
+    ///
+    /// # Panics
+    /// If the pixel is outside [`Tldi::size`].
+    pub fn layers_at(&self, i: u32, j: u32) -> &[Layer] {
+        assert!(i < self.size[0] && j < self.size[1], "pixel ({i}, {j}) outside {:?}", self.size);
+        self.layers_of((j * self.size[0] + i) as usize)
+    }
+
+    /// The layers of the `k`-th pixel, row by row.
+    pub(crate) fn layers_of(&self, k: usize) -> &[Layer] {
+        &self.layers[self.offsets[k] as usize..self.offsets[k + 1] as usize]
+    }
+
+    /// All layers, row by row, each pixel's in order of depth.
+    pub fn layers(&self) -> &[Layer] {
+        &self.layers
+    }
+
+    /// Number of pixels.
+    pub fn pixel_count(&self) -> usize {
+        self.size[0] as usize * self.size[1] as usize
+    }
+
+    /// Most layers that one pixel has.
+    pub fn max_layers(&self) -> usize {
+        self.offsets
+            .windows(2)
+            .map(|w| (w[1] - w[0]) as usize)
+            .max()
+            .unwrap_or(0)
+    }
+}

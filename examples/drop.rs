@@ -1,0 +1,2 @@
+//! Drop.
+fn main() {}
