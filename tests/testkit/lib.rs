@@ -1,1 +1,11 @@
-//! (under construction)
+//! Shared by the tests of all packages: sampled shapes, oracles, random poses, real data.
+
+mod data;
+mod oracle;
+mod random;
+mod shapes;
+
+pub use data::{data_file, load_cloud};
+pub use oracle::{OracleFragment, oracle_layers};
+pub use random::{random_pose, random_unit};
+pub use shapes::{Samples, sampled_box, sampled_plane, sampled_sphere};

@@ -91,8 +91,7 @@ impl Aabb {
         }
         let center = *pose * center;
         let r = glamx::Mat3::from_quat(pose.rotation);
-        let half =
-            r.x_axis.abs() * half.x + r.y_axis.abs() * half.y + r.z_axis.abs() * half.z;
+        let half = r.x_axis.abs() * half.x + r.y_axis.abs() * half.y + r.z_axis.abs() * half.z;
         Self {
             min: center - half,
             max: center + half,

@@ -40,7 +40,8 @@ pub struct PairQuery<'a> {
 /// What the comparison of one pair found. All vectors are in the frame of the first surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PairResult {
-    /// Whether the surfaces intersect.
+    /// Whether the surfaces intersect, or the solids overlap where normals tell inside from
+    /// outside.
     pub collides: bool,
     /// Least signed gap in metres over all pixels that both surfaces cover (negative:
     /// penetration), or `None` where no pixel is shared within reach.

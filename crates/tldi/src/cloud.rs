@@ -1,6 +1,11 @@
 //! The point cloud: positions, radii, optional normals and colours, bounds.
 
-use crate::{Aabb, CloudBuilder, Positions};
+use crate::builder::{check_count, check_dropped, check_length, merged};
+use crate::gather::{Gathered, extend_without};
+use crate::morton::permuted;
+use crate::normals::{fill_from_nearest, normalize};
+use crate::radii::{check_coordinates, check_radii, mean_and_max};
+use crate::{Aabb, CloudBuilder, CloudError, NonFinite, Positions};
 use glamx::Vec3;
 use std::borrow::Cow;
 
@@ -45,6 +50,23 @@ pub struct PointCloud<'a> {
     pub(crate) mean_radius: f32,
     pub(crate) max_radius: f32,
     pub(crate) dropped: usize,
+    pub(crate) non_finite: NonFinite,
+    pub(crate) order: Option<Vec<u32>>,
+    pub(crate) spare: Spare,
+}
+
+/// Memory for the next frame of a cloud that is given new points; a clone of the cloud starts
+/// without.
+#[derive(Debug, Default)]
+pub(crate) struct Spare {
+    gathered: Gathered,
+    normals: Vec<Vec3>,
+}
+
+impl Clone for Spare {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
 }
 
 impl<'a> PointCloud<'a> {
@@ -128,9 +150,134 @@ impl<'a> PointCloud<'a> {
         &self.blocks
     }
 
-    /// Non-finite points that the builder dropped.
+    /// Non-finite points that were dropped from those last given.
     pub fn dropped(&self) -> usize {
         self.dropped
+    }
+
+    /// After [`CloudBuilder::spatial_order`], the index that each point would have without it (the
+    /// index given by the caller, where nothing was dropped), so that whoever is told of a point of
+    /// the cloud finds it in their own data. Else `None`: the points are as given.
+    pub fn order(&self) -> Option<&[u32]> {
+        self.order.as_deref()
+    }
+
+    /// Replaces all points, as a deforming or streaming cloud does in every frame.
+    ///
+    /// - A global radius is kept. So are radii and colours for each point, if as many points as the
+    ///   cloud has are given, all finite: they are taken to be the same points, moved. Otherwise
+    ///   colours are removed, and radii for each point are an error
+    ///   ([`CloudError::LengthMismatch`]): [set](Self::set_radii) a global radius first, or build
+    ///   another cloud.
+    /// - Normals are replaced by those given, which must be outward (see
+    ///   [`CloudBuilder::normals`]), or removed: the former ones would be wrong.
+    /// - A cloud built with [`CloudBuilder::spatial_order`] takes the points in the order in which
+    ///   they were given to the builder and puts them into its own; if the number changes, or some
+    ///   are dropped, it keeps them as they come and [`order`](Self::order) becomes `None`.
+    ///
+    /// On an error the cloud is unchanged. Cost: one pass over the points. Memory is reused: after
+    /// two calls with as many points nothing is allocated, unless normals must be replaced.
+    ///
+    /// ```
+    /// use tldi::{PointCloud, glamx::Vec3};
+    /// let mut points = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+    /// let mut cloud = PointCloud::builder(&points).radius(0.7).build()?.into_owned();
+    /// points.push(2.0 * Vec3::Z);
+    /// cloud.set_points(&points, None)?;
+    /// assert_eq!((cloud.len(), cloud.bounds().max), (4, Vec3::new(1.0, 1.0, 2.0)));
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    pub fn set_points(
+        &mut self,
+        points: &[Vec3],
+        normals: Option<&[Vec3]>,
+    ) -> Result<(), CloudError> {
+        check_count(points.len())?;
+        if let Some(normals) = normals {
+            check_length("normals", normals.len(), points.len())?;
+        }
+        // Everything is prepared in spare memory and swapped in at the end.
+        let Spare {
+            gathered,
+            normals: new_normals,
+        } = &mut self.spare;
+        let mut order = self.order.as_ref().filter(|o| o.len() == points.len());
+        if let Some(curve) = order {
+            gathered.refill(curve.iter().map(|&i| points[i as usize]));
+            if !gathered.dropped.is_empty() {
+                order = None;
+            }
+        }
+        if order.is_none() {
+            gathered.refill(points.iter().copied());
+        }
+        check_dropped(self.non_finite, points.len(), &gathered.dropped)?;
+        let same_points = points.len() == self.x.len() && gathered.dropped.is_empty();
+        if let Radii::PerPoint(radii) = &self.radii
+            && !same_points
+        {
+            let kept = points.len() - gathered.dropped.len();
+            let same_count = points.len() == radii.len();
+            let expected = if same_count { kept } else { points.len() };
+            check_length("radii", radii.len(), expected)?;
+        }
+        let bounds = merged(&gathered.blocks);
+        let coordinates = [&*gathered.x, &*gathered.y, &*gathered.z];
+        check_coordinates(coordinates, bounds, &self.radii, |i| {
+            order.map_or(i, |order| order[i] as usize)
+        })?;
+        if let Some(normals) = normals {
+            new_normals.clear();
+            match order {
+                Some(order) => new_normals.extend(order.iter().map(|&i| normals[i as usize])),
+                None => extend_without(new_normals, normals.iter().copied(), &gathered.dropped),
+            }
+            if !normalize(new_normals) {
+                fill_from_nearest(new_normals, coordinates)?;
+            }
+        }
+
+        // Nothing fails from here on.
+        if order.is_none() {
+            self.order = None;
+        }
+        swap(&mut self.x, &mut gathered.x);
+        swap(&mut self.y, &mut gathered.y);
+        swap(&mut self.z, &mut gathered.z);
+        std::mem::swap(&mut self.blocks, &mut gathered.blocks);
+        match (&mut self.normals, normals) {
+            (Some(current), Some(_)) => swap(current, new_normals),
+            (current @ None, Some(_)) => *current = Some(Cow::Owned(std::mem::take(new_normals))),
+            (current, None) => {
+                if let Some(Cow::Owned(unused)) = current.take() {
+                    *new_normals = unused;
+                }
+            }
+        }
+        self.normals_oriented = normals.is_some();
+        self.colors.take_if(|_| !same_points);
+        self.bounds = bounds;
+        self.dropped = gathered.dropped.len();
+        Ok(())
+    }
+
+    /// Replaces the radii; those for each point come in the order in which
+    /// [`set_points`](Self::set_points) takes the points, without dropped ones. On an error the
+    /// cloud is unchanged.
+    pub fn set_radii(&mut self, radii: Radii<'a>) -> Result<(), CloudError> {
+        let mut radii = radii;
+        if let Radii::PerPoint(radii) = &mut radii {
+            check_length("radii", radii.len(), self.len())?;
+            if let Some(order) = &self.order {
+                *radii = Cow::Owned(permuted(radii, order));
+            }
+        }
+        let given_index = |i: usize| self.order.as_ref().map_or(i, |order| order[i] as usize);
+        check_radii(&radii, given_index)?;
+        check_coordinates(self.coordinates(), self.bounds, &radii, given_index)?;
+        (self.mean_radius, self.max_radius) = mean_and_max(&radii);
+        self.radii = radii;
+        Ok(())
     }
 
     /// The cloud with everything owned.
@@ -151,6 +298,17 @@ impl<'a> PointCloud<'a> {
             mean_radius: self.mean_radius,
             max_radius: self.max_radius,
             dropped: self.dropped,
+            non_finite: self.non_finite,
+            order: self.order,
+            spare: self.spare,
         }
+    }
+}
+
+/// Makes `new` current and keeps the memory of the former content, if it was owned.
+fn swap<T: Clone>(current: &mut Cow<'_, [T]>, new: &mut Vec<T>) {
+    let former = std::mem::replace(current, Cow::Owned(std::mem::take(new)));
+    if let Cow::Owned(former) = former {
+        *new = former;
     }
 }

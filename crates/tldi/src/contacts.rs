@@ -22,6 +22,18 @@ pub struct ContactPixel {
     pub gap: f32,
 }
 
+impl ContactPixel {
+    /// Unit normal from the first surface towards the second: the mean of both sides'.
+    pub fn normal(&self) -> Vec3 {
+        (self.normal_a - self.normal_b).normalize_or(self.normal_a)
+    }
+
+    /// Midway between the surfaces, metres.
+    pub fn middle(&self) -> Vec3 {
+        0.5 * (self.point_a + self.point_b)
+    }
+}
+
 /// One point of a [`ContactPatch`]. Vectors are in the frame of the first surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactPoint {

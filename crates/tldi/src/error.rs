@@ -2,7 +2,8 @@
 
 use thiserror::Error;
 
-/// Why a [`PointCloud`](crate::PointCloud) could not be built.
+/// Why a [`PointCloud`](crate::PointCloud) could not be built or changed. Indices are those of the
+/// data given by the caller.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CloudError {
@@ -24,10 +25,13 @@ pub enum CloudError {
         /// How many there are.
         count: usize,
     },
-    /// A radius is zero, negative, NaN or infinite.
-    #[error("the radius of point {index} is {radius}: radii must be finite and greater than zero")]
+    /// A radius is zero, negative, NaN, infinite, or so extreme that `f32` cannot hold the volumes
+    /// made from it.
+    #[error(
+        "the radius of point {index} is {radius}: radii must be between 1e-12 and 1e12; choose another, or another unit of length"
+    )]
     BadRadius {
-        /// The first such point.
+        /// The first such point (0 for a global radius).
         index: usize,
         /// Its radius in metres.
         radius: f32,
@@ -35,7 +39,7 @@ pub enum CloudError {
     /// An attribute has another number of entries than there are points.
     #[error("{attribute} has {actual} entries for {expected} points: give one per point")]
     LengthMismatch {
-        /// The attribute: "radii", "normals", "colors", "y", …
+        /// The attribute: "radii", "normals", "colors", "y", "z".
         attribute: &'static str,
         /// Number of points.
         expected: usize,
@@ -50,7 +54,8 @@ pub enum CloudError {
         /// Most points that one cloud can have.
         limit: usize,
     },
-    /// Near this coordinate, `f32` steps are coarse against the point radius.
+    /// A coordinate exceeds 2¹⁹ (524,288) times the point's radius: there, a step of `f32` may be
+    /// more than a sixteenth of the radius.
     #[error(
         "point {index} has coordinate {coordinate}, where f32 steps are too coarse for its radius {radius}: move the cloud's origin nearer and put the offset into the body's pose"
     )]
@@ -71,5 +76,21 @@ pub enum CloudError {
         value: f32,
         /// What is allowed.
         expected: &'static str,
+    },
+    /// Radii cannot be made from nearest neighbours, since all points are at one position.
+    #[error(
+        "all {count} points are at one position, so that neighbours give no radius: give one with CloudBuilder::radius"
+    )]
+    NoSpacing {
+        /// Number of points.
+        count: usize,
+    },
+    /// Normals were given, but all are zero or not finite.
+    #[error(
+        "none of the {count} normals is finite and other than zero: leave them out, or use CloudBuilder::pca_normals"
+    )]
+    NoUsableNormal {
+        /// Number of normals.
+        count: usize,
     },
 }

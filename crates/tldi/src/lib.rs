@@ -10,8 +10,16 @@ mod builder;
 mod camera;
 mod cloud;
 mod contacts;
+mod cpu;
 mod error;
+mod gather;
+mod knn;
+mod morton;
+mod normals;
+pub mod paper;
 mod params;
+mod patches;
+mod radii;
 mod surface;
 #[allow(clippy::module_inception, reason = "the image is the crate's namesake")]
 mod tldi;
@@ -23,9 +31,12 @@ pub use builder::{CloudBuilder, NonFinite, Positions};
 pub use camera::{Projection, VirtualCamera};
 pub use cloud::{BLOCK, PointCloud, Radii};
 pub use contacts::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS};
+pub use cpu::{CpuBackend, build};
 pub use error::CloudError;
 pub use glamx;
+pub use knn::{KdTree, Neighbor};
 pub use params::{Params, Variant};
+pub use patches::{MAX_PATCHES, PatchScratch};
 pub use surface::{RayHit, RaySurface, Surface};
 
 /// A view axis is kept from frame to frame while the zone's normals agree with it within this

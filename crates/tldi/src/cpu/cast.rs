@@ -1,0 +1,60 @@
+//! Stage `cast`: the image of an exact surface, one ray a pixel.
+
+use super::splat::Rect;
+use crate::{Facing, Layer, RayHit, RaySurface, Tldi, VirtualCamera};
+use glamx::Pose3;
+
+/// Builds `out` over the pixels of `cover`, an image of the other surface with an orthographic
+/// camera; pixels in which that has no layer stay empty, for nothing there can be compared.
+/// Rays run from depth `near` to depth `far`, in metres.
+pub(crate) fn cast(
+    surface: &dyn RaySurface,
+    frame_from_surface: &Pose3,
+    camera: &VirtualCamera,
+    cover: &Tldi,
+    (near, far): (f32, f32),
+    hits: &mut Vec<RayHit>,
+    out: &mut Tldi,
+) {
+    let rect = Rect {
+        origin: cover.origin,
+        size: cover.size,
+    };
+    out.camera = *camera;
+    out.origin = rect.origin;
+    out.size = rect.size;
+    out.layers.clear();
+    out.offsets.clear();
+    out.offsets.push(0);
+    let closed = surface.is_closed();
+    let direction = frame_from_surface.rotation.inverse() * camera.axis();
+    let view_from_surface = camera.view_from_frame.rotation * frame_from_surface.rotation;
+    for pixel in 0..rect.pixels() {
+        if !cover.layers_of(pixel).is_empty() {
+            let i = rect.origin[0] + (pixel % rect.size[0] as usize) as i32;
+            let j = rect.origin[1] + (pixel / rect.size[0] as usize) as i32;
+            let start = camera.point_at(i as f32 + 0.5, j as f32 + 0.5, near);
+            let origin = frame_from_surface.inverse_transform_point(start);
+            hits.clear();
+            surface.crossings(origin, direction, far - near, hits);
+            for hit in hits.iter() {
+                let depth = near + hit.distance;
+                let normal = view_from_surface * hit.normal;
+                let facing = match closed {
+                    true if normal.z < 0.0 => Facing::Entry,
+                    true => Facing::Exit,
+                    false => Facing::Unknown,
+                };
+                out.layers.push(Layer {
+                    near: depth,
+                    far: depth,
+                    depth,
+                    normal: if closed || normal.z < 0.0 { normal } else { -normal },
+                    facing,
+                    color: [0; 4],
+                });
+            }
+        }
+        out.offsets.push(out.layers.len() as u32);
+    }
+}

@@ -1,0 +1,185 @@
+//! Stage `zone`: which of the culled points are near the other cloud.
+//!
+//! One bit per cell of a coarse grid over the overlap, dilated by one cell: whatever is within one
+//! cell edge of the other cloud is found, at a cost linear in points and cells. If nothing is
+//! found the pair is rejected before any image is built.
+
+use super::cull::Survivors;
+use crate::Aabb;
+use glamx::Vec3;
+
+/// Most cells of the grid: 4 Mi bits are 512 KiB, which stays in a core's cache. Larger overlaps
+/// get larger cells, which only makes the stage less selective.
+const MAX_CELLS: f32 = (1 << 22) as f32;
+
+/// The grid and its bits, kept from call to call.
+#[derive(Default)]
+pub(crate) struct ZoneScratch {
+    bits: Vec<u64>,
+    dilated: Vec<u64>,
+}
+
+struct Grid {
+    min: Vec3,
+    inv_cell: f32,
+    /// Cells along x, y, z; rows along x are padded to whole words.
+    dims: [usize; 3],
+    row_words: usize,
+}
+
+impl Grid {
+    fn new(bounds: &Aabb, reach: f32) -> Self {
+        let extents = bounds.extents().max(Vec3::ZERO);
+        let mut cell = reach;
+        let count = |cell: f32| {
+            let n = (extents / cell).floor() + Vec3::ONE;
+            n.x * n.y * n.z
+        };
+        while count(cell) > MAX_CELLS {
+            cell *= 1.26; // a third of an octave: twice fewer cells
+        }
+        let dims = (extents / cell).floor() + Vec3::ONE;
+        let dims = [dims.x as usize, dims.y as usize, dims.z as usize];
+        Self {
+            min: bounds.min,
+            inv_cell: 1.0 / cell,
+            dims,
+            row_words: dims[0].div_ceil(64),
+        }
+    }
+
+    fn words(&self) -> usize {
+        self.row_words * self.dims[1] * self.dims[2]
+    }
+
+    /// Word and bit of a point; points outside count to the nearest cell.
+    fn locate(&self, p: Vec3) -> (usize, u32) {
+        let c = (p - self.min) * self.inv_cell;
+        let clamp = |c: f32, n: usize| (c.max(0.0) as usize).min(n - 1);
+        let [x, y, z] = [
+            clamp(c.x, self.dims[0]),
+            clamp(c.y, self.dims[1]),
+            clamp(c.z, self.dims[2]),
+        ];
+        let row = (z * self.dims[1] + y) * self.row_words;
+        (row + x / 64, (x % 64) as u32)
+    }
+
+    fn mark(&self, points: &Survivors, bits: &mut Vec<u64>) {
+        bits.clear();
+        bits.resize(self.words(), 0);
+        for i in 0..points.len() {
+            let (word, bit) = self.locate(points.point(i));
+            bits[word] |= 1 << bit;
+        }
+    }
+
+    /// Grows the marked cells by one cell in all 26 directions. `spare` is overwritten.
+    fn dilate(&self, bits: &mut [u64], spare: &mut Vec<u64>) {
+        spare.clear();
+        spare.resize(bits.len(), 0);
+        let w = self.row_words;
+        let [_, ny, nz] = self.dims;
+        // Along x, with carries between the words of a row.
+        for row in 0..ny * nz {
+            let src = &bits[row * w..(row + 1) * w];
+            for k in 0..w {
+                let below = if k > 0 { src[k - 1] >> 63 } else { 0 };
+                let above = if k + 1 < w { src[k + 1] << 63 } else { 0 };
+                spare[row * w + k] = src[k] | src[k] << 1 | src[k] >> 1 | below | above;
+            }
+        }
+        // Along y, then z: rows are or-ed with their neighbours.
+        let neighbours = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
+        for z in 0..nz {
+            for y in 0..ny {
+                for k in 0..w {
+                    bits[(z * ny + y) * w + k] = neighbours(y, ny)
+                        .fold(0, |acc, y| acc | spare[(z * ny + y) * w + k]);
+                }
+            }
+        }
+        for z in 0..nz {
+            for rest in 0..ny * w {
+                spare[z * ny * w + rest] =
+                    neighbours(z, nz).fold(0, |acc, z| acc | bits[z * ny * w + rest]);
+            }
+        }
+        bits.copy_from_slice(spare);
+    }
+
+    fn select(&self, points: &Survivors, bits: &[u64], near: &mut Vec<u32>) {
+        near.clear();
+        near.extend((0..points.len() as u32).filter(|&i| {
+            let (word, bit) = self.locate(points.point(i as usize));
+            bits[word] >> bit & 1 == 1
+        }));
+    }
+}
+
+/// Fills `near_a` and `near_b` with the indices of the culled points that have a point of the
+/// other cloud within `reach` metres. A few farther ones (up to two cell diagonals) are included;
+/// none nearer is missed.
+pub(crate) fn zone(
+    a: &Survivors,
+    b: &Survivors,
+    bounds: &Aabb,
+    reach: f32,
+    scratch: &mut ZoneScratch,
+    near_a: &mut Vec<u32>,
+    near_b: &mut Vec<u32>,
+) {
+    let grid = Grid::new(bounds, reach);
+    grid.mark(a, &mut scratch.bits);
+    grid.dilate(&mut scratch.bits, &mut scratch.dilated);
+    grid.select(b, &scratch.bits, near_b);
+    if near_b.is_empty() {
+        near_a.clear();
+        return;
+    }
+    grid.mark(b, &mut scratch.bits);
+    grid.dilate(&mut scratch.bits, &mut scratch.dilated);
+    grid.select(a, &scratch.bits, near_a);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every pair within reach is found and nothing beyond the dilated cells, by brute force.
+    #[test]
+    fn selects_what_brute_force_selects() {
+        for seed in 0..40 {
+            let mut rng = fastrand::Rng::with_seed(seed);
+            let mut random = |n: usize| {
+                let mut s = Survivors::default();
+                for _ in 0..n {
+                    s.x.push(rng.f32() * 9.0);
+                    s.y.push(rng.f32());
+                    s.z.push(rng.f32() * 2.0);
+                }
+                s
+            };
+            let (a, b) = (random(60), random(50));
+            let bounds = Aabb {
+                min: Vec3::ZERO,
+                max: Vec3::new(9.0, 1.0, 2.0),
+            };
+            let reach = 0.05 + 0.3 * (seed as f32 / 40.0);
+            let (mut near_a, mut near_b) = (vec![], vec![]);
+            zone(&a, &b, &bounds, reach, &mut ZoneScratch::default(), &mut near_a, &mut near_b);
+            for (p, q, near) in [(&a, &b, &near_a), (&b, &a, &near_b)] {
+                for i in 0..p.len() {
+                    let distance = (0..q.len())
+                        .map(|j| p.point(i).distance(q.point(j)))
+                        .fold(f32::INFINITY, f32::min);
+                    let selected = near.contains(&(i as u32));
+                    assert!(selected || distance > reach, "seed {seed}: point {i} at {distance} missed");
+                    // Two neighbouring cells span at most two diagonals.
+                    let farthest = 2.0 * 3.0f32.sqrt() * reach * 1.0001;
+                    assert!(!selected || distance <= farthest, "seed {seed}: point {i} at {distance}");
+                }
+            }
+        }
+    }
+}

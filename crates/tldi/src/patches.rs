@@ -1,0 +1,442 @@
+//! Reduces contact pixels to contact patches: the last stage, on the CPU for every backend.
+//!
+//! Pixels are grouped by neighbourhood and normal. What a group yields follows its pixels
+//! continuously: normals and the deepest point are weighted means, and the support points are
+//! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
+
+use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, Params};
+use glamx::{Vec2, Vec3};
+
+/// Most patches of one pair, the deepest: a solver gains nothing from more.
+pub const MAX_PATCHES: usize = 32;
+
+/// Neighbouring pixels are linked if their points on either surface are within this many pixels ...
+const SAME_SURFACE_PX: f32 = 3.0;
+
+/// ... and belong to one group if their smoothed normals are within 30° too.
+const SAME_GROUP: f32 = 0.866;
+
+/// A patch whose unit normals have a mean shorter than this (a spread of about 14°) is split.
+const FLAT: f32 = 0.97;
+
+/// Patches of fewer pixels are not split.
+const LEAST_SPLIT: usize = 12;
+
+/// Splits in a row: at most eight parts a group.
+const MAX_SPLITS: u32 = 3;
+
+/// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal.
+const NORMAL_BAND: f32 = 2.0;
+
+/// Band whose pixels can be support points.
+const SUPPORT_BAND: f32 = 1.0;
+
+/// The gaps of a patch are taken to be at least this rough, in pixels: below, extent alone chooses
+/// the support points.
+const LEAST_ROUGHNESS: f32 = 0.05;
+
+/// Variance (1 − mean length) that a surface's normals are taken to have at least: keeps the
+/// weights of two perfectly flat surfaces finite.
+const LEAST_VARIANCE: f32 = 0.01;
+
+const NONE: u32 = u32::MAX;
+
+/// A contact pixel after averaging over its linked neighbours.
+#[derive(Clone, Copy, Debug)]
+struct Smooth {
+    count: f32,
+    gap: f32,
+    normal_a: Vec3,
+    normal_b: Vec3,
+    /// Unit normal from the first surface towards the second.
+    normal: Vec3,
+}
+
+/// Memory of [`PatchScratch::reduce`], kept from call to call.
+#[derive(Debug, Default)]
+pub struct PatchScratch {
+    /// First contact pixel at each pixel of a view's rectangle.
+    map: Vec<u32>,
+    /// Union-find parents; after grouping, the group of each contact pixel.
+    group: Vec<u32>,
+    /// Linked contact pixels.
+    links: Vec<(u32, u32)>,
+    smooth: Vec<Smooth>,
+    members: Vec<u32>,
+    stack: Vec<(usize, usize, u32)>,
+}
+
+impl PatchScratch {
+    /// Fills `out` with the patches of `contacts`, deepest first.
+    ///
+    /// `contacts` are ordered by view, row and column, as the stage `compare` leaves them. Cost:
+    /// linear in contact pixels but for sorting the groups.
+    pub fn reduce(
+        &mut self,
+        contacts: &[ContactPixel],
+        params: &Params,
+        out: &mut Vec<ContactPatch>,
+    ) {
+        out.clear();
+        if contacts.is_empty() {
+            return;
+        }
+        self.link(contacts, params);
+        self.smooth(contacts);
+        self.group();
+        self.members.clear();
+        self.members.extend(0..contacts.len() as u32);
+        let group = &self.group;
+        self.members.sort_by_key(|&m| (group[m as usize], m));
+        self.stack.clear();
+        let mut start = 0;
+        for part in self.members.chunk_by(|&a, &b| group[a as usize] == group[b as usize]) {
+            self.stack.push((start, start + part.len(), 0));
+            start += part.len();
+        }
+        while let Some((start, end, splits)) = self.stack.pop() {
+            let members = &mut self.members[start..end];
+            let shape = Shape::of(members, contacts, &self.smooth, params);
+            if splits < MAX_SPLITS && members.len() >= LEAST_SPLIT && shape.normal_length < FLAT {
+                let middle = shape.split(members, contacts);
+                if middle > 0 && middle < members.len() {
+                    self.stack.push((start, start + middle, splits + 1));
+                    self.stack.push((start + middle, end, splits + 1));
+                    continue;
+                }
+            }
+            shape.emit(members, contacts, &self.smooth, params, out);
+        }
+        let least = |p: &ContactPatch| p.points.iter().fold(f32::INFINITY, |m, c| m.min(c.gap));
+        out.sort_by(|p, q| least(p).total_cmp(&least(q)));
+        out.truncate(MAX_PATCHES);
+    }
+
+    /// Finds the pairs of neighbouring pixels that continue each other on both surfaces.
+    fn link(&mut self, contacts: &[ContactPixel], params: &Params) {
+        self.links.clear();
+        let limit = SAME_SURFACE_PX * params.pixel_size;
+        let mut first = 0;
+        for view in contacts.chunk_by(|c, d| c.view == d.view) {
+            let (lo, hi) = view.iter().fold(([i32::MAX; 2], [i32::MIN; 2]), |(lo, hi), c| {
+                ([0, 1].map(|k| lo[k].min(c.pixel[k])), [0, 1].map(|k| hi[k].max(c.pixel[k])))
+            });
+            // A rim of one pixel on the left and right spares the bounds checks.
+            let width = (hi[0] - lo[0] + 3) as usize;
+            let height = (hi[1] - lo[1] + 2) as usize;
+            let at = |p: [i32; 2]| {
+                (p[1] - lo[1]) as usize * width + (p[0] - lo[0] + 1) as usize
+            };
+            self.map.clear();
+            self.map.resize(width * height, NONE);
+            for (k, c) in view.iter().enumerate().rev() {
+                self.map[at(c.pixel)] = k as u32;
+            }
+            for (k, c) in view.iter().enumerate() {
+                let own = at(c.pixel);
+                for next in [own + 1, own + width - 1, own + width, own + width + 1] {
+                    let Some(start) = self.map.get(next).copied().filter(|&m| m != NONE) else {
+                        continue;
+                    };
+                    let same_pixel = view[start as usize].pixel;
+                    for (l, d) in view.iter().enumerate().skip(start as usize) {
+                        if d.pixel != same_pixel {
+                            break;
+                        }
+                        if c.point_a.distance(d.point_a) <= limit
+                            && c.point_b.distance(d.point_b) <= limit
+                        {
+                            self.links.push(((first + k) as u32, (first + l) as u32));
+                        }
+                    }
+                }
+            }
+            first += view.len();
+        }
+    }
+
+    /// Averages gaps and normals over linked neighbours: what is left of a sensor's noise is a
+    /// third or less.
+    fn smooth(&mut self, contacts: &[ContactPixel]) {
+        self.smooth.clear();
+        self.smooth.extend(contacts.iter().map(|c| Smooth {
+            count: 1.0,
+            gap: c.gap,
+            normal_a: c.normal_a,
+            normal_b: c.normal_b,
+            normal: Vec3::ZERO,
+        }));
+        for &(k, l) in &self.links {
+            for (to, from) in [(k, l), (l, k)] {
+                let (to, from) = (&mut self.smooth[to as usize], &contacts[from as usize]);
+                to.count += 1.0;
+                to.gap += from.gap;
+                to.normal_a += from.normal_a;
+                to.normal_b += from.normal_b;
+            }
+        }
+        for (s, c) in self.smooth.iter_mut().zip(contacts) {
+            s.gap /= s.count;
+            s.normal_a /= s.count;
+            s.normal_b /= s.count;
+            s.normal = common_normal(s.normal_a, s.normal_b).unwrap_or_else(|| c.normal());
+        }
+    }
+
+    /// Union-find over linked pixels of like normal.
+    fn group(&mut self) {
+        self.group.clear();
+        self.group.extend(0..self.smooth.len() as u32);
+        for &(k, l) in &self.links {
+            let normal = |k: u32| self.smooth[k as usize].normal;
+            if normal(k).dot(normal(l)) < SAME_GROUP {
+                continue;
+            }
+            let (root_k, root_l) = (root(&mut self.group, k), root(&mut self.group, l));
+            // The lower index becomes the root: groups do not depend on the order of the links.
+            let (low, high) = (root_k.min(root_l), root_k.max(root_l));
+            self.group[high as usize] = low;
+        }
+        for k in 0..self.group.len() as u32 {
+            self.group[k as usize] = root(&mut self.group, k);
+        }
+    }
+}
+
+/// Unit normal from the first surface towards the second, from the means of unit normals of both:
+/// weighted by the inverse of their variance, so that the flat side of an edge on a face, and the
+/// smooth side of a noisy scan, decide.
+fn common_normal(mean_a: Vec3, mean_b: Vec3) -> Option<Vec3> {
+    let weighted = |mean: Vec3| {
+        let spread = (1.0 - mean.length()).max(0.0);
+        mean.normalize_or_zero() / (spread + LEAST_VARIANCE)
+    };
+    (weighted(mean_a) - weighted(mean_b)).try_normalize()
+}
+
+fn root(parents: &mut [u32], mut k: u32) -> u32 {
+    while parents[k as usize] != k {
+        parents[k as usize] = parents[parents[k as usize] as usize];
+        k = parents[k as usize];
+    }
+    k
+}
+
+/// Weight of a gap `above` the smallest one: 1 there, falling smoothly to 0 at `band`.
+fn falloff(above: f32, band: f32) -> f32 {
+    let rest = (1.0 - above / band).max(0.0);
+    rest * rest
+}
+
+fn least_gap(members: &[u32], smooth: &[Smooth]) -> f32 {
+    members
+        .iter()
+        .fold(f32::INFINITY, |g, &m| g.min(smooth[m as usize].gap))
+}
+
+/// Normal and main directions of a patch.
+struct Shape {
+    normal: Vec3,
+    /// Length of the mean of the contact pixels' unit normals: 1 where they agree.
+    normal_length: f32,
+    least_gap: f32,
+    centre: Vec3,
+    /// Across the normal: the direction of largest extent, and the one across it.
+    axes: [Vec3; 2],
+    /// Standard deviations along the axes, metres.
+    sigma: [f32; 2],
+    /// Mean gap of the support band, metres, and its slope per sigma along the axes.
+    mean_gap: f32,
+    slope: [f32; 2],
+    /// Standard deviation of the gaps about that plane, metres.
+    roughness: f32,
+}
+
+impl Shape {
+    fn of(
+        members: &[u32],
+        contacts: &[ContactPixel],
+        smooth: &[Smooth],
+        params: &Params,
+    ) -> Self {
+        let least_gap = least_gap(members, smooth);
+        let (mut mean_a, mut mean_b, mut mean) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        let mut total = 0.0;
+        for s in members.iter().map(|&m| &smooth[m as usize]) {
+            let w = falloff(s.gap - least_gap, NORMAL_BAND * params.pixel_size);
+            mean_a += w * s.normal_a;
+            mean_b += w * s.normal_b;
+            mean += w * s.normal;
+            total += w;
+        }
+        let normal = common_normal(mean_a / total, mean_b / total)
+            .or_else(|| mean.try_normalize())
+            .unwrap_or(smooth[members[0] as usize].normal);
+        let band = SUPPORT_BAND * params.pixel_size;
+        let support = || {
+            members
+                .iter()
+                .filter(move |&&m| smooth[m as usize].gap - least_gap <= band)
+                .map(|&m| contacts[m as usize].middle())
+        };
+        let count = support().count() as f32;
+        let centre = support().sum::<Vec3>() / count;
+        let (u, v) = normal.any_orthonormal_pair();
+        let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
+        for p in support() {
+            let d = Vec2::new((p - centre).dot(u), (p - centre).dot(v));
+            uu += d.x * d.x;
+            uv += d.x * d.y;
+            vv += d.y * d.y;
+        }
+        let angle = 0.5 * (2.0 * uv).atan2(uu - vv);
+        let (sin, cos) = angle.sin_cos();
+        let axes = [cos * u + sin * v, cos * v - sin * u];
+        // A pixel has an extent of its own.
+        let least = 0.25 * params.pixel_size;
+        let sigma = axes.map(|axis| {
+            let variance = support().map(|p| (p - centre).dot(axis).powi(2)).sum::<f32>() / count;
+            variance.sqrt().max(least)
+        });
+        let mut shape = Self {
+            normal,
+            normal_length: mean.length() / total,
+            least_gap,
+            centre,
+            axes,
+            sigma,
+            mean_gap: 0.0,
+            slope: [0.0; 2],
+            roughness: 0.0,
+        };
+        shape.fit_gaps(members, contacts, smooth, params);
+        shape
+    }
+
+    fn in_band<'a>(
+        &self,
+        members: &'a [u32],
+        smooth: &'a [Smooth],
+        params: &Params,
+    ) -> impl Iterator<Item = usize> + use<'a> {
+        let limit = self.least_gap + SUPPORT_BAND * params.pixel_size;
+        let members = members.iter().map(|&m| m as usize);
+        members.filter(move |&m| smooth[m].gap <= limit)
+    }
+
+    /// Place of a contact pixel along the axes, in sigmas.
+    fn place(&self, contact: &ContactPixel) -> [f32; 2] {
+        let d = contact.middle() - self.centre;
+        [0, 1].map(|k| d.dot(self.axes[k]) / self.sigma[k])
+    }
+
+    /// Fits a plane to the gaps of the support band: along the main axes the slopes are separate.
+    fn fit_gaps(
+        &mut self,
+        members: &[u32],
+        contacts: &[ContactPixel],
+        smooth: &[Smooth],
+        params: &Params,
+    ) {
+        let (mut count, mut sum, mut along) = (0.0, 0.0, [0.0; 2]);
+        for m in self.in_band(members, smooth, params) {
+            let above = smooth[m].gap - self.least_gap;
+            let place = self.place(&contacts[m]);
+            count += 1.0;
+            sum += above;
+            for k in 0..2 {
+                along[k] += above * place[k];
+            }
+        }
+        self.mean_gap = self.least_gap + sum / count;
+        self.slope = along.map(|a| a / count);
+        let residuals = self
+            .in_band(members, smooth, params)
+            .map(|m| self.residual(&contacts[m], smooth[m].gap).powi(2));
+        let least = LEAST_ROUGHNESS * params.pixel_size;
+        self.roughness = (residuals.sum::<f32>() / count).sqrt().max(least);
+    }
+
+    /// How far a gap is above the fitted plane, metres.
+    fn residual(&self, contact: &ContactPixel, gap: f32) -> f32 {
+        let [u, v] = self.place(contact);
+        gap - self.mean_gap - self.slope[0] * u - self.slope[1] * v
+    }
+
+    /// Parts `members` by the plane through the centre across the longest axis; returns how many
+    /// are in the first part.
+    fn split(&self, members: &mut [u32], contacts: &[ContactPixel]) -> usize {
+        let longest = usize::from(self.sigma[1] > self.sigma[0]);
+        let behind = |m: u32| {
+            (contacts[m as usize].middle() - self.centre).dot(self.axes[longest]) >= 0.0
+        };
+        // Stable, so that members stay in the order of their pixels.
+        members.sort_by_key(|&m| behind(m));
+        members.partition_point(|&m| !behind(m))
+    }
+
+    /// Pushes a patch of support points and, where the middle is deeper than these by more than
+    /// the roughness (a ball's), one of the deepest point alone: a manifold takes four points.
+    ///
+    /// Support points are what the body would rest on: in each quadrant the pixel that is farthest
+    /// out and lowest, a sigma of extent against a sigma of roughness. They do not depend on how
+    /// far the body is tilted, so that a lifted edge stays in the manifold.
+    fn emit(
+        &self,
+        members: &[u32],
+        contacts: &[ContactPixel],
+        smooth: &[Smooth],
+        params: &Params,
+        out: &mut Vec<ContactPatch>,
+    ) {
+        let mut corners = [members[0] as usize; PATCH_POINTS];
+        let mut best = [f32::NEG_INFINITY; PATCH_POINTS];
+        for m in self.in_band(members, smooth, params) {
+            let [u, v] = self.place(&contacts[m]);
+            let low = -self.residual(&contacts[m], smooth[m].gap) / self.roughness;
+            for (k, out) in [u + v, v - u, u - v, -u - v].into_iter().enumerate() {
+                if out + low > best[k] {
+                    best[k] = out + low;
+                    corners[k] = m;
+                }
+            }
+        }
+        let mut patch = ContactPatch {
+            normal: self.normal,
+            ..Default::default()
+        };
+        let mut least_corner = f32::INFINITY;
+        for (k, &m) in corners.iter().enumerate() {
+            if !corners[..k].contains(&m) {
+                let gap = smooth[m].gap;
+                least_corner = least_corner.min(gap);
+                patch
+                    .points
+                    .push(self.point(contacts[m].middle(), gap));
+            }
+        }
+        out.push(patch);
+        let (mut middle, mut gap, mut total) = (Vec3::ZERO, 0.0, 0.0);
+        for m in self.in_band(members, smooth, params) {
+            let w = falloff(smooth[m].gap - self.least_gap, self.roughness);
+            middle += w * contacts[m].middle();
+            gap += w * smooth[m].gap;
+            total += w;
+        }
+        let deepest = self.point(middle / total, gap / total);
+        if deepest.gap < least_corner - 0.5 * self.roughness {
+            out.push(ContactPatch {
+                normal: self.normal,
+                points: std::iter::once(deepest).collect(),
+            });
+        }
+    }
+
+    fn point(&self, middle: Vec3, gap: f32) -> ContactPoint {
+        ContactPoint {
+            point_a: middle - 0.5 * gap * self.normal,
+            point_b: middle + 0.5 * gap * self.normal,
+            gap,
+        }
+    }
+}

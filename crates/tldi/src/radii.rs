@@ -1,0 +1,108 @@
+//! Point radii: validation, and the spherical cover from nearest neighbours.
+
+use crate::{Aabb, CloudError, KdTree, Radii};
+use std::ops::RangeInclusive;
+
+/// Radii in metres that a cloud accepts: with [`COORDINATE_PER_RADIUS`], squares and cubes of all
+/// lengths stay within the range of `f32`.
+const RADIUS_RANGE: RangeInclusive<f32> = 1e-12..=1e12;
+
+/// Largest coordinate in units of the point's radius: 2¹⁹, where a step of `f32` (2⁻²³ of the
+/// coordinate, at most) is a sixteenth of the radius.
+const COORDINATE_PER_RADIUS: f32 = 524_288.0;
+
+/// Largest radius from nearest neighbours, in units of the median one.
+const CAP_PER_MEDIAN: f32 = 10.0;
+
+/// Whether a cloud accepts the radius.
+pub(crate) fn is_valid(radius: f32) -> bool {
+    RADIUS_RANGE.contains(&radius)
+}
+
+/// Fails for the first radius that a cloud does not accept. `given_index` turns an index of
+/// `radii` into the user's.
+pub(crate) fn check_radii(
+    radii: &Radii<'_>,
+    given_index: impl Fn(usize) -> usize,
+) -> Result<(), CloudError> {
+    let bad = |index, radius| Err(CloudError::BadRadius { index, radius });
+    match radii {
+        Radii::Global(r) if !is_valid(*r) => bad(0, *r),
+        Radii::Global(_) => Ok(()),
+        Radii::PerPoint(r) => match r.iter().position(|r| !is_valid(*r)) {
+            Some(i) => bad(given_index(i), r[i]),
+            None => Ok(()),
+        },
+    }
+}
+
+/// Fails for the first point whose coordinates are too coarse for its radius. `given_index` turns
+/// an index of the coordinates into the user's.
+pub(crate) fn check_coordinates(
+    coordinates: [&[f32]; 3],
+    bounds: Aabb,
+    radii: &Radii<'_>,
+    given_index: impl Fn(usize) -> usize,
+) -> Result<(), CloudError> {
+    let [x, y, z] = coordinates;
+    let largest = |i: usize| x[i].abs().max(y[i].abs()).max(z[i].abs());
+    let too_large = match radii {
+        Radii::Global(r) => {
+            let limit = COORDINATE_PER_RADIUS * r;
+            if bounds.min.abs().max(bounds.max.abs()).max_element() <= limit {
+                return Ok(());
+            }
+            (0..x.len()).find(|&i| largest(i) > limit)
+        }
+        Radii::PerPoint(r) => (0..x.len()).find(|&i| largest(i) > COORDINATE_PER_RADIUS * r[i]),
+    };
+    match too_large {
+        None => Ok(()),
+        Some(i) => Err(CloudError::CoordinateTooLarge {
+            index: given_index(i),
+            coordinate: [x[i], y[i], z[i]]
+                .into_iter()
+                .fold(0.0, |a: f32, b| if b.abs() > a.abs() { b } else { a }),
+            radius: match radii {
+                Radii::Global(r) => *r,
+                Radii::PerPoint(r) => r[i],
+            },
+        }),
+    }
+}
+
+/// Mean and largest radius in metres.
+pub(crate) fn mean_and_max(radii: &Radii<'_>) -> (f32, f32) {
+    match radii {
+        Radii::Global(r) => (*r, *r),
+        Radii::PerPoint(r) => {
+            let sum: f64 = r.iter().copied().map(f64::from).sum();
+            let mean = (sum / r.len() as f64) as f32;
+            (mean, r.iter().copied().fold(0.0, f32::max))
+        }
+    }
+}
+
+/// `scale` × the distance to the `k`-th nearest other position (the farthest, where there are
+/// fewer), for each point; `k` is at least 1. With m the median of that over all distinct positions,
+/// radii above [`CAP_PER_MEDIAN`] × m are lowered to it, and radii that [`check_coordinates`] would
+/// refuse are raised to what it accepts, but not above m: a few points that nearly coincide do not
+/// make a cloud unusable, while coordinates too large for its typical spacing do.
+pub(crate) fn knn_radii(tree: &KdTree, k: usize, scale: f32) -> Result<Vec<f32>, CloudError> {
+    if tree.distinct() < 2 {
+        return Err(CloudError::NoSpacing { count: tree.len() });
+    }
+    let mut radii = tree.map_positions(k, |_, neighbors| {
+        let farthest = neighbors.last().map_or(0.0, |n| n.distance_squared);
+        (f64::from(scale) * farthest.sqrt()) as f32
+    });
+    let mut sorted = radii.clone();
+    let middle = (sorted.len() - 1) / 2;
+    let (_, median, _) = sorted.select_nth_unstable_by(middle, f32::total_cmp);
+    for (entry, radius) in radii.iter_mut().enumerate() {
+        let largest = tree.position(entry).abs().max_element();
+        let floor = (largest / COORDINATE_PER_RADIUS).min(*median);
+        *radius = radius.min(CAP_PER_MEDIAN * *median).max(floor);
+    }
+    Ok(tree.spread(&radii))
+}

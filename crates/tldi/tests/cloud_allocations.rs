@@ -1,0 +1,84 @@
+//! Giving a warm cloud new points allocates nothing. A binary of its own with one test, since the
+//! allocations of all threads are counted.
+
+use fastrand::Rng;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use tldi::PointCloud;
+use tldi::glamx::Vec3;
+
+struct Counting;
+
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: everything is handed to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promise is the one that the system's allocator asks for.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        // SAFETY: the memory came from the system's allocator with this layout.
+        unsafe { System.dealloc(memory, layout) }
+    }
+    unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the memory came from the system's allocator with this layout.
+        unsafe { System.realloc(memory, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// Allocations made by `f`.
+fn allocations(f: impl FnOnce()) -> usize {
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    f();
+    ALLOCATIONS.load(Ordering::Relaxed) - before
+}
+
+#[test]
+fn a_warm_cloud_allocates_nothing() {
+    let mut rng = Rng::with_seed(1);
+    let mut frame = |count: usize| -> Vec<Vec3> {
+        let mut point = || {
+            Vec3::new(
+                rng.f32(),
+                rng.f32(),
+                if rng.u8(..9) > 0 { 1.0 } else { f32::NAN },
+            )
+        };
+        (0..count).map(|_| point()).collect()
+    };
+    let frames = [frame(3000), frame(2500), frame(3000), frame(10)];
+    let whole: Vec<Vec3> = (0..3000).map(|i| Vec3::splat(i as f32)).collect();
+    let normals = vec![2.0 * Vec3::Y; 3000];
+    let mut plain = PointCloud::builder(&whole)
+        .radius(0.1)
+        .build()
+        .expect("valid");
+    let mut ordered = PointCloud::builder(&whole)
+        .spatial_order()
+        .build()
+        .expect("valid");
+    assert!(
+        allocations(|| drop(frames[0].clone())) > 0,
+        "the counter works"
+    );
+
+    let mut round = || {
+        for frame in &frames {
+            plain.set_points(frame, None).expect("valid");
+        }
+        plain.set_points(&whole, None).expect("valid");
+        for _ in 0..3 {
+            ordered.set_points(&whole, Some(&normals)).expect("valid");
+        }
+    };
+    // The memory that is filled and the memory that is replaced take turns: both must have grown.
+    round();
+    round();
+    assert_eq!(allocations(&mut round), 0);
+}

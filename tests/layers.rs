@@ -1,0 +1,130 @@
+//! The image of one cloud against brute force and analytic truth.
+
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{Facing, Params, PointCloud, VirtualCamera, build};
+use tldi_tests::{oracle_layers, random_unit, sampled_sphere};
+
+/// Every pixel's layers equal those of an O(n²) sort-and-merge in f64.
+#[test]
+fn layers_equal_brute_force() {
+    let (mut compared, mut too_close) = (0, 0);
+    for seed in 0..60 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let count = rng.usize(1..120);
+        let spread = 0.02 + 0.3 * rng.f32();
+        let mut point = || Vec3::from_array(std::array::from_fn(|_| spread * (rng.f32() - 0.5)));
+        let points: Vec<_> = (0..count).map(|_| point()).collect();
+        let radii: Vec<_> = (0..count).map(|_| 0.002 + 0.02 * rng.f32()).collect();
+        let normals: Vec<_> = (0..count).map(|_| random_unit(&mut rng)).collect();
+        let cloud = PointCloud::builder(&points)
+            .radii(radii)
+            .normals(normals)
+            .build()
+            .expect("random points are valid");
+        let params = Params::for_radius(0.01);
+        let camera = VirtualCamera::along(Vec3::Z, params.pixel_size);
+        // The camera's own frame, so that the oracle needs no rotation.
+        let image = build(&cloud, &camera.view_from_frame.inverse(), &camera, &params);
+        for j in 0..image.size[1] {
+            for i in 0..image.size[0] {
+                let [u, v] = [image.origin[0] + i as i32, image.origin[1] + j as i32];
+                let Some(truth) = oracle_layers(&cloud, u, v, &params) else {
+                    too_close += 1;
+                    continue;
+                };
+                compared += 1;
+                let layers = image.layers_at(i, j);
+                assert_eq!(layers.len(), truth.len(), "seed {seed}, pixel ({u}, {v})");
+                for (layer, (near, far, depth)) in layers.iter().zip(truth) {
+                    // Two fixed-point steps (merge gap / 4096 each) and weights in 255ths of the
+                    // merge gap's spread.
+                    let step = f64::from(params.merge_gap) / 4096.0;
+                    let spread = (far - near) / 100.0;
+                    assert!((f64::from(layer.near) - near).abs() < 2.0 * step, "seed {seed}");
+                    assert!((f64::from(layer.far) - far).abs() < 2.0 * step, "seed {seed}");
+                    assert!((f64::from(layer.depth) - depth).abs() < 2.0 * step + spread, "seed {seed}");
+                }
+            }
+        }
+    }
+    assert!(compared > 20_000, "{compared}");
+    assert!(too_close * 50 < compared, "{too_close} of {compared} undecided");
+}
+
+/// A sphere is entered and left at the analytic depths, with the analytic normals.
+#[test]
+fn a_sphere_has_two_layers_at_the_analytic_depths() {
+    let (radius, r) = (0.2, 0.01);
+    let cloud = sampled_sphere(radius, r).cloud(r);
+    let params = Params::for_radius(r);
+    let mut rng = fastrand::Rng::with_seed(7);
+    for _ in 0..8 {
+        let camera = VirtualCamera::along(random_unit(&mut rng), r);
+        let image = build(&cloud, &Pose3::IDENTITY, &camera, &params);
+        for j in 0..image.size[1] {
+            for i in 0..image.size[0] {
+                let x = (image.origin[0] + i as i32) as f32 + 0.5;
+                let y = (image.origin[1] + j as i32) as f32 + 0.5;
+                let rho = r * x.hypot(y);
+                // Steeper than 60° the damped slope lags behind the surface.
+                if rho > radius * 0.87 {
+                    continue;
+                }
+                let layers = image.layers_at(i, j);
+                assert_eq!(layers.len(), 2, "at {rho}");
+                let depth = (radius * radius - rho * rho).sqrt();
+                for (layer, facing, sign) in
+                    [(&layers[0], Facing::Entry, -1.0), (&layers[1], Facing::Exit, 1.0)]
+                {
+                    assert_eq!(layer.facing, facing);
+                    // A quarter of a radius: slope damping leaves 0.3 of tan 60° of the mean
+                    // offset of the splats around a pixel's centre.
+                    assert!((layer.depth - sign * depth).abs() < 0.25 * r, "at {rho}: {layer:?}");
+                    let normal = Vec3::new(r * x, r * y, sign * depth) / radius;
+                    assert!(layer.normal.dot(normal) > 0.99, "at {rho}: {layer:?}");
+                }
+            }
+        }
+    }
+}
+
+/// 10⁵ points in one pixel are one layer, exactly in the middle, in any order.
+#[test]
+fn a_hot_pixel_is_one_layer() {
+    let count = 100_000;
+    let mut points: Vec<_> = (0..count)
+        .map(|k| Vec3::new(0.005, 0.005, k as f32 * 1e-6 - 0.05))
+        .collect();
+    let image = |points: &[Vec3]| {
+        let cloud = PointCloud::builder(points)
+            .radius(0.01)
+            .normals(vec![Vec3::Z; points.len()])
+            .build()
+            .expect("the points are valid");
+        let camera = VirtualCamera::along(Vec3::Z, 0.01);
+        let frame_from_cloud = camera.view_from_frame.inverse();
+        build(&cloud, &frame_from_cloud, &camera, &Params::for_radius(0.01))
+    };
+    let straight = image(&points);
+    let [i, j] = [0, 1].map(|k| (0 - straight.origin[k]) as u32);
+    let layers = straight.layers_at(i, j);
+    assert_eq!(layers.len(), 1);
+    assert!((layers[0].depth - 0.0).abs() < 1e-5, "{:?}", layers[0]);
+    fastrand::Rng::with_seed(5).shuffle(&mut points);
+    assert_eq!(straight.layers(), image(&points).layers());
+}
+
+/// Colours blend with the same weights as depths; a cloud without colours has alpha 0.
+#[test]
+fn colours_blend() {
+    let cloud = PointCloud::builder(vec![Vec3::new(0.005, 0.005, 0.0); 2])
+        .radius(0.01)
+        .normals(vec![Vec3::Z; 2])
+        .colors(vec![[200, 0, 100, 255], [100, 50, 0, 255]])
+        .build()
+        .expect("the points are valid");
+    let camera = VirtualCamera::along(Vec3::Z, 0.01);
+    let params = Params::for_radius(0.01);
+    let image = build(&cloud, &camera.view_from_frame.inverse(), &camera, &params);
+    assert!(image.layers().iter().all(|l| l.color == [150, 25, 50, 255]));
+}

@@ -1,0 +1,115 @@
+//! Brute-force counterparts of the stages, written from their descriptions and sharing no code
+//! with them.
+
+use tldi::glamx::Vec3;
+use tldi::{Params, PointCloud};
+
+/// One splat in one pixel, as the description of the oriented variant has it.
+#[derive(Clone, Copy, Debug)]
+pub struct OracleFragment {
+    /// Depth of the tangent plane at the pixel's centre, slope damped, metres.
+    pub depth: f64,
+    /// Relative weight.
+    pub weight: f64,
+    /// 0 entry, 1 exit or unoriented, 2 edge-on.
+    pub class: u8,
+}
+
+/// The layers `(near, far, depth)` of pixel `(i, j)` of an orthographic camera that looks along
+/// +z with pixel edges of `params.pixel_size`: every splat of the cloud is tried (O(points)), and
+/// fragments are merged one by one into any layer of their class within the merge gap until
+/// nothing changes (O(n²)).
+///
+/// `None` where a decision (covered or not, which class, merged or not) is closer than `f32` can
+/// tell: there the oracle knows no better than what it judges.
+pub fn oracle_layers(
+    cloud: &PointCloud,
+    i: i32,
+    j: i32,
+    params: &Params,
+) -> Option<Vec<(f64, f64, f64)>> {
+    let pixel = f64::from(params.pixel_size);
+    let normals = cloud.normals().expect("the oracle needs normals");
+    let mut runs: Vec<Vec<OracleFragment>> = Vec::new();
+    for (k, p) in cloud.points().enumerate() {
+        if let Some(f) = fragment(cloud, p, normals[k], k, [i, j], pixel, params)? {
+            runs.push(vec![f]);
+        }
+    }
+    let gap = f64::from(params.merge_gap);
+    for (k, f) in runs.iter().enumerate() {
+        let close = |g: &[OracleFragment]| ((f[0].depth - g[0].depth).abs() - gap).abs() < 1e-3 * gap;
+        if runs[..k].iter().any(|g| close(g)) {
+            return None;
+        }
+    }
+    'merge: loop {
+        for a in 0..runs.len() {
+            for b in a + 1..runs.len() {
+                let touching = runs[a].iter().any(|f| {
+                    runs[b]
+                        .iter()
+                        .any(|g| f.class == g.class && (f.depth - g.depth).abs() <= gap)
+                });
+                if touching {
+                    let other = runs.swap_remove(b);
+                    runs[a].extend(other);
+                    continue 'merge;
+                }
+            }
+        }
+        break;
+    }
+    let mut layers: Vec<_> = runs
+        .iter()
+        .map(|run| {
+            let near = run.iter().map(|f| f.depth).fold(f64::INFINITY, f64::min);
+            let far = run.iter().map(|f| f.depth).fold(f64::NEG_INFINITY, f64::max);
+            let weight: f64 = run.iter().map(|f| f.weight).sum();
+            let depth = run.iter().map(|f| f.weight * f.depth).sum::<f64>() / weight;
+            (near, far, depth)
+        })
+        .collect();
+    layers.sort_by(|a, b| a.2.total_cmp(&b.2));
+    Some(layers)
+}
+
+/// The outer `None` is "too close to tell".
+fn fragment(
+    cloud: &PointCloud,
+    p: Vec3,
+    n: Vec3,
+    k: usize,
+    [i, j]: [i32; 2],
+    pixel: f64,
+    params: &Params,
+) -> Option<Option<OracleFragment>> {
+    let (p, n) = (p.as_dvec3(), n.as_dvec3());
+    let radius = f64::from(cloud.radius(k)).max(0.75 * pixel);
+    let dx = (f64::from(i) + 0.5) * pixel - p.x;
+    let dy = (f64::from(j) + 0.5) * pixel - p.y;
+    let rise = -(n.x * dx + n.y * dy) / n.z;
+    let rise = if rise.is_finite() { rise.clamp(-radius, radius) } else { 0.0 };
+    let share = 1.0 - (dx * dx + dy * dy + rise * rise) / (radius * radius);
+    let near_rim = |c: f64| (c - c.round()).abs() < 1e-5;
+    if share.abs() < 1e-4
+        || (n.z.abs() - 0.2).abs() < 1e-5
+        || (dx.abs().max(dy.abs()) < pixel && (near_rim(p.x / pixel) || near_rim(p.y / pixel)))
+    {
+        return None;
+    }
+    let own = (p.x / pixel).floor() == f64::from(i) && (p.y / pixel).floor() == f64::from(j);
+    if share <= 0.0 && !own {
+        return Some(None);
+    }
+    let class = match n.z {
+        z if z.abs() < 0.2 => 2,
+        z if cloud.normals_oriented() && z <= 0.0 => 0,
+        _ => 1,
+    };
+    Some(Some(OracleFragment {
+        depth: p.z + f64::from(params.slope_damping) * rise,
+        weight: (1.0 + 254.0 * share.max(0.0) * n.z.abs()).floor(),
+        class,
+    }))
+}

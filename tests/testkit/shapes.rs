@@ -1,0 +1,94 @@
+//! Points on analytic surfaces, with their true outward normals.
+
+use tldi::PointCloud;
+use tldi::glamx::{Vec2, Vec3};
+
+/// Points and outward normals of a surface.
+#[derive(Clone, Debug, Default)]
+pub struct Samples {
+    /// Positions, metres.
+    pub points: Vec<Vec3>,
+    /// Outward unit normals.
+    pub normals: Vec<Vec3>,
+}
+
+impl Samples {
+    /// A cloud with these oriented normals and one radius in metres.
+    pub fn cloud(&self, radius: f32) -> PointCloud<'static> {
+        PointCloud::builder(self.points.clone())
+            .radius(radius)
+            .normals(self.normals.clone())
+            .build()
+            .expect("analytic samples are valid")
+    }
+
+    /// A cloud without normals.
+    pub fn bare_cloud(&self, radius: f32) -> PointCloud<'static> {
+        PointCloud::builder(self.points.clone())
+            .radius(radius)
+            .build()
+            .expect("analytic samples are valid")
+    }
+
+    fn push(&mut self, point: Vec3, normal: Vec3) {
+        self.points.push(point);
+        self.normals.push(normal);
+    }
+}
+
+/// A sphere about the origin, points about `spacing` metres apart (Fibonacci lattice).
+pub fn sampled_sphere(radius: f32, spacing: f32) -> Samples {
+    let count = (4.0 * std::f32::consts::PI * radius * radius / (spacing * spacing)).ceil() as usize;
+    let golden = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
+    let mut samples = Samples::default();
+    for i in 0..count {
+        let y = 1.0 - 2.0 * (i as f64 + 0.5) / count as f64;
+        let (s, c) = (golden * i as f64).sin_cos();
+        let r = (1.0 - y * y).sqrt();
+        let normal = Vec3::new((r * c) as f32, y as f32, (r * s) as f32);
+        samples.push(radius * normal, normal);
+    }
+    samples
+}
+
+/// A square in the plane y = 0 about the origin with edges of `size` metres and normal +y, points
+/// moved at random by up to 0.3 `spacing` within the plane.
+pub fn sampled_plane(size: f32, spacing: f32, rng: &mut fastrand::Rng) -> Samples {
+    let mut samples = Samples::default();
+    grid(Vec2::splat(size), spacing, rng, |p| {
+        samples.push(Vec3::new(p.x, 0.0, p.y), Vec3::Y);
+    });
+    samples
+}
+
+/// The six faces of a box about the origin.
+pub fn sampled_box(half: Vec3, spacing: f32, rng: &mut fastrand::Rng) -> Samples {
+    let mut samples = Samples::default();
+    for axis in 0..3 {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for sign in [-1.0, 1.0] {
+            let mut normal = Vec3::ZERO;
+            normal[axis] = sign;
+            grid(2.0 * Vec2::new(half[u], half[v]), spacing, rng, |p| {
+                let mut point = normal * half;
+                point[u] = p.x;
+                point[v] = p.y;
+                samples.push(point, normal);
+            });
+        }
+    }
+    samples
+}
+
+/// Calls `visit` for a jittered grid over a rectangle of `size` about the origin, rim included.
+fn grid(size: Vec2, spacing: f32, rng: &mut fastrand::Rng, mut visit: impl FnMut(Vec2)) {
+    let cells = (size / spacing).ceil().max(Vec2::ONE);
+    let step = size / cells;
+    for j in 0..=cells.y as usize {
+        for i in 0..=cells.x as usize {
+            let p = Vec2::new(i as f32, j as f32) * step - 0.5 * size;
+            let jitter = 0.6 * step * Vec2::new(rng.f32() - 0.5, rng.f32() - 0.5);
+            visit((p + jitter).clamp(-0.5 * size, 0.5 * size));
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! The same bits at any number of threads.
+
+use tldi::glamx::Pose3;
+use tldi::{Backend, CpuBackend, PairQuery, PairResult, Params, Surface, View};
+use tldi_tests::{random_pose, sampled_sphere};
+
+#[test]
+fn results_do_not_depend_on_threads() {
+    let mut rng = fastrand::Rng::with_seed(11);
+    // Large enough for the cull to run in several tasks.
+    let (big, small) = (sampled_sphere(1.0, 0.009), sampled_sphere(0.3, 0.01));
+    let clouds = [big.cloud(0.009), small.cloud(0.01), big.bare_cloud(0.009), small.bare_cloud(0.01)];
+    assert!(clouds[0].len() > 100_000);
+    let poses: Vec<Pose3> = (0..8)
+        .map(|_| {
+            let mut pose = random_pose(&mut rng, 0.0);
+            pose.translation = pose.rotation * tldi::glamx::Vec3::X * (1.25 + 0.06 * rng.f32());
+            pose
+        })
+        .collect();
+    let run = |threads: usize| -> Vec<PairResult> {
+        let batch: Vec<_> = poses
+            .iter()
+            .enumerate()
+            .map(|(k, pose)| PairQuery {
+                a: Surface::Cloud(&clouds[2 * (k % 2)]),
+                b: Surface::Cloud(&clouds[2 * (k % 2) + 1]),
+                a_from_b: *pose,
+                view: View::Aim { toward_b: pose.translation, last_axis: None },
+                params: Params::for_radius(0.01),
+            })
+            .collect();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads can be started");
+        pool.install(|| {
+            let (mut backend, mut results) = (CpuBackend::new(), Vec::new());
+            // Twice: warm memory must not show either.
+            for _ in 0..2 {
+                backend.compare(&batch, &mut results).expect("the batch is supported");
+            }
+            results
+        })
+    };
+    let one = run(1);
+    assert!(one.iter().filter(|r| !r.contacts.is_empty()).count() >= 4);
+    for threads in [2, 7] {
+        assert_eq!(one, run(threads), "{threads} threads");
+    }
+}
