@@ -5,9 +5,22 @@
 //! no closed surface. Contact pixels pair a layer through which rays leave the second body with
 //! one through which they enter the first.
 
+use super::aim::MAX_VIEWS;
 use super::sweep::is_edge_on;
-use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi};
+use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera};
+use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
+
+/// Depths of the middles of both bodies, where a body's size says that it is one.
+///
+/// Without oriented normals a layer does not tell which side is inside. The smaller surface of a
+/// pair is then taken for a body that reaches at least to the middle of its bounds; the larger one
+/// for a sheet, in which no volume is invented.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Middles {
+    pub(crate) a: Option<f32>,
+    pub(crate) b: Option<f32>,
+}
 
 /// Adds what the view `view` (index into `axes`, unit vectors from `b` to `a`) sees to `result`.
 /// Both images have the same camera and rectangle.
@@ -16,12 +29,19 @@ pub(crate) fn compare(
     b: &Tldi,
     axes: &[Vec3],
     view: usize,
+    middles: &Middles,
     params: &Params,
     result: &mut PairResult,
 ) {
     debug_assert_eq!((a.origin, a.size), (b.origin, b.size));
     let [width, height] = a.size;
     let frame_from_view = a.camera.view_from_frame.inverse();
+    let mut others = ArrayVec::<Vec3, MAX_VIEWS>::new();
+    for (k, axis) in axes.iter().enumerate() {
+        if k != view {
+            others.push(a.camera.view_from_frame.rotation * *axis);
+        }
+    }
     for j in 0..height {
         for i in 0..width {
             let k = (j * width + i) as usize;
@@ -30,25 +50,40 @@ pub(crate) fn compare(
                 continue;
             }
             if !result.collides {
-                let crossing = |k: usize| crosses(la, lb, a.layers_of(k), b.layers_of(k), params);
+                let crossing =
+                    |k: usize| crosses(la, lb, a.layers_of(k), b.layers_of(k), &others, params);
                 result.collides = pierces(la, lb, params)
                     || (i + 1 < width && crossing(k + 1))
                     || (j + 1 < height && crossing(k + width as usize));
             }
-            let pixel = [a.origin[0] + i as i32, a.origin[1] + j as i32];
-            contact_pixels(
-                la,
-                lb,
-                &PixelView { pixel, tldi: a, frame_from_view: &frame_from_view, axes, view },
-                params,
-                result,
-            );
+            let at = PixelView {
+                pixel: [a.origin[0] + i as i32, a.origin[1] + j as i32],
+                camera: &a.camera,
+                frame_from_view: &frame_from_view,
+                view,
+                others: &others,
+                middles,
+            };
+            contact_pixels(la, lb, &at, params, result);
         }
     }
 }
 
+/// Whether no other view (axes in the frame of this one) sees a surface of this normal less
+/// steeply.
+fn best_seen(normal: Vec3, others: &[Vec3]) -> bool {
+    others.iter().all(|axis| axis.dot(normal).abs() <= normal.z.abs())
+}
+
 /// Whether a layer of `a` and one of `b` swap their order between two neighbouring pixels.
-fn crosses(a: &[Layer], b: &[Layer], a_next: &[Layer], b_next: &[Layer], params: &Params) -> bool {
+fn crosses(
+    a: &[Layer],
+    b: &[Layer],
+    a_next: &[Layer],
+    b_next: &[Layer],
+    others: &[Vec3],
+    params: &Params,
+) -> bool {
     let continuous = |from: &Layer, to: &[Layer]| {
         let next = to
             .iter()
@@ -64,6 +99,7 @@ fn crosses(a: &[Layer], b: &[Layer], a_next: &[Layer], b_next: &[Layer], params:
         continuous(la, a_next).is_some_and(|na| {
             b.iter().filter(|l| !is_edge_on(l)).any(|lb| {
                 (la.depth - lb.depth).abs() <= 2.0 * params.merge_gap
+                    && (best_seen(la.normal, others) || best_seen(lb.normal, others))
                     && continuous(lb, b_next)
                         .is_some_and(|nb| (la.depth - lb.depth) * (na - nb) < 0.0)
             })
@@ -85,10 +121,12 @@ fn pierces(a: &[Layer], b: &[Layer], params: &Params) -> bool {
 /// Where a pixel is.
 struct PixelView<'a> {
     pixel: [i32; 2],
-    tldi: &'a Tldi,
+    camera: &'a VirtualCamera,
     frame_from_view: &'a Pose3,
-    axes: &'a [Vec3],
     view: usize,
+    /// Axes of the other views, in the frame of this one.
+    others: &'a [Vec3],
+    middles: &'a Middles,
 }
 
 fn contact_pixels(
@@ -102,39 +140,19 @@ fn contact_pixels(
         if exit.facing == Facing::Entry || is_edge_on(exit) {
             continue;
         }
-        // Where the ray entered the part of b that it leaves here.
-        let entered = match exit.facing {
-            Facing::Exit => b[..kb]
-                .iter()
-                .rfind(|l| l.facing == Facing::Entry)
-                .map_or(f32::NEG_INFINITY, |l| l.depth),
-            _ => b[..kb]
-                .iter()
-                .rfind(|l| !is_edge_on(l))
-                .map_or(exit.depth - params.merge_gap, |l| l.depth),
-        };
-        let deepest = a
-            .iter()
-            .enumerate()
-            .filter(|(ka, la)| {
-                la.facing != Facing::Exit
-                    && !is_edge_on(la)
-                    && (entered <= la.depth || holds(&a[*ka..], entered))
-            })
-            .map(|(_, la)| la)
-            .min_by(|l, m| l.depth.total_cmp(&m.depth));
-        let Some(entry) = deepest else { continue };
+        let entered = entered_at(&b[..=kb], at.middles.b, params);
+        // What b has left behind altogether it does not touch.
+        let entry = (a.iter().enumerate())
+            .filter(|(_, la)| la.facing != Facing::Exit && !is_edge_on(la))
+            .find(|(ka, _)| entered <= left_at(&a[*ka..], at.middles.a, params));
+        let Some((_, entry)) = entry else { continue };
         // Outward normals in the view frame: the camera sees a from outside, b from inside.
         let normal_a = facing_camera(entry.normal, -1.0);
         let normal_b = facing_camera(exit.normal, 1.0);
         let normal = (normal_a - normal_b).normalize_or(-Vec3::Z);
         let along_view = entry.depth - exit.depth;
         let gap = along_view * normal.z.abs();
-        // Another view that sees this contact less steeply owns it.
-        let in_frame = |v: Vec3| at.frame_from_view.rotation * v;
-        let seen = |axis: &Vec3| axis.dot(in_frame(normal)).abs();
-        let own = seen(&at.axes[at.view]);
-        if at.axes.iter().any(|axis| seen(axis) > own) {
+        if !best_seen(normal, at.others) {
             continue;
         }
         result.gap = Some(result.gap.map_or(gap, |g| g.min(gap)));
@@ -145,12 +163,13 @@ fn contact_pixels(
         if gap > params.prediction {
             continue;
         }
+        let in_frame = |v: Vec3| at.frame_from_view.rotation * v;
         let [u, v] = at.pixel.map(|c| c as f32 + 0.5);
         result.contacts.push(ContactPixel {
             pixel: at.pixel,
             view: at.view as u32,
-            point_a: *at.frame_from_view * at.tldi.camera.view_at(u, v, entry.depth),
-            point_b: *at.frame_from_view * at.tldi.camera.view_at(u, v, exit.depth),
+            point_a: *at.frame_from_view * at.camera.view_at(u, v, entry.depth),
+            point_b: *at.frame_from_view * at.camera.view_at(u, v, exit.depth),
             normal_a: in_frame(normal_a),
             normal_b: in_frame(normal_b),
             gap,
@@ -158,13 +177,35 @@ fn contact_pixels(
     }
 }
 
-/// Whether `depth` is inside the solid that the ray enters at the first of `layers`.
-fn holds(layers: &[Layer], depth: f32) -> bool {
-    layers[0].facing == Facing::Entry
-        && layers[1..]
-            .iter()
-            .find(|l| l.facing == Facing::Exit)
-            .is_some_and(|exit| layers[0].depth < depth && depth < exit.depth)
+/// Depth at which the ray entered the part of a body that it leaves through the last of `layers`:
+/// unbounded where its normal says that there is an inside but the entry was culled.
+fn entered_at(layers: &[Layer], middle: Option<f32>, params: &Params) -> f32 {
+    let Some((exit, before)) = layers.split_last() else {
+        return f32::INFINITY;
+    };
+    let entry = |facing| before.iter().rfind(move |l| l.facing == facing && !is_edge_on(l));
+    match exit.facing {
+        Facing::Exit => entry(Facing::Entry).map_or(f32::NEG_INFINITY, |l| l.depth),
+        _ => entry(Facing::Unknown).map_or_else(
+            || (exit.depth - params.merge_gap).min(middle.unwrap_or(f32::INFINITY)),
+            |l| l.depth,
+        ),
+    }
+}
+
+/// Depth at which the ray leaves the part of a body that it enters through the first of `layers`.
+fn left_at(layers: &[Layer], middle: Option<f32>, params: &Params) -> f32 {
+    let Some((entry, behind)) = layers.split_first() else {
+        return f32::NEG_INFINITY;
+    };
+    let exit = |facing| behind.iter().find(move |l| l.facing == facing && !is_edge_on(l));
+    match entry.facing {
+        Facing::Entry => exit(Facing::Exit).map_or(f32::INFINITY, |l| l.depth),
+        _ => exit(Facing::Unknown).map_or_else(
+            || (entry.depth + params.merge_gap).max(middle.unwrap_or(f32::NEG_INFINITY)),
+            |l| l.depth,
+        ),
+    }
 }
 
 /// `normal` or its opposite, such that its z has the given sign.

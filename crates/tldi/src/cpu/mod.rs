@@ -18,6 +18,7 @@ use crate::{
     Surface, Tldi, Variant, View, VirtualCamera, paper,
 };
 use aim::{Hint, ZoneNormals};
+use compare::Middles;
 use cull::{CullScratch, Region, Survivors};
 use glamx::{Pose3, Vec3};
 use normals::NormalScratch;
@@ -450,9 +451,21 @@ impl Scratch {
             &self.b.image,
             &result.axes.clone(),
             view,
+            &middles(query, camera),
             &query.params,
             result,
         );
+    }
+}
+
+/// See [`Middles`].
+fn middles(query: &PairQuery, camera: &VirtualCamera) -> Middles {
+    let (bounds_a, bounds_b) = (query.a.bounds(), query.b.bounds());
+    let (size_a, size_b) = (bounds_a.extents().length(), bounds_b.extents().length());
+    let depth = |center: Vec3| Some(camera.view_from_point(center).z);
+    Middles {
+        a: if size_a <= size_b { depth(bounds_a.center()) } else { None },
+        b: if size_b <= size_a { depth(query.a_from_b * bounds_b.center()) } else { None },
     }
 }
 
