@@ -1,2 +1,295 @@
-//! Drop.
-fn main() {}
+//! Lets point-cloud bodies fall onto a point-cloud scan and come to rest.
+
+use anyhow::{Context, bail};
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use tldi::PointCloud;
+use tldi::glamx::Vec3;
+use tldi_examples::cli::{Common, UpChoice};
+use tldi_examples::render::{BODY_COLORS, Item, Paint, Scene};
+use tldi_examples::report::DropReport;
+use tldi_examples::scene::{BodyShape, furnished_room};
+use tldi_examples::simulation::{DropSimulation, NamedCloud, Snapshot};
+use tldi_examples::spots::{Demand, find_spots};
+use tldi_examples::up::{Confidence, Up, detect_up};
+use tldi_examples::{load, viewpoint};
+
+/// Lets point-cloud bodies fall onto a point-cloud scan and come to rest
+///
+/// Without files, a generated room and generated bodies are used. Ends with 0 if every step was
+/// taken and no body left the scan, with 1 if not, with 2 if the options cannot be used.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// Scan to drop bodies onto (PLY, PCD, XYZ or CSV, also as .gz); a generated room if left out
+    #[arg(long, value_name = "FILE")]
+    scan: Option<PathBuf>,
+    /// Body to drop, its y axis up; generated shapes if left out
+    #[arg(long, value_name = "FILE")]
+    body: Option<PathBuf>,
+    /// Number of bodies
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    count: u16,
+    /// Largest extent of a body in metres; if left out, as in the file where that is plausible
+    #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
+    size: Option<f32>,
+    /// Number of steps of 1/60 s
+    #[arg(long, value_name = "N", default_value_t = 300)]
+    steps: usize,
+    /// Direction against gravity in the frame of the scan; auto finds it in the scan
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        default_value = "auto",
+        allow_hyphen_values = true
+    )]
+    up: UpChoice,
+    /// Folder for initial.png, mid.png and final.png
+    #[arg(long, value_name = "DIR", default_value = "out/drop")]
+    out: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Distance between the points of a generated body, as a share of its width.
+const BODY_SPACING: f32 = 0.025;
+/// The step in which `mid.png` is made: bodies have just landed.
+const MID_STEP: usize = 15;
+/// Radius in mean radii up to which points of the scan are drawn: lone ones, such as a depth
+/// camera's flying pixels, have far larger ones and would hide what is behind them.
+const LARGEST_DRAWN_RADIUS: f32 = 3.0;
+const PICTURE_SIZE: [u32; 2] = [1280, 720];
+
+fn positive(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(number) if number > 0.0 && f32::is_finite(number) => Ok(number),
+        _ => Err("expected a number greater than 0".to_owned()),
+    }
+}
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    if let Err(error) = args.common.backend.require_available() {
+        eprintln!("error: {error}");
+        return ExitCode::from(2);
+    }
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> anyhow::Result<()> {
+    let scan = load_scan(args)?;
+    let up = choose_up(args.up, &scan);
+    let bodies = load_bodies(args, scan.mean_radius())?;
+    let demand = Demand {
+        count: bodies.len(),
+        body_radius: bodies
+            .iter()
+            .map(|body| ball_radius(&body.cloud))
+            .fold(0.0, f32::max),
+        seed: args.common.seed,
+    };
+    let spots = find_spots(&scan, up, &demand)?;
+    let mut simulation = DropSimulation::new(scan, up, bodies, &spots, args.common.seed)?;
+    let snapshots = simulate(&mut simulation, args.steps)?;
+    let report = simulation.report();
+    draw(&simulation, &report, up, &snapshots, &args.out)?;
+    if let Some(path) = &args.common.json {
+        write_file(path, &serde_json::to_vec_pretty(&report)?)?;
+    }
+    finish(&report)
+}
+
+fn load_scan(args: &Args) -> anyhow::Result<PointCloud<'static>> {
+    match &args.scan {
+        Some(path) => {
+            eprintln!("reading {}", path.display());
+            load::scan_from_file(path)
+        }
+        None => {
+            eprintln!("generating a room");
+            // Spacing and noise in metres, as of a good terrestrial scanner.
+            Ok(load::scan_from_surface(furnished_room(
+                0.012,
+                0.001,
+                args.common.seed,
+            ))?)
+        }
+    }
+}
+
+fn choose_up(choice: UpChoice, scan: &PointCloud<'_>) -> Vec3 {
+    if let UpChoice::Given(up) = choice {
+        return up;
+    }
+    let points: Vec<Vec3> = scan.points().collect();
+    let Up {
+        direction,
+        confidence,
+    } = detect_up(&points, scan.normals().unwrap_or_default());
+    let [x, y, z] = direction.to_array();
+    let remark = match confidence {
+        Confidence::Clear => "",
+        Confidence::AxisOnly => " (warning: perhaps upside down)",
+        Confidence::Assumed => " (warning: assumed, the scan has no level surfaces)",
+    };
+    eprintln!("up is {x:.3},{y:.3},{z:.3}{remark}; --up X,Y,Z sets it");
+    direction
+}
+
+fn load_bodies(args: &Args, scan_radius: f32) -> anyhow::Result<Vec<NamedCloud>> {
+    let kinds: Vec<(String, PointCloud<'static>)> = match &args.body {
+        Some(path) => {
+            eprintln!("reading {}", path.display());
+            let stem = path.file_name().unwrap_or_default().to_string_lossy();
+            let name = stem.split('.').next().unwrap_or_default().to_owned();
+            vec![(name, load::body_from_file(path)?)]
+        }
+        None => (BodyShape::ALL.into_iter())
+            .map(|shape| {
+                let surface = shape.sample(BODY_SPACING, args.common.seed);
+                Ok((shape.name().to_owned(), load::body_from_surface(surface)?))
+            })
+            .collect::<anyhow::Result<_>>()?,
+    };
+    let mut bodies = Vec::new();
+    for (name, cloud) in kinds {
+        let file_size = cloud.bounds().extents().max_element();
+        if !(file_size.is_finite() && file_size > 0.0) {
+            bail!("the body {name} has no extent: all its points coincide");
+        }
+        // Generated bodies have no size of their own: an extent that is taken for none.
+        let own_size = if args.body.is_some() {
+            file_size
+        } else {
+            f32::INFINITY
+        };
+        let size = args
+            .size
+            .unwrap_or_else(|| load::default_size(own_size, scan_radius));
+        eprintln!(
+            "{name}: {} points, {file_size:.3} in its file, {size:.3} m here",
+            cloud.len()
+        );
+        bodies.push((name, load::resized(&cloud, size)?));
+    }
+    let count = usize::from(args.count);
+    Ok((bodies.iter().cycle().take(count).enumerate())
+        .map(|(k, (name, cloud))| NamedCloud {
+            name: format!("{name} {}", k + 1),
+            cloud: cloud.clone(),
+        })
+        .collect())
+}
+
+/// Radius in metres of the ball around the origin that holds the cloud.
+fn ball_radius(cloud: &PointCloud<'_>) -> f32 {
+    cloud.points().map(Vec3::length).fold(0.0, f32::max)
+}
+
+/// Takes all steps; returns the state before the first one, after [`MID_STEP`] and after the last.
+fn simulate(simulation: &mut DropSimulation, steps: usize) -> anyhow::Result<[Snapshot; 3]> {
+    let bar = if io::stderr().is_terminal() {
+        ProgressBar::new(steps as u64)
+    } else {
+        ProgressBar::hidden()
+    };
+    bar.set_style(ProgressStyle::with_template(
+        "{bar:40} {pos}/{len} steps, {eta} left",
+    )?);
+    let initial = simulation.snapshot();
+    let mut mid = initial.clone();
+    for step in 1..=steps {
+        (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
+        if step == MID_STEP.min(steps) {
+            mid = simulation.snapshot();
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok([initial, mid, simulation.snapshot()])
+}
+
+fn draw(
+    simulation: &DropSimulation,
+    report: &DropReport,
+    up: Vec3,
+    snapshots: &[Snapshot; 3],
+    folder: &Path,
+) -> anyhow::Result<()> {
+    let clouds = simulation.clouds();
+    let detail = clouds
+        .iter()
+        .map(|cloud| ball_radius(cloud))
+        .fold(0.0, f32::max);
+    let scan = simulation.scan();
+    let most = LARGEST_DRAWN_RADIUS * scan.mean_radius();
+    let drawn_scan = load::derived(scan, 1, |p| p, |radius| radius.min(most))?;
+    let scene = |snapshot: &Snapshot| {
+        let scan = Item {
+            cloud: &drawn_scan,
+            scene_from_cloud: tldi::glamx::Pose3::IDENTITY,
+            paint: Paint::Scan,
+        };
+        let bodies = clouds
+            .iter()
+            .zip(&snapshot.scan_from_body)
+            .zip(BODY_COLORS.iter().cycle());
+        let bodies = bodies.map(|((cloud, pose), color)| Item {
+            cloud,
+            scene_from_cloud: *pose,
+            paint: Paint::Body(*color),
+        });
+        Scene {
+            items: std::iter::once(scan).chain(bodies).collect(),
+            up,
+            detail,
+        }
+    };
+    // A body that was lost is looked for where it started, not where it fell to.
+    let [initial, _, last] = snapshots;
+    let mut in_sight = last.clone();
+    for (k, body) in report.bodies.iter().enumerate() {
+        if !body.inside_bounds {
+            in_sight.scan_from_body[k] = initial.scan_from_body[k];
+        }
+    }
+    let starts: Vec<Vec3> = (initial.scan_from_body.iter())
+        .map(|pose| pose.translation)
+        .collect();
+    let camera = viewpoint::choose(&scene(&in_sight), &starts, PICTURE_SIZE);
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    for (snapshot, name) in snapshots
+        .iter()
+        .zip(["initial.png", "mid.png", "final.png"])
+    {
+        let picture = scene(snapshot).draw(&camera, &snapshot.contacts);
+        write_file(&folder.join(name), &picture.to_png()?)?;
+    }
+    eprintln!("pictures are in {}", folder.display());
+    Ok(())
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn finish(report: &DropReport) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    report.write_table(&mut out)?;
+    out.flush()?;
+    let lost: Vec<&str> = report.lost().collect();
+    if !lost.is_empty() {
+        bail!("fell out of the scan: {}", lost.join(", "));
+    }
+    Ok(())
+}

@@ -40,15 +40,27 @@ fn layers_equal_brute_force() {
                     // merge gap's spread.
                     let step = f64::from(params.merge_gap) / 4096.0;
                     let spread = (far - near) / 100.0;
-                    assert!((f64::from(layer.near) - near).abs() < 2.0 * step, "seed {seed}");
-                    assert!((f64::from(layer.far) - far).abs() < 2.0 * step, "seed {seed}");
-                    assert!((f64::from(layer.depth) - depth).abs() < 2.0 * step + spread, "seed {seed}");
+                    assert!(
+                        (f64::from(layer.near) - near).abs() < 2.0 * step,
+                        "seed {seed}"
+                    );
+                    assert!(
+                        (f64::from(layer.far) - far).abs() < 2.0 * step,
+                        "seed {seed}"
+                    );
+                    assert!(
+                        (f64::from(layer.depth) - depth).abs() < 2.0 * step + spread,
+                        "seed {seed}"
+                    );
                 }
             }
         }
     }
     assert!(compared > 20_000, "{compared}");
-    assert!(too_close * 50 < compared, "{too_close} of {compared} undecided");
+    assert!(
+        too_close * 50 < compared,
+        "{too_close} of {compared} undecided"
+    );
 }
 
 /// A sphere is entered and left at the analytic depths, with the analytic normals.
@@ -73,13 +85,17 @@ fn a_sphere_has_two_layers_at_the_analytic_depths() {
                 let layers = image.layers_at(i, j);
                 assert_eq!(layers.len(), 2, "at {rho}");
                 let depth = (radius * radius - rho * rho).sqrt();
-                for (layer, facing, sign) in
-                    [(&layers[0], Facing::Entry, -1.0), (&layers[1], Facing::Exit, 1.0)]
-                {
+                for (layer, facing, sign) in [
+                    (&layers[0], Facing::Entry, -1.0),
+                    (&layers[1], Facing::Exit, 1.0),
+                ] {
                     assert_eq!(layer.facing, facing);
                     // A quarter of a radius: slope damping leaves 0.3 of tan 60° of the mean
                     // offset of the splats around a pixel's centre.
-                    assert!((layer.depth - sign * depth).abs() < 0.25 * r, "at {rho}: {layer:?}");
+                    assert!(
+                        (layer.depth - sign * depth).abs() < 0.25 * r,
+                        "at {rho}: {layer:?}"
+                    );
                     let normal = Vec3::new(r * x, r * y, sign * depth) / radius;
                     assert!(layer.normal.dot(normal) > 0.99, "at {rho}: {layer:?}");
                 }
@@ -103,7 +119,12 @@ fn a_hot_pixel_is_one_layer() {
             .expect("the points are valid");
         let camera = VirtualCamera::along(Vec3::Z, 0.01);
         let frame_from_cloud = camera.view_from_frame.inverse();
-        build(&cloud, &frame_from_cloud, &camera, &Params::for_radius(0.01))
+        build(
+            &cloud,
+            &frame_from_cloud,
+            &camera,
+            &Params::for_radius(0.01),
+        )
     };
     let straight = image(&points);
     let [i, j] = [0, 1].map(|k| (0 - straight.origin[k]) as u32);

@@ -16,15 +16,25 @@ fn compare(a: Surface, b: Surface, a_from_b: Pose3, params: Params) -> PairResul
         a,
         b,
         a_from_b,
-        view: View::Aim { toward_b: a_from_b.translation, last_axis: None },
+        view: View::Aim {
+            toward_b: a_from_b.translation,
+            last_axis: None,
+        },
         params,
     };
-    CpuBackend::new().compare(&[query], &mut results).expect("the query is supported");
+    CpuBackend::new()
+        .compare(&[query], &mut results)
+        .expect("the query is supported");
     results.remove(0)
 }
 
 fn clouds(a: &PointCloud<'static>, b: &PointCloud<'static>, a_from_b: Pose3) -> PairResult {
-    compare(Surface::Cloud(a), Surface::Cloud(b), a_from_b, Params::for_radius(R))
+    compare(
+        Surface::Cloud(a),
+        Surface::Cloud(b),
+        a_from_b,
+        Params::for_radius(R),
+    )
 }
 
 fn deepest_normal(result: &PairResult) -> Vec3 {
@@ -59,14 +69,26 @@ fn spheres() {
             // Smoothing over 3 × 3 pixels lifts the middle of a contact of this curvature
             // (1/0.1 + 1/0.07 per metre) by 0.16 r̄; splats of 1 r̄ blur as much again.
             let error = (least_patch_gap(&result) - gap).abs();
-            assert!(error < 0.45 * R, "gap {gap}, direction {direction}: off by {error}");
-            let angle = deepest_normal(&result).angle_between(direction).to_degrees();
-            assert!(angle < 3.0, "gap {gap}, direction {direction}: normal off by {angle}°");
+            assert!(
+                error < 0.45 * R,
+                "gap {gap}, direction {direction}: off by {error}"
+            );
+            let angle = deepest_normal(&result)
+                .angle_between(direction)
+                .to_degrees();
+            assert!(
+                angle < 3.0,
+                "gap {gap}, direction {direction}: normal off by {angle}°"
+            );
             if gap.abs() > 0.3 * R {
                 wrong += usize::from(result.collides != (gap < 0.0));
             }
             if gap.abs() > 0.5 * R {
-                assert_eq!(result.collides, gap < 0.0, "gap {gap}, direction {direction}");
+                assert_eq!(
+                    result.collides,
+                    gap < 0.0,
+                    "gap {gap}, direction {direction}"
+                );
             }
         }
     }
@@ -84,7 +106,11 @@ fn box_on_plane() {
     let boxed = sampled_box(half, R, &mut rng);
     for (cloud, gaps, least_cosine) in [
         // Exact normals: what is left is the fixed-point step.
-        (Samples::cloud as fn(&Samples, f32) -> _, [0.01, 0.002, -0.002, -0.03], 0.999_99),
+        (
+            Samples::cloud as fn(&Samples, f32) -> _,
+            [0.01, 0.002, -0.002, -0.03],
+            0.999_99,
+        ),
         // Estimated normals bend at the box's edges: 1° on the whole face.
         (Samples::bare_cloud, [0.01, 0.002, -0.002, -0.01], 0.999_8),
     ] {
@@ -98,14 +124,21 @@ fn box_on_plane() {
                     .iter()
                     .find(|p| p.points.len() == 4)
                     .expect("a face rests on four points");
-                assert!(flat.normal.y > least_cosine, "gap {gap}, yaw {yaw}: {flat:?}");
+                assert!(
+                    flat.normal.y > least_cosine,
+                    "gap {gap}, yaw {yaw}: {flat:?}"
+                );
                 for corner in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
                     let corner = pose * (half * Vec3::new(corner[0], -1.0, corner[1]));
                     let middle = |p: &ContactPoint| 0.5 * (p.point_a + p.point_b);
                     let nearest = flat
                         .points
                         .iter()
-                        .min_by(|p, q| middle(p).distance(corner).total_cmp(&middle(q).distance(corner)))
+                        .min_by(|p, q| {
+                            middle(p)
+                                .distance(corner)
+                                .total_cmp(&middle(q).distance(corner))
+                        })
                         .expect("there are four");
                     // The diagonal of one and a half pixels, and half the gap. Without true
                     // normals the splats at the edges mix in the side walls, for 3 pixels.
@@ -114,8 +147,14 @@ fn box_on_plane() {
                         None => (5.2 * R, 0.4 * R),
                     };
                     let limit = reach + 0.5 * gap.abs();
-                    assert!(middle(nearest).distance(corner) < limit, "{nearest:?} {corner}");
-                    assert!((nearest.gap - gap).abs() < tolerance, "gap {gap}: {nearest:?}");
+                    assert!(
+                        middle(nearest).distance(corner) < limit,
+                        "{nearest:?} {corner}"
+                    );
+                    assert!(
+                        (nearest.gap - gap).abs() < tolerance,
+                        "gap {gap}: {nearest:?}"
+                    );
                 }
             }
         }
@@ -160,12 +199,20 @@ fn a_sheet_is_no_volume() {
     let ball = sampled_sphere(0.06, R);
     for body in [ball.cloud(R), ball.bare_cloud(R)] {
         let behind = clouds(&sheet, &body, Pose3::translation(0.0, -0.06 - 3.0 * R, 0.0));
-        assert!(!behind.collides && behind.patches.is_empty(), "{:?}", behind.patches);
+        assert!(
+            !behind.collides && behind.patches.is_empty(),
+            "{:?}",
+            behind.patches
+        );
         for side in [1.0, -1.0] {
             let deep = clouds(&sheet, &body, Pose3::translation(0.0, side * 0.03, 0.0));
             assert!(deep.collides);
             assert!(deepest_normal(&deep).y * side > 0.99, "{:?}", deep.patches);
-            assert!((least_patch_gap(&deep) + 0.03).abs() < 0.45 * R, "{:?}", deep.patches);
+            assert!(
+                (least_patch_gap(&deep) + 0.03).abs() < 0.45 * R,
+                "{:?}",
+                deep.patches
+            );
         }
     }
 }
@@ -175,7 +222,10 @@ struct Ball(f32);
 
 impl RaySurface for Ball {
     fn bounds(&self) -> Aabb {
-        Aabb { min: Vec3::splat(-self.0), max: Vec3::splat(self.0) }
+        Aabb {
+            min: Vec3::splat(-self.0),
+            max: Vec3::splat(self.0),
+        }
     }
 
     fn crossings(&self, origin: Vec3, direction: Vec3, max_distance: f32, hits: &mut Vec<RayHit>) {
@@ -206,13 +256,19 @@ struct Ground;
 
 impl RaySurface for Ground {
     fn bounds(&self) -> Aabb {
-        Aabb { min: Vec3::NEG_INFINITY, max: Vec3::new(f32::INFINITY, 0.0, f32::INFINITY) }
+        Aabb {
+            min: Vec3::NEG_INFINITY,
+            max: Vec3::new(f32::INFINITY, 0.0, f32::INFINITY),
+        }
     }
 
     fn crossings(&self, origin: Vec3, direction: Vec3, max_distance: f32, hits: &mut Vec<RayHit>) {
         let distance = -origin.y / direction.y;
         if (0.0..=max_distance).contains(&distance) {
-            hits.push(RayHit { distance, normal: Vec3::Y });
+            hits.push(RayHit {
+                distance,
+                normal: Vec3::Y,
+            });
         }
     }
 
@@ -239,8 +295,10 @@ fn clouds_against_exact_surfaces() {
         on_ball.translation = direction * (0.1 + radius + gap);
         let mut on_ground = turn;
         on_ground.translation = Vec3::new(rng.f32(), radius + gap, rng.f32());
-        let cases: [(&dyn RaySurface, Pose3, Vec3); 2] =
-            [(&Ball(0.1), on_ball, direction), (&Ground, on_ground, Vec3::Y)];
+        let cases: [(&dyn RaySurface, Pose3, Vec3); 2] = [
+            (&Ball(0.1), on_ball, direction),
+            (&Ground, on_ground, Vec3::Y),
+        ];
         for (surface, exact_from_cloud, normal) in cases {
             let params = Params::for_radius(R);
             let (exact, cloud) = (Surface::Exact(surface), Surface::Cloud(&cloud));
@@ -249,7 +307,10 @@ fn clouds_against_exact_surfaces() {
             let turned = exact_from_cloud.rotation.inverse() * -normal;
             for (result, normal) in [(first, normal), (second, turned)] {
                 let error = (least_patch_gap(&result) - gap).abs();
-                assert!(error < 0.45 * R, "gap {gap}, normal {normal}: off by {error}");
+                assert!(
+                    error < 0.45 * R,
+                    "gap {gap}, normal {normal}: off by {error}"
+                );
                 let angle = deepest_normal(&result).angle_between(normal).to_degrees();
                 assert!(angle < 3.0, "gap {gap}: normal off by {angle}°");
             }
@@ -279,9 +340,17 @@ fn unsupported_pairs_are_named() {
         a: Surface::Exact(&Ground),
         b: Surface::Exact(&Ball(1.0)),
         a_from_b: Pose3::IDENTITY,
-        view: View::Aim { toward_b: Vec3::Y, last_axis: None },
+        view: View::Aim {
+            toward_b: Vec3::Y,
+            last_axis: None,
+        },
         params: Params::for_radius(R),
     };
-    let error = CpuBackend::new().compare(&[query], &mut Vec::new()).expect_err("no cloud");
-    assert!(matches!(error, BackendError::Unsupported { pair: 0, .. }), "{error}");
+    let error = CpuBackend::new()
+        .compare(&[query], &mut Vec::new())
+        .expect_err("no cloud");
+    assert!(
+        matches!(error, BackendError::Unsupported { pair: 0, .. }),
+        "{error}"
+    );
 }

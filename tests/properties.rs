@@ -25,7 +25,10 @@ fn random_body(rng: &mut fastrand::Rng) -> Samples {
 /// Two bodies at a pose where they are somewhere between apart and halfway into each other.
 fn random_pair(seed: u64) -> (PointCloud<'static>, PointCloud<'static>, Pose3) {
     let mut rng = fastrand::Rng::with_seed(seed);
-    let (a, b) = (random_body(&mut rng).cloud(R), random_body(&mut rng).cloud(R));
+    let (a, b) = (
+        random_body(&mut rng).cloud(R),
+        random_body(&mut rng).cloud(R),
+    );
     let mut a_from_b = random_pose(&mut rng, 0.0);
     a_from_b.translation = random_unit(&mut rng) * (0.05 + 0.2 * rng.f32());
     (a, b, a_from_b)
@@ -37,10 +40,15 @@ fn compare(a: &PointCloud<'static>, b: &PointCloud<'static>, a_from_b: Pose3) ->
         a: Surface::Cloud(a),
         b: Surface::Cloud(b),
         a_from_b,
-        view: View::Aim { toward_b: a_from_b.translation, last_axis: None },
+        view: View::Aim {
+            toward_b: a_from_b.translation,
+            last_axis: None,
+        },
         params: Params::for_radius(R),
     };
-    CpuBackend::new().compare(&[query], &mut results).expect("the query is supported");
+    CpuBackend::new()
+        .compare(&[query], &mut results)
+        .expect("the query is supported");
     results.remove(0)
 }
 
@@ -54,7 +62,10 @@ fn symmetric_in_a_and_b() {
     let (mut clear, mut collisions) = (0, 0);
     for seed in 0..200 {
         let (a, b, a_from_b) = random_pair(seed);
-        let (ab, ba) = (compare(&a, &b, a_from_b), compare(&b, &a, a_from_b.inverse()));
+        let (ab, ba) = (
+            compare(&a, &b, a_from_b),
+            compare(&b, &a, a_from_b.inverse()),
+        );
         let (Some(gap_ab), Some(gap_ba)) = (least_gap(&ab), least_gap(&ba)) else {
             assert!(!ab.collides && !ba.collides, "seed {seed}");
             continue;
@@ -63,7 +74,10 @@ fn symmetric_in_a_and_b() {
         if gap_ab.min(gap_ba) > R || gap_ab.max(gap_ba) < -R {
             clear += 1;
             collisions += usize::from(ab.collides);
-            assert_eq!(ab.collides, ba.collides, "seed {seed}: gaps {gap_ab} {gap_ba}");
+            assert_eq!(
+                ab.collides, ba.collides,
+                "seed {seed}: gaps {gap_ab} {gap_ba}"
+            );
         }
     }
     assert!(clear > 80 && collisions > 30, "{clear} {collisions}");
@@ -96,7 +110,10 @@ fn gaps_follow_the_distance() {
     for seed in 0..200 {
         let mut rng = fastrand::Rng::with_seed(seed);
         let (ra, rb) = (0.05 + 0.1 * rng.f32(), 0.05 + 0.1 * rng.f32());
-        let (a, b) = (sampled_sphere(ra, R).cloud(R), sampled_sphere(rb, R).cloud(R));
+        let (a, b) = (
+            sampled_sphere(ra, R).cloud(R),
+            sampled_sphere(rb, R).cloud(R),
+        );
         let direction = random_unit(&mut rng);
         let gap_at = |gap: f32| {
             let pose = Pose3::from_translation(direction * (ra + rb + gap));
@@ -104,7 +121,10 @@ fn gaps_follow_the_distance() {
         };
         let (near, far) = (gap_at(-0.5 * R), gap_at(0.5 * R));
         // Each within 0.3 r̄ of the truth on these curvatures.
-        assert!((far - near - R).abs() < 0.6 * R, "seed {seed}: {near} {far}");
+        assert!(
+            (far - near - R).abs() < 0.6 * R,
+            "seed {seed}: {near} {far}"
+        );
         checked += 1;
     }
     assert_eq!(checked, 200);

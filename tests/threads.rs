@@ -9,7 +9,12 @@ fn results_do_not_depend_on_threads() {
     let mut rng = fastrand::Rng::with_seed(11);
     // Large enough for the cull to run in several tasks.
     let (big, small) = (sampled_sphere(1.0, 0.009), sampled_sphere(0.3, 0.01));
-    let clouds = [big.cloud(0.009), small.cloud(0.01), big.bare_cloud(0.009), small.bare_cloud(0.01)];
+    let clouds = [
+        big.cloud(0.009),
+        small.cloud(0.01),
+        big.bare_cloud(0.009),
+        small.bare_cloud(0.01),
+    ];
     assert!(clouds[0].len() > 100_000);
     let poses: Vec<Pose3> = (0..8)
         .map(|_| {
@@ -26,7 +31,10 @@ fn results_do_not_depend_on_threads() {
                 a: Surface::Cloud(&clouds[2 * (k % 2)]),
                 b: Surface::Cloud(&clouds[2 * (k % 2) + 1]),
                 a_from_b: *pose,
-                view: View::Aim { toward_b: pose.translation, last_axis: None },
+                view: View::Aim {
+                    toward_b: pose.translation,
+                    last_axis: None,
+                },
                 params: Params::for_radius(0.01),
             })
             .collect();
@@ -38,7 +46,9 @@ fn results_do_not_depend_on_threads() {
             let (mut backend, mut results) = (CpuBackend::new(), Vec::new());
             // Twice: warm memory must not show either.
             for _ in 0..2 {
-                backend.compare(&batch, &mut results).expect("the batch is supported");
+                backend
+                    .compare(&batch, &mut results)
+                    .expect("the batch is supported");
             }
             results
         })

@@ -38,5 +38,10 @@ pub fn load_cloud(name: &str, size: f32) -> Option<PointCloud<'static>> {
     for p in &mut raw.points {
         *p = (*p - middle) * scale;
     }
-    Some(raw.into_builder().knn_radii(7, 0.65).build().expect("the test data is valid"))
+    Some(
+        raw.into_builder()
+            .knn_radii(7, 0.65)
+            .build()
+            .expect("the test data is valid"),
+    )
 }

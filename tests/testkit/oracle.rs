@@ -38,7 +38,8 @@ pub fn oracle_layers(
     }
     let gap = f64::from(params.merge_gap);
     for (k, f) in runs.iter().enumerate() {
-        let close = |g: &[OracleFragment]| ((f[0].depth - g[0].depth).abs() - gap).abs() < 1e-3 * gap;
+        let close =
+            |g: &[OracleFragment]| ((f[0].depth - g[0].depth).abs() - gap).abs() < 1e-3 * gap;
         if runs[..k].iter().any(|g| close(g)) {
             return None;
         }
@@ -64,7 +65,10 @@ pub fn oracle_layers(
         .iter()
         .map(|run| {
             let near = run.iter().map(|f| f.depth).fold(f64::INFINITY, f64::min);
-            let far = run.iter().map(|f| f.depth).fold(f64::NEG_INFINITY, f64::max);
+            let far = run
+                .iter()
+                .map(|f| f.depth)
+                .fold(f64::NEG_INFINITY, f64::max);
             let weight: f64 = run.iter().map(|f| f.weight).sum();
             let depth = run.iter().map(|f| f.weight * f.depth).sum::<f64>() / weight;
             (near, far, depth)
@@ -89,7 +93,11 @@ fn fragment(
     let dx = (f64::from(i) + 0.5) * pixel - p.x;
     let dy = (f64::from(j) + 0.5) * pixel - p.y;
     let rise = -(n.x * dx + n.y * dy) / n.z;
-    let rise = if rise.is_finite() { rise.clamp(-radius, radius) } else { 0.0 };
+    let rise = if rise.is_finite() {
+        rise.clamp(-radius, radius)
+    } else {
+        0.0
+    };
     let share = 1.0 - (dx * dx + dy * dy + rise * rise) / (radius * radius);
     let near_rim = |c: f64| (c - c.round()).abs() < 1e-5;
     if share.abs() < 1e-4

@@ -38,7 +38,8 @@ impl Samples {
 
 /// A sphere about the origin, points about `spacing` metres apart (Fibonacci lattice).
 pub fn sampled_sphere(radius: f32, spacing: f32) -> Samples {
-    let count = (4.0 * std::f32::consts::PI * radius * radius / (spacing * spacing)).ceil() as usize;
+    let count =
+        (4.0 * std::f32::consts::PI * radius * radius / (spacing * spacing)).ceil() as usize;
     let golden = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
     let mut samples = Samples::default();
     for i in 0..count {

@@ -1,1 +1,61 @@
-//! (under construction)
+//! Point clouds from files.
+//!
+//! | format | extensions | read |
+//! |---|---|---|
+//! | PLY | `ply` | ascii, binary little and big endian; faces |
+//! | PCD | `pcd` | ascii, binary, binary_compressed |
+//! | columns of text | `xyz`, `txt`, `csv`, `asc`, `pts` | see below |
+//! | LAS, LAZ | `las`, `laz` | feature `las` |
+//! | E57 | `e57` | feature `e57` |
+//!
+//! Columns of text: one point a line, columns separated by semicolons (then a comma may be the
+//! decimal mark), else commas, else blanks, as the first line of data shows. Lines that start with
+//! `#` or `//` are comments. Columns are named by a header line, which may be a comment: `x y z`,
+//! and any of `nx ny nz`, `r g b a` (or `red` …), `radius`; others are skipped. Without a header,
+//! their number decides:
+//!
+//! | columns | meaning |
+//! |---|---|
+//! | 3 | x y z |
+//! | 4 | x y z, one ignored (intensity) |
+//! | 6 | x y z r g b if the last three are whole numbers from 0 to 255 in all lines, else x y z nx ny nz |
+//! | 7 | x y z, one ignored, r g b (the PTS layout; a first line with nothing but the count is passed over) |
+//! | 9 | x y z r g b nx ny nz, or x y z nx ny nz r g b if only the last three are such whole numbers |
+//!
+//! Any file may be packed with gzip (`.gz`), which is told by its content. Positions, normals, colours
+//! and radii are kept, whatever their order and type in the file; all else is skipped. Units are
+//! those of the file: scale, where it is not in metres, before you build a cloud.
+//!
+//! Files are read as a stream, with [`Progress`], and nothing in them is trusted: a damaged or
+//! hostile one gives a [`SourceError`] that says what is wrong and where, and no count in a header
+//! makes the reader allocate more than the data that really follows could fill.
+//!
+//! ```no_run
+//! use tldi_sources::{ReadOptions, read};
+//! let scan = read("scan.ply.gz", &ReadOptions::default())?;
+//! let cloud = scan.into_builder().knn_radii(7, 0.65).build()?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod collector;
+#[cfg(feature = "e57")]
+mod e57;
+mod error;
+mod input;
+#[cfg(feature = "las")]
+mod las;
+mod options;
+mod pcd;
+mod ply;
+mod raw_cloud;
+mod read;
+mod scalar;
+#[cfg(any(feature = "las", feature = "e57"))]
+mod seekable;
+mod slot;
+mod text;
+
+pub use error::{Position, SourceError, SourceErrorKind};
+pub use options::{Format, Progress, ReadOptions};
+pub use raw_cloud::RawCloud;
+pub use read::{read, read_from, read_with_progress};

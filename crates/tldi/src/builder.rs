@@ -111,8 +111,8 @@ enum RadiusSource<'a> {
 ///     .viewpoint(Vec3::new(1.0, 5.0, 1.0))
 ///     .build()?;
 /// assert!(cloud.normals().is_some_and(|n| n.iter().all(|n| n.y > 0.999)));
-/// // Away from the border, the 7th nearest neighbour on a square grid is at twice the spacing.
-/// assert!((cloud.radius(210) - 0.65 * 0.2).abs() < 1e-6);
+/// // Away from the border, the 7th nearest neighbour on a square grid is √2 × the spacing away.
+/// assert!((cloud.radius(210) - 0.65 * 0.1 * 2f32.sqrt()).abs() < 1e-6);
 /// # Ok::<(), tldi::CloudError>(())
 /// ```
 #[derive(Clone, Debug)]

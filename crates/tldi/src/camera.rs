@@ -75,7 +75,10 @@ impl VirtualCamera {
         far: f32,
     ) -> Self {
         let z = (target - eye).normalize();
-        let x = z.cross(up).try_normalize().unwrap_or_else(|| z.any_orthonormal_vector());
+        let x = z
+            .cross(up)
+            .try_normalize()
+            .unwrap_or_else(|| z.any_orthonormal_vector());
         let y = z.cross(x);
         let frame_from_view = Mat3::from_cols(x, y, z);
         let rotation = glamx::Quat::from_mat3(&frame_from_view.transpose()).normalize();
@@ -123,9 +126,7 @@ impl VirtualCamera {
     /// Pixel coordinates of a point given in view coordinates.
     pub fn pixel_from_view(&self, view: Vec3) -> [f32; 2] {
         match self.projection {
-            Projection::Orthographic { pixel_size } => {
-                [view.x / pixel_size, view.y / pixel_size]
-            }
+            Projection::Orthographic { pixel_size } => [view.x / pixel_size, view.y / pixel_size],
             Projection::Perspective { focal_px, .. } => {
                 let [w, h] = self.size.unwrap_or([0, 0]);
                 let s = focal_px / view.z;

@@ -90,7 +90,10 @@ impl PatchScratch {
         self.members.sort_by_key(|&m| (group[m as usize], m));
         self.stack.clear();
         let mut start = 0;
-        for part in self.members.chunk_by(|&a, &b| group[a as usize] == group[b as usize]) {
+        for part in self
+            .members
+            .chunk_by(|&a, &b| group[a as usize] == group[b as usize])
+        {
             self.stack.push((start, start + part.len(), 0));
             start += part.len();
         }
@@ -118,15 +121,18 @@ impl PatchScratch {
         let limit = SAME_SURFACE_PX * params.pixel_size;
         let mut first = 0;
         for view in contacts.chunk_by(|c, d| c.view == d.view) {
-            let (lo, hi) = view.iter().fold(([i32::MAX; 2], [i32::MIN; 2]), |(lo, hi), c| {
-                ([0, 1].map(|k| lo[k].min(c.pixel[k])), [0, 1].map(|k| hi[k].max(c.pixel[k])))
-            });
+            let (lo, hi) = view
+                .iter()
+                .fold(([i32::MAX; 2], [i32::MIN; 2]), |(lo, hi), c| {
+                    (
+                        [0, 1].map(|k| lo[k].min(c.pixel[k])),
+                        [0, 1].map(|k| hi[k].max(c.pixel[k])),
+                    )
+                });
             // A rim of one pixel on the left and right spares the bounds checks.
             let width = (hi[0] - lo[0] + 3) as usize;
             let height = (hi[1] - lo[1] + 2) as usize;
-            let at = |p: [i32; 2]| {
-                (p[1] - lo[1]) as usize * width + (p[0] - lo[0] + 1) as usize
-            };
+            let at = |p: [i32; 2]| (p[1] - lo[1]) as usize * width + (p[0] - lo[0] + 1) as usize;
             self.map.clear();
             self.map.resize(width * height, NONE);
             for (k, c) in view.iter().enumerate().rev() {
@@ -253,12 +259,7 @@ struct Shape {
 }
 
 impl Shape {
-    fn of(
-        members: &[u32],
-        contacts: &[ContactPixel],
-        smooth: &[Smooth],
-        params: &Params,
-    ) -> Self {
+    fn of(members: &[u32], contacts: &[ContactPixel], smooth: &[Smooth], params: &Params) -> Self {
         let least_gap = least_gap(members, smooth);
         let (mut mean_a, mut mean_b, mut mean) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
         let mut total = 0.0;
@@ -295,7 +296,10 @@ impl Shape {
         // A pixel has an extent of its own.
         let least = 0.25 * params.pixel_size;
         let sigma = axes.map(|axis| {
-            let variance = support().map(|p| (p - centre).dot(axis).powi(2)).sum::<f32>() / count;
+            let variance = support()
+                .map(|p| (p - centre).dot(axis).powi(2))
+                .sum::<f32>()
+                / count;
             variance.sqrt().max(least)
         });
         let mut shape = Self {
@@ -367,9 +371,8 @@ impl Shape {
     /// are in the first part.
     fn split(&self, members: &mut [u32], contacts: &[ContactPixel]) -> usize {
         let longest = usize::from(self.sigma[1] > self.sigma[0]);
-        let behind = |m: u32| {
-            (contacts[m as usize].middle() - self.centre).dot(self.axes[longest]) >= 0.0
-        };
+        let behind =
+            |m: u32| (contacts[m as usize].middle() - self.centre).dot(self.axes[longest]) >= 0.0;
         // Stable, so that members stay in the order of their pixels.
         members.sort_by_key(|&m| behind(m));
         members.partition_point(|&m| !behind(m))
@@ -410,9 +413,7 @@ impl Shape {
             if !corners[..k].contains(&m) {
                 let gap = smooth[m].gap;
                 least_corner = least_corner.min(gap);
-                patch
-                    .points
-                    .push(self.point(contacts[m].middle(), gap));
+                patch.points.push(self.point(contacts[m].middle(), gap));
             }
         }
         out.push(patch);

@@ -69,7 +69,11 @@ impl Tldi {
     /// # Panics
     /// If the pixel is outside [`Tldi::size`].
     pub fn layers_at(&self, i: u32, j: u32) -> &[Layer] {
-        assert!(i < self.size[0] && j < self.size[1], "pixel ({i}, {j}) outside {:?}", self.size);
+        assert!(
+            i < self.size[0] && j < self.size[1],
+            "pixel ({i}, {j}) outside {:?}",
+            self.size
+        );
         self.layers_of((j * self.size[0] + i) as usize)
     }
 

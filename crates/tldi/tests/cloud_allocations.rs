@@ -63,6 +63,7 @@ fn a_warm_cloud_allocates_nothing() {
         .spatial_order()
         .build()
         .expect("valid");
+    let mut alternating = ordered.clone();
     assert!(
         allocations(|| drop(frames[0].clone())) > 0,
         "the counter works"
@@ -75,6 +76,10 @@ fn a_warm_cloud_allocates_nothing() {
         plain.set_points(&whole, None).expect("valid");
         for _ in 0..3 {
             ordered.set_points(&whole, Some(&normals)).expect("valid");
+            alternating
+                .set_points(&whole, Some(&normals))
+                .expect("valid");
+            alternating.set_points(&whole, None).expect("valid");
         }
     };
     // The memory that is filled and the memory that is replaced take turns: both must have grown.

@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 use std::f32::consts::TAU;
-use tldi::glamx::{Quat, Vec3};
+use tldi::glamx::{DVec3, Quat, Vec3};
 use tldi::{CloudError, KdTree, PointCloud};
 
 /// The normals that PCA of `k` neighbours gives, without a viewpoint.
@@ -180,6 +180,37 @@ fn lines_and_coincident_points_give_unit_normals_that_fit() {
     assert_eq!(pca(&[Vec3::ONE], 8), [Vec3::Z]);
     assert_eq!(pca(&[Vec3::ONE; 4], 8), [Vec3::Z; 4]);
     assert!(pca(&[Vec3::ZERO, Vec3::ONE], 8)[0].dot(Vec3::ONE).abs() < 1e-6);
+}
+
+#[test]
+fn no_other_direction_has_less_variance() {
+    let mut rng = Rng::with_seed(9);
+    let points: Vec<Vec3> = (0..400)
+        .map(|_| random_direction(&mut rng) * rng.f32())
+        .collect();
+    for k in [2, 3, 5, 20] {
+        let normals = pca(&points, k);
+        for (p, n) in points.iter().zip(&normals) {
+            let mut nearest = points.clone();
+            nearest.sort_by(|a, b| a.distance_squared(*p).total_cmp(&b.distance_squared(*p)));
+            nearest.truncate(k + 1); // with the point itself
+            let mean = nearest.iter().map(|q| q.as_dvec3()).sum::<DVec3>() / (k + 1) as f64;
+            let variance = |direction: Vec3| -> f64 {
+                let d = direction.as_dvec3().normalize();
+                nearest
+                    .iter()
+                    .map(|q| (q.as_dvec3() - mean).dot(d).powi(2))
+                    .sum()
+            };
+            // Near a minimum, variance is flat: 1e-12 covers the rounding of n to f32.
+            let least = variance(*n) - 1e-12;
+            let (u, v) = n.any_orthonormal_pair();
+            for other in [u, v, -u, -v].map(|turn| *n + 1e-3 * turn) {
+                assert!(least <= variance(other), "{k}: {n} {other}");
+            }
+            assert!(least <= variance(random_direction(&mut rng)));
+        }
+    }
 }
 
 #[test]

@@ -187,6 +187,26 @@ fn cylinders_that_all_overlap_are_blended_alike() {
 }
 
 #[test]
+fn a_blend_is_within_what_it_blends() {
+    // Equal depths, unequal weights: rounding must not move the mean beyond them.
+    let mut rng = fastrand::Rng::with_seed(9);
+    for _ in 0..200 {
+        let points: Vec<Vec3> = (0..50)
+            .map(|_| Vec3::new(0.2 * rng.f32(), 0.2 * rng.f32(), 0.0))
+            .collect();
+        let radius = 0.3 + rng.f32();
+        let cloud = PointCloud::builder(&points).radius(radius).build().unwrap();
+        let image = build(&cloud, &one_pixel(), &Params::paper(radius));
+        let layer = image.layers()[0];
+        assert!(
+            layer.near == -radius && layer.far <= radius,
+            "{layer:?} for {radius}"
+        );
+        assert!(layer.far > 0.99999 * radius, "{layer:?} for {radius}");
+    }
+}
+
+#[test]
 fn weights_are_gaussian_with_half_the_radius_as_standard_deviation() {
     // The second disc's centre is 0.3 from the pixel's, at a radius of 0.4: exp(−½ (0.3 / 0.2)²).
     let points = [Vec3::new(0.0, 0.0, 1.0), Vec3::new(0.3, 0.0, 1.2)];

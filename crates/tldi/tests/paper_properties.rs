@@ -389,6 +389,13 @@ fn collision_and_gap_are_monotone_in_rho() {
                 )
             })
             .collect();
+        // Beyond 0 and 1 nothing changes.
+        let end = found.len() - 1;
+        assert_eq!(
+            [found[0], found[end]],
+            [found[1], found[end - 1]],
+            "seed {seed}"
+        );
         for (pair, rhos) in found.windows(2).zip(rhos.windows(2)) {
             let wider = pair[0].collides || !pair[1].collides;
             assert!(

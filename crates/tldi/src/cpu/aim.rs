@@ -47,12 +47,7 @@ pub(crate) struct Hint {
 
 /// The axes, unit vectors from `b` towards `a`; at least one. Empty normals on either side give
 /// the hint's axis.
-pub(crate) fn aim(
-    a: &ZoneNormals,
-    b: &ZoneNormals,
-    hint: &Hint,
-    axes: &mut Vec<Vec3>,
-) {
+pub(crate) fn aim(a: &ZoneNormals, b: &ZoneNormals, hint: &Hint, axes: &mut Vec<Vec3>) {
     axes.clear();
     let mut seen: [Vec3; MAX_VIEWS] = [Vec3::ZERO; MAX_VIEWS];
     let mut views = 0;
@@ -100,7 +95,12 @@ pub(crate) fn aim(
 /// The axis or its opposite, such that it points from `b` towards `a`; and whether anything told.
 fn oriented(axis: Vec3, a: &ZoneNormals, b: &ZoneNormals, hint: &Hint) -> (Vec3, bool) {
     let mean_along = |s: &ZoneNormals| {
-        let facing = || s.normals.iter().map(|n| n.dot(axis)).filter(|d| d.abs() >= SUPPORTED);
+        let facing = || {
+            s.normals
+                .iter()
+                .map(|n| n.dot(axis))
+                .filter(|d| d.abs() >= SUPPORTED)
+        };
         let count = facing().count() as f32;
         if !s.oriented || count < LEAST_SHARE * s.normals.len() as f32 {
             return 0.0;
@@ -132,7 +132,7 @@ fn outer(n: Vec3) -> Mat3 {
 
 fn top_eigenvector(m: &Mat3) -> Option<Vec3> {
     let trace = m.x_axis.x + m.y_axis.y + m.z_axis.z;
-    if !(trace > 0.0) {
+    if trace.is_nan() || trace <= 0.0 {
         return None;
     }
     let eigen = SymmetricEigen3::new(*m);
@@ -146,7 +146,10 @@ mod tests {
     use super::*;
 
     fn hint(toward_b: Vec3) -> Hint {
-        Hint { toward_b, last_axis: None }
+        Hint {
+            toward_b,
+            last_axis: None,
+        }
     }
 
     fn zone(normals: &[Vec3], oriented: bool) -> ZoneNormals<'_> {
@@ -158,10 +161,20 @@ mod tests {
         let (up, down) = (vec![Vec3::Y; 50], vec![-Vec3::Y; 30]);
         let mut axes = vec![];
         // Oriented normals beat a wrong hint.
-        aim(&zone(&up, true), &zone(&down, true), &hint(-Vec3::Y), &mut axes);
+        aim(
+            &zone(&up, true),
+            &zone(&down, true),
+            &hint(-Vec3::Y),
+            &mut axes,
+        );
         assert_eq!(axes, [-Vec3::Y]);
         // Without orientation the hint decides.
-        aim(&zone(&up, false), &zone(&down, false), &hint(-Vec3::Y), &mut axes);
+        aim(
+            &zone(&up, false),
+            &zone(&down, false),
+            &hint(-Vec3::Y),
+            &mut axes,
+        );
         assert_eq!(axes, [Vec3::Y]);
     }
 
@@ -170,10 +183,20 @@ mod tests {
         let corner = [vec![Vec3::Y; 50], vec![Vec3::X; 30]].concat();
         let edges = [vec![-Vec3::Y; 20], vec![-Vec3::X; 20]].concat();
         let mut axes = vec![];
-        aim(&zone(&corner, true), &zone(&edges, true), &hint(Vec3::Y), &mut axes);
+        aim(
+            &zone(&corner, true),
+            &zone(&edges, true),
+            &hint(Vec3::Y),
+            &mut axes,
+        );
         assert_eq!(axes, [-Vec3::Y, -Vec3::X]);
         let floor = vec![Vec3::Y; 50];
-        aim(&zone(&floor, true), &zone(&edges, true), &hint(Vec3::Y), &mut axes);
+        aim(
+            &zone(&floor, true),
+            &zone(&edges, true),
+            &hint(Vec3::Y),
+            &mut axes,
+        );
         assert_eq!(axes, [-Vec3::Y]);
     }
 
@@ -186,7 +209,10 @@ mod tests {
             aim(
                 &zone(&normals, false),
                 &zone(&normals, false),
-                &Hint { toward_b: Vec3::Y, last_axis: Some(-Vec3::Y) },
+                &Hint {
+                    toward_b: Vec3::Y,
+                    last_axis: Some(-Vec3::Y),
+                },
                 &mut axes,
             );
             assert_eq!(axes[0] == -Vec3::Y, kept, "{angle}");

@@ -49,7 +49,11 @@ pub(crate) fn cast(
                     near: depth,
                     far: depth,
                     depth,
-                    normal: if closed || normal.z < 0.0 { normal } else { -normal },
+                    normal: if closed || normal.z < 0.0 {
+                        normal
+                    } else {
+                        -normal
+                    },
                     facing,
                     color: [0; 4],
                 });

@@ -72,7 +72,9 @@ pub(crate) fn compare(
 /// Whether no other view (axes in the frame of this one) sees a surface of this normal less
 /// steeply.
 fn best_seen(normal: Vec3, others: &[Vec3]) -> bool {
-    others.iter().all(|axis| axis.dot(normal).abs() <= normal.z.abs())
+    others
+        .iter()
+        .all(|axis| axis.dot(normal).abs() <= normal.z.abs())
 }
 
 /// Whether a layer of `a` and one of `b` swap their order between two neighbouring pixels.
@@ -144,8 +146,10 @@ fn contact_pixels(
         // What b has left behind altogether it does not touch.
         let entry = (a.iter().enumerate())
             .filter(|(_, la)| la.facing != Facing::Exit && !is_edge_on(la))
-            .find(|(ka, _)| entered <= left_at(&a[*ka..], at.middles.a, params));
-        let Some((_, entry)) = entry else { continue };
+            .filter(|(ka, _)| entered <= left_at(&a[*ka..], at.middles.a, params))
+            .map(|(_, la)| la)
+            .find(|la| exit.depth - la.depth <= params.merge_gap || opposed(la, exit));
+        let Some(entry) = entry else { continue };
         // Outward normals in the view frame: the camera sees a from outside, b from inside.
         let normal_a = facing_camera(entry.normal, -1.0);
         let normal_b = facing_camera(exit.normal, 1.0);
@@ -177,13 +181,31 @@ fn contact_pixels(
     }
 }
 
+/// |n·v| from which the depth along the view tells the distance of surfaces that are deep in each
+/// other (60°), and likewise the least cosine between the normals of such surfaces. A wall that a
+/// body stands beside has points in the body's columns, but does not face its bottom.
+const FACING: f32 = 0.5;
+
+/// Whether two layers face each other and the view, as surfaces do that push bodies apart.
+fn opposed(entry: &Layer, exit: &Layer) -> bool {
+    let (n, m) = (
+        facing_camera(entry.normal, -1.0),
+        facing_camera(exit.normal, 1.0),
+    );
+    n.z <= -FACING && m.z >= FACING && n.dot(m) <= -FACING
+}
+
 /// Depth at which the ray entered the part of a body that it leaves through the last of `layers`:
 /// unbounded where its normal says that there is an inside but the entry was culled.
 fn entered_at(layers: &[Layer], middle: Option<f32>, params: &Params) -> f32 {
     let Some((exit, before)) = layers.split_last() else {
         return f32::INFINITY;
     };
-    let entry = |facing| before.iter().rfind(move |l| l.facing == facing && !is_edge_on(l));
+    let entry = |facing| {
+        before
+            .iter()
+            .rfind(move |l| l.facing == facing && !is_edge_on(l))
+    };
     match exit.facing {
         Facing::Exit => entry(Facing::Entry).map_or(f32::NEG_INFINITY, |l| l.depth),
         _ => entry(Facing::Unknown).map_or_else(
@@ -198,7 +220,11 @@ fn left_at(layers: &[Layer], middle: Option<f32>, params: &Params) -> f32 {
     let Some((entry, behind)) = layers.split_first() else {
         return f32::NEG_INFINITY;
     };
-    let exit = |facing| behind.iter().find(move |l| l.facing == facing && !is_edge_on(l));
+    let exit = |facing| {
+        behind
+            .iter()
+            .find(move |l| l.facing == facing && !is_edge_on(l))
+    };
     match entry.facing {
         Facing::Entry => exit(Facing::Exit).map_or(f32::INFINITY, |l| l.depth),
         _ => exit(Facing::Unknown).map_or_else(
@@ -210,5 +236,9 @@ fn left_at(layers: &[Layer], middle: Option<f32>, params: &Params) -> f32 {
 
 /// `normal` or its opposite, such that its z has the given sign.
 fn facing_camera(normal: Vec3, sign: f32) -> Vec3 {
-    if normal.z * sign < 0.0 { -normal } else { normal }
+    if normal.z * sign < 0.0 {
+        -normal
+    } else {
+        normal
+    }
 }

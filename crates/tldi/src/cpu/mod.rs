@@ -63,7 +63,7 @@ const AIM_SAMPLES: usize = 512;
 /// ```
 #[derive(Default)]
 pub struct CpuBackend {
-    pool: Mutex<Vec<Box<Scratch>>>,
+    pool: Mutex<Vec<Scratch>>,
 }
 
 impl CpuBackend {
@@ -173,14 +173,24 @@ pub fn build(
     }
     let mut side = Side::default();
     let everything = Region {
-        overlap: cloud.bounds().transformed(frame_from_cloud).loosened(f32::MAX.sqrt()),
+        overlap: cloud
+            .bounds()
+            .transformed(frame_from_cloud)
+            .loosened(f32::MAX.sqrt()),
         other_from_frame: Pose3::IDENTITY,
         other_bounds: Aabb {
             min: Vec3::NEG_INFINITY,
             max: Vec3::INFINITY,
         },
     };
-    cull::cull(cloud, frame_from_cloud, &everything, &mut side.cull, &mut side.points);
+    cull::cull(
+        cloud,
+        frame_from_cloud,
+        &everything,
+        1,
+        &mut side.cull,
+        &mut side.points,
+    );
     normals::normals(cloud, frame_from_cloud, &mut side.normals, &mut side.points);
     if let Some(seen) = side.fragments.project(&side.points, camera) {
         let scale = DepthScale::new(seen.near, params);
@@ -261,16 +271,25 @@ impl Scratch {
                 result.axes.push(camera.axis());
                 self.look(query, &camera, 0, result);
             }
-            View::Aim { toward_b, last_axis } => {
-                self.aim(query, &Hint { toward_b, last_axis }, &mut result.axes);
+            View::Aim {
+                toward_b,
+                last_axis,
+            } => {
+                self.aim(
+                    query,
+                    &Hint {
+                        toward_b,
+                        last_axis,
+                    },
+                    &mut result.axes,
+                );
                 if query.params.variant() == Variant::Paper {
                     let camera = VirtualCamera::along(result.axes[0], query.params.pixel_size);
                     self.compare_paper(query, &camera, result);
                     return;
                 }
                 for view in 0..result.axes.len() {
-                    let camera =
-                        VirtualCamera::along(result.axes[view], query.params.pixel_size);
+                    let camera = VirtualCamera::along(result.axes[view], query.params.pixel_size);
                     self.look(query, &camera, view, result);
                 }
             }
@@ -291,8 +310,26 @@ impl Scratch {
         let [scratch_a, scratch_b] = &mut self.paper;
         let (image_a, image_b) = (&mut self.a.image, &mut self.b.image);
         rayon::join(
-            || paper::build(a, &Pose3::IDENTITY, camera, &query.params, scratch_a, image_a),
-            || paper::build(b, &query.a_from_b, camera, &query.params, scratch_b, image_b),
+            || {
+                paper::build(
+                    a,
+                    &Pose3::IDENTITY,
+                    camera,
+                    &query.params,
+                    scratch_a,
+                    image_a,
+                )
+            },
+            || {
+                paper::build(
+                    b,
+                    &query.a_from_b,
+                    camera,
+                    &query.params,
+                    scratch_b,
+                    image_b,
+                )
+            },
         );
         let found = paper::compare(image_a, image_b, &query.params);
         result.collides = found.collides;
@@ -307,7 +344,8 @@ impl Scratch {
         // here need their neighbours, or they would err at the rim.
         let ring = |surface: &Surface| match surface {
             Surface::Cloud(cloud) if cloud.normals().is_none() => {
-                (2.0 + normals::SUPPORT) * cloud.mean_radius()
+                let stride = cull::stride(cloud, query.params.pixel_size) as f32;
+                (2.0 + normals::SUPPORT * stride.sqrt()) * cloud.mean_radius()
             }
             surface => 2.0 * surface.mean_radius(),
         };
@@ -328,7 +366,9 @@ impl Scratch {
                         other_from_frame: b_from_a,
                         other_bounds: bounds_b.loosened(margin),
                     };
-                    cull::cull(cloud, &Pose3::IDENTITY, &region, &mut a.cull, &mut a.points);
+                    let stride = cull::stride(cloud, query.params.pixel_size);
+                    let frame = Pose3::IDENTITY;
+                    cull::cull(cloud, &frame, &region, stride, &mut a.cull, &mut a.points);
                 } else {
                     a.points.clear();
                 }
@@ -340,7 +380,9 @@ impl Scratch {
                         other_from_frame: Pose3::IDENTITY,
                         other_bounds: bounds_a.loosened(margin),
                     };
-                    cull::cull(cloud, &query.a_from_b, &region, &mut b.cull, &mut b.points);
+                    let stride = cull::stride(cloud, query.params.pixel_size);
+                    let frame = query.a_from_b;
+                    cull::cull(cloud, &frame, &region, stride, &mut b.cull, &mut b.points);
                 } else {
                     b.points.clear();
                 }
@@ -438,11 +480,27 @@ impl Scratch {
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
                 let hits = &mut self.hits;
-                a.look_with(cloud, surface, &query.a_from_b, camera, query, hits, &mut b.image);
+                a.look_with(
+                    cloud,
+                    surface,
+                    &query.a_from_b,
+                    camera,
+                    query,
+                    hits,
+                    &mut b.image,
+                );
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
                 let hits = &mut self.hits;
-                b.look_with(cloud, surface, &Pose3::IDENTITY, camera, query, hits, &mut a.image);
+                b.look_with(
+                    cloud,
+                    surface,
+                    &Pose3::IDENTITY,
+                    camera,
+                    query,
+                    hits,
+                    &mut a.image,
+                );
             }
             (Surface::Exact(_), Surface::Exact(_)) => return,
         }
@@ -464,8 +522,16 @@ fn middles(query: &PairQuery, camera: &VirtualCamera) -> Middles {
     let (size_a, size_b) = (bounds_a.extents().length(), bounds_b.extents().length());
     let depth = |center: Vec3| Some(camera.view_from_point(center).z);
     Middles {
-        a: if size_a <= size_b { depth(bounds_a.center()) } else { None },
-        b: if size_b <= size_a { depth(query.a_from_b * bounds_b.center()) } else { None },
+        a: if size_a <= size_b {
+            depth(bounds_a.center())
+        } else {
+            None
+        },
+        b: if size_b <= size_a {
+            depth(query.a_from_b * bounds_b.center())
+        } else {
+            None
+        },
     }
 }
 
@@ -509,7 +575,10 @@ impl Side {
     }
 
     /// Image of this cloud, and of an exact surface into `image` over the same pixels.
-    #[allow(clippy::too_many_arguments, reason = "one side of each kind, and where both are")]
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "one side of each kind, and where both are"
+    )]
     fn look_with(
         &mut self,
         cloud: &PointCloud,
@@ -530,9 +599,21 @@ impl Side {
         // Rays must pass through all of the surface, or what is deepest would be missed; through
         // as much of an unbounded one as the cloud is deep in it.
         let extent = surface.bounds().extents().length();
-        let beyond = if extent.is_finite() { extent } else { 2.0 * self.deepest };
+        let beyond = if extent.is_finite() {
+            extent
+        } else {
+            2.0 * self.deepest
+        };
         let margin = query.params.prediction + (seen.far - seen.near) + beyond;
         let range = (seen.near - margin, seen.far + margin);
-        cast::cast(surface, frame_from_surface, camera, &self.image, range, hits, image);
+        cast::cast(
+            surface,
+            frame_from_surface,
+            camera,
+            &self.image,
+            range,
+            hits,
+            image,
+        );
     }
 }

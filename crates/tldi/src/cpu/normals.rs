@@ -9,8 +9,8 @@ use crate::PointCloud;
 use crate::normals::{covariance, least_variance_axis};
 use glamx::{Pose3, Vec3};
 
-/// Radius of the neighbourhood whose covariance gives the normal, in mean radii. With radii of
-/// 0.65 × the 7th neighbour's distance it holds about 25 neighbours on a surface.
+/// Radius of the neighbourhood whose covariance gives the normal, in mean radii of
+/// the culled points. With 0.65 × the 7th neighbour's distance it holds about 25 neighbours on a surface.
 pub(super) const SUPPORT: f32 = 3.0;
 
 /// Memory of the stage, kept from call to call.
@@ -28,7 +28,8 @@ pub(crate) fn normals(
     points: &mut Survivors,
 ) {
     let Some(given) = cloud.normals() else {
-        estimate(SUPPORT * cloud.mean_radius(), scratch, points);
+        let spacing = points.radius.iter().sum::<f32>() / points.len().max(1) as f32;
+        estimate(SUPPORT * spacing, scratch, points);
         return;
     };
     points.normal.clear();

@@ -150,10 +150,14 @@ impl Fragments {
             near = near.min(view.z - radius);
             far = far.max(view.z + radius);
         }
-        let mut rect = Rect::from_corners(lo.map(|c| c.floor() as i32), hi.map(|c| c.floor() as i32))
-            .filter(|_| near <= far)?;
+        let mut rect =
+            Rect::from_corners(lo.map(|c| c.floor() as i32), hi.map(|c| c.floor() as i32))
+                .filter(|_| near <= far)?;
         if let Some(size) = camera.size {
-            rect = rect.intersection(&Rect { origin: [0, 0], size })?;
+            rect = rect.intersection(&Rect {
+                origin: [0, 0],
+                size,
+            })?;
         }
         Some(Footprint { rect, near, far })
     }
@@ -190,7 +194,8 @@ impl Fragments {
         self.cursors.clear();
         self.cursors.extend_from_slice(&self.offsets);
         self.fragments.clear();
-        self.fragments.resize(self.unsorted.len(), Fragment::default());
+        self.fragments
+            .resize(self.unsorted.len(), Fragment::default());
         for (pixel, fragment) in &self.unsorted {
             let cursor = &mut self.cursors[*pixel as usize];
             self.fragments[*cursor as usize] = *fragment;
@@ -219,13 +224,7 @@ struct Splat {
 }
 
 impl Splat {
-    fn new(
-        view: Vec3,
-        normal: Vec3,
-        radius: f32,
-        oriented: bool,
-        camera: &VirtualCamera,
-    ) -> Self {
+    fn new(view: Vec3, normal: Vec3, radius: f32, oriented: bool, camera: &VirtualCamera) -> Self {
         let pixel_size = camera.pixel_size_at(view.z);
         let direction = match camera.projection {
             Projection::Orthographic { .. } => Vec3::Z,

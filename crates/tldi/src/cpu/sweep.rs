@@ -54,9 +54,8 @@ pub(crate) fn sweep(
             out.layers
                 .push(sum.layer(run, oriented, colors.is_some(), scale));
         }
-        out.layers[first_layer..].sort_by(|a, b| {
-            (a.depth.total_cmp(&b.depth)).then(a.facing.cmp(&b.facing))
-        });
+        out.layers[first_layer..]
+            .sort_by(|a, b| (a.depth.total_cmp(&b.depth)).then(a.facing.cmp(&b.facing)));
         out.offsets.push(out.layers.len() as u32);
     }
 }
@@ -75,7 +74,11 @@ impl Sum {
         self.weight += w;
         self.depth += w * i64::from(f.depth);
         // Unoriented normals are taken as facing the camera.
-        let sign = if !oriented && normal.z > 0.0 { -1.0 } else { 1.0 };
+        let sign = if !oriented && normal.z > 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
         for (sum, c) in self.normal.iter_mut().zip(normal.to_array()) {
             *sum += w * (sign * c * NORMAL_STEPS) as i64;
         }
@@ -95,7 +98,8 @@ impl Sum {
             _ => Facing::Unknown,
         };
         let color = if colored {
-            self.color.map(|c| ((c + self.weight / 2) / self.weight) as u8)
+            self.color
+                .map(|c| ((c + self.weight / 2) / self.weight) as u8)
         } else {
             [0; 4]
         };

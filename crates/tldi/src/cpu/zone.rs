@@ -94,8 +94,8 @@ impl Grid {
         for z in 0..nz {
             for y in 0..ny {
                 for k in 0..w {
-                    bits[(z * ny + y) * w + k] = neighbours(y, ny)
-                        .fold(0, |acc, y| acc | spare[(z * ny + y) * w + k]);
+                    bits[(z * ny + y) * w + k] =
+                        neighbours(y, ny).fold(0, |acc, y| acc | spare[(z * ny + y) * w + k]);
                 }
             }
         }
@@ -167,17 +167,31 @@ mod tests {
             };
             let reach = 0.05 + 0.3 * (seed as f32 / 40.0);
             let (mut near_a, mut near_b) = (vec![], vec![]);
-            zone(&a, &b, &bounds, reach, &mut ZoneScratch::default(), &mut near_a, &mut near_b);
+            zone(
+                &a,
+                &b,
+                &bounds,
+                reach,
+                &mut ZoneScratch::default(),
+                &mut near_a,
+                &mut near_b,
+            );
             for (p, q, near) in [(&a, &b, &near_a), (&b, &a, &near_b)] {
                 for i in 0..p.len() {
                     let distance = (0..q.len())
                         .map(|j| p.point(i).distance(q.point(j)))
                         .fold(f32::INFINITY, f32::min);
                     let selected = near.contains(&(i as u32));
-                    assert!(selected || distance > reach, "seed {seed}: point {i} at {distance} missed");
+                    assert!(
+                        selected || distance > reach,
+                        "seed {seed}: point {i} at {distance} missed"
+                    );
                     // Two neighbouring cells span at most two diagonals.
                     let farthest = 2.0 * 3.0f32.sqrt() * reach * 1.0001;
-                    assert!(!selected || distance <= farthest, "seed {seed}: point {i} at {distance}");
+                    assert!(
+                        !selected || distance <= farthest,
+                        "seed {seed}: point {i} at {distance}"
+                    );
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! Comparison of two images: early rejection, then the layers of each pixel by depth.
 
-use crate::{Layer, Params, Tldi};
+use crate::{Layer, Params, Projection, Tldi};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -19,12 +19,15 @@ pub struct PaperComparison {
 ///
 /// Every layer's range `[near, far]` is first compressed by [`rho`](Params::rho): shortened to
 /// 1 − ρ of its length around its middle (paper, section 5: the ranges are thicker than the
-/// surface, by about the radius on either side). Ranges that touch overlap.
+/// surface, by about the radius on either side). A ρ below 0 is read as 0, above 1 as 1. Ranges
+/// that touch overlap.
 ///
-/// Early rejection comes first: if at every common pixel all of one image lies behind all of the
-/// other, they do not collide. Otherwise the layers of each pixel are walked in order of depth;
-/// the first overlap ends the search. The result is symmetric in `a` and `b`, and the same at any
-/// number of threads. Cost: linear in the common pixels and their layers; allocates nothing.
+/// Early rejection comes first: if at every common pixel the front layer of one image lies behind
+/// the back layer of the other, they do not collide. (The paper asks for the same image in front
+/// at all pixels; each pixel on its own is enough, and rejects more.) Otherwise the layers of each
+/// pixel are walked in order of depth; the first overlap ends the search. The result is symmetric
+/// in `a` and `b`, and the same at any number of threads. Cost: linear in the common pixels and
+/// their layers; allocates nothing.
 ///
 /// # Panics
 /// If both images have layers but their cameras look from different places or have different
@@ -65,7 +68,7 @@ pub fn colliding_pixels(a: &Tldi, b: &Tldi, params: &Params, pixels: &mut Vec<[i
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Overlap;
 
-/// Neither image lies behind the other.
+/// Neither image lies behind the other as a whole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct MayCollide;
 
@@ -74,7 +77,7 @@ struct MayCollide;
 /// Both are monotone in ρ, between the layer's near and far depths, and never swapped: compressed
 /// layers keep their order, and overlap for a smaller ρ wherever they do for a larger one.
 fn compressed(layer: &Layer, rho: f32) -> [f32; 2] {
-    let margin = 0.5 * rho.clamp(0.0, 1.0) * (layer.far - layer.near);
+    let margin = 0.5 * rho.max(0.0) * (layer.far - layer.near);
     [
         (layer.near + margin).min(layer.depth),
         (layer.far - margin).max(layer.depth),
@@ -111,52 +114,19 @@ fn lesser(a: Option<f32>, b: Option<f32>) -> Option<f32> {
     }
 }
 
-/// What early rejection has found so far.
-#[derive(Clone, Copy)]
-struct Order {
-    /// Whether at every pixel the first layer of one image lies behind the last of the other.
-    a_behind_b: bool,
-    b_behind_a: bool,
-    /// Least distance in depth between them.
-    gap: Option<f32>,
-}
-
-impl Order {
-    const UNKNOWN: Self = Self {
-        a_behind_b: true,
-        b_behind_a: true,
-        gap: None,
+/// Distance in depth between two images at one pixel, where one lies behind the other as a whole;
+/// `None` where an image has no layer there.
+fn reject(a: &[Layer], b: &[Layer], rho: f32) -> Result<Option<f32>, MayCollide> {
+    let ([first_a, ..], [.., last_a], [first_b, ..], [.., last_b]) = (a, a, b, b) else {
+        return Ok(None);
     };
-
-    fn and(self, other: Self) -> Result<Self, MayCollide> {
-        let both = Self {
-            a_behind_b: self.a_behind_b && other.a_behind_b,
-            b_behind_a: self.b_behind_a && other.b_behind_a,
-            gap: lesser(self.gap, other.gap),
-        };
-        if both.a_behind_b || both.b_behind_a {
-            Ok(both)
-        } else {
-            Err(MayCollide)
-        }
-    }
-
-    fn of_pixel(a: &[Layer], b: &[Layer], rho: f32) -> Result<Self, MayCollide> {
-        let ([first_a, ..], [first_b, ..]) = (a, b) else {
-            return Ok(Self::UNKNOWN);
-        };
-        let last = |layers: &[Layer]| layers[layers.len() - 1];
-        let a_from_b = compressed(first_a, rho)[0] - compressed(&last(b), rho)[1];
-        let b_from_a = compressed(first_b, rho)[0] - compressed(&last(a), rho)[1];
-        if a_from_b > 0.0 || b_from_a > 0.0 {
-            Ok(Self {
-                a_behind_b: a_from_b > 0.0,
-                b_behind_a: b_from_a > 0.0,
-                gap: Some(a_from_b.max(b_from_a)),
-            })
-        } else {
-            Err(MayCollide)
-        }
+    let a_behind_b = compressed(first_a, rho)[0] - compressed(last_b, rho)[1];
+    let b_behind_a = compressed(first_b, rho)[0] - compressed(last_a, rho)[1];
+    let gap = a_behind_b.max(b_behind_a);
+    if gap > 0.0 {
+        Ok(Some(gap))
+    } else {
+        Err(MayCollide)
     }
 }
 
@@ -173,7 +143,15 @@ impl<'a> CommonPixels<'a> {
         if a.layers.is_empty() || b.layers.is_empty() {
             return None;
         }
-        let grid = |image: &Tldi| (image.camera.view_from_frame, image.camera.projection);
+        let grid = |image: &Tldi| {
+            let camera = image.camera;
+            // The principal point of a perspective camera is the middle of its image.
+            let size = match camera.projection {
+                Projection::Orthographic { .. } => None,
+                Projection::Perspective { .. } => camera.size,
+            };
+            (camera.view_from_frame, camera.projection, size)
+        };
         assert!(
             grid(a) == grid(b),
             "the images were built with different cameras: build both with the same one"
@@ -216,30 +194,12 @@ impl<'a> CommonPixels<'a> {
 
     /// The least gap where one image lies behind the other at every pixel.
     fn reject_early(&self, rho: f32) -> Result<Option<f32>, MayCollide> {
-        self.rows
-            .clone()
-            .into_par_iter()
-            .map(|j| {
-                self.row(j).try_fold(Order::UNKNOWN, |order, [a, b]| {
-                    order.and(Order::of_pixel(a, b, rho)?)
-                })
-            })
-            .try_reduce(|| Order::UNKNOWN, Order::and)
-            .map(|order| order.gap)
+        self.least(|a, b| reject(a, b, rho))
     }
 
     /// The full comparison of all layers.
     fn compare_layers(&self, rho: f32) -> PaperComparison {
-        let gap = self
-            .rows
-            .clone()
-            .into_par_iter()
-            .map(|j| {
-                self.row(j)
-                    .try_fold(None, |least, [a, b]| Ok(lesser(least, walk(a, b, rho)?)))
-            })
-            .try_reduce(|| None, |a, b| Ok(lesser(a, b)));
-        match gap {
+        match self.least(|a, b| walk(a, b, rho)) {
             Ok(gap) => PaperComparison {
                 collides: false,
                 gap,
@@ -250,6 +210,21 @@ impl<'a> CommonPixels<'a> {
             },
         }
     }
+
+    /// The least of what `gap` says of the layers of both images at each pixel; ends at an error.
+    fn least<E: Send>(
+        &self,
+        gap: impl Fn(&[Layer], &[Layer]) -> Result<Option<f32>, E> + Sync,
+    ) -> Result<Option<f32>, E> {
+        self.rows
+            .clone()
+            .into_par_iter()
+            .map(|j| {
+                self.row(j)
+                    .try_fold(None, |least, [a, b]| Ok(lesser(least, gap(a, b)?)))
+            })
+            .try_reduce(|| None, |a, b| Ok(lesser(a, b)))
+    }
 }
 
 #[cfg(test)]
@@ -258,7 +233,7 @@ mod tests {
     use crate::{Facing, VirtualCamera};
     use glamx::Vec3;
 
-    /// One row of pixels; ranges in order of depth with random gaps.
+    /// A few pixels with ranges in order of depth and random gaps between them.
     fn random_image(rng: &mut fastrand::Rng, start: f32) -> Tldi {
         let mut image = Tldi {
             camera: VirtualCamera::along(Vec3::Z, 1.0),
@@ -298,7 +273,10 @@ mod tests {
             };
             let rho = rng.f32();
             let full = pixels.compare_layers(rho);
-            match pixels.reject_early(rho) {
+            let rejection = pixels.reject_early(rho);
+            let swapped = CommonPixels::new(&b, &a).unwrap();
+            assert_eq!(rejection, swapped.reject_early(rho), "seed {seed}");
+            match rejection {
                 Ok(gap) => {
                     assert_eq!(
                         PaperComparison {

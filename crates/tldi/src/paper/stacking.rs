@@ -17,7 +17,7 @@ pub(super) fn stacking(rest: &[Fragment], front: &Front, segments: u32) -> u128 
     let mut filled = 0;
     for fragment in rest {
         let first = front.first_segment(fragment);
-        if first > filled || first >= segments {
+        if first > filled {
             break;
         }
         let last = front.last_segment(fragment).min(segments - 1);

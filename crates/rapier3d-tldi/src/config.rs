@@ -1,0 +1,77 @@
+//! The settings of a pipeline.
+
+use crate::TldiError;
+use tldi::{Params, Variant};
+
+/// Settings of a [`TldiPipeline`](crate::TldiPipeline), the same for all its pairs.
+///
+/// ```
+/// use rapier3d_tldi::prelude::*;
+/// let config = TldiConfig { pixel_scale: 2.0, ..TldiConfig::default() }; // a noisy sensor
+/// let pipeline = TldiPipeline::new(config)?;
+/// # Ok::<(), TldiError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TldiConfig {
+    /// Which construction and comparison of the layers to use.
+    pub variant: Variant,
+    /// Edge of a pixel in mean radii of the pair's coarser cloud, greater than 0. 1 resolves the
+    /// most that the points tell; 2 averages noise as large as the radii.
+    pub pixel_scale: f32,
+    /// Contacts are kept, riding on their bodies, until the pair has moved by this much relative
+    /// to each other since they were measured, in mean radii of its finer cloud. Less than what a
+    /// comparison scatters by, so nothing is lost, and bodies come to rest; 0 measures in every
+    /// step.
+    pub kept_drift: f32,
+}
+
+impl Default for TldiConfig {
+    fn default() -> Self {
+        Self {
+            variant: Variant::default(),
+            pixel_scale: 1.0,
+            kept_drift: 0.05,
+        }
+    }
+}
+
+impl TldiConfig {
+    /// Refuses values that no comparison can use.
+    pub(crate) fn validated(self) -> Result<Self, TldiError> {
+        let check = |setting, value: f32, is_valid: bool, expected| {
+            if value.is_finite() && is_valid {
+                Ok(())
+            } else {
+                Err(TldiError::BadConfig {
+                    setting,
+                    value,
+                    expected,
+                })
+            }
+        };
+        check(
+            "pixel_scale",
+            self.pixel_scale,
+            self.pixel_scale > 0.0,
+            "it must be finite and greater than 0",
+        )?;
+        check(
+            "kept_drift",
+            self.kept_drift,
+            self.kept_drift >= 0.0,
+            "it must be finite and not negative",
+        )?;
+        Ok(self)
+    }
+
+    /// Parameters of a pair whose coarser cloud has this mean radius, in metres, for contacts up to
+    /// a gap of `prediction` metres.
+    pub(crate) fn params(&self, mean_radius: f32, prediction: f32) -> Params {
+        match self.variant {
+            Variant::Paper => Params::paper(mean_radius),
+            Variant::Oriented => Params::for_radius(mean_radius),
+        }
+        .with_pixel_size(self.pixel_scale * mean_radius)
+        .with_prediction(prediction)
+    }
+}

@@ -1,0 +1,75 @@
+//! What can go wrong between the clouds and rapier.
+
+use rapier3d::geometry::ColliderHandle;
+use thiserror::Error;
+use tldi::{BackendError, CloudError};
+
+/// Why a step of a [`TldiPipeline`](crate::TldiPipeline) failed.
+///
+/// Rapier drops the errors of its narrow phase, and the bodies concerned fall through each other;
+/// here they are kept and returned by the pipeline's next
+/// [`finish`](crate::TldiPipeline::finish) or [`step`](crate::TldiPipeline::step).
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum TldiError {
+    /// The narrow phase does not ask this pipeline.
+    #[error(
+        "the narrow phase is not attached to this pipeline: call `attach` once after creating or deserialising the world"
+    )]
+    NotAttached,
+    /// The backend could not compare two colliders of the batch. No step was taken.
+    #[error("colliders {collider1:?} and {collider2:?} cannot be compared: {source}")]
+    Pair {
+        /// The collider with the lower index.
+        collider1: ColliderHandle,
+        /// The other collider.
+        collider2: ColliderHandle,
+        /// What the backend says.
+        source: BackendError,
+    },
+    /// The backend failed for the batch as a whole. No step was taken.
+    #[error("the batch of {pairs} pairs cannot be compared: {source}")]
+    Batch {
+        /// Pairs in the batch.
+        pairs: usize,
+        /// What the backend says.
+        source: BackendError,
+    },
+    /// Pairs that were compared on the spot, inside rapier's step, failed: they had no contacts in
+    /// that step.
+    #[error(
+        "{count} pairs that were not in the batch had no contacts in the last step; the first: {first}"
+    )]
+    OnTheSpot {
+        /// How many failed since the last report.
+        count: usize,
+        /// The error of one of them.
+        first: BackendError,
+    },
+    /// The new points of a collider are not a valid cloud. It keeps the old ones.
+    #[error("the new points of collider {collider:?}: {source}")]
+    Cloud {
+        /// The collider.
+        collider: ColliderHandle,
+        /// What is wrong with the points.
+        source: CloudError,
+    },
+    /// The collider does not exist (any more).
+    #[error("collider {0:?} does not exist: was it removed?")]
+    NoSuchCollider(ColliderHandle),
+    /// The collider's shape is not a cloud.
+    #[error(
+        "the shape of collider {0:?} is not a PointCloudShape: give the cloud a collider of its own (not a part of a compound)"
+    )]
+    NotACloud(ColliderHandle),
+    /// A setting is outside its range.
+    #[error("{setting} is {value}: {expected}")]
+    BadConfig {
+        /// Name of the field of [`TldiConfig`](crate::TldiConfig).
+        setting: &'static str,
+        /// The value given.
+        value: f32,
+        /// What is allowed.
+        expected: &'static str,
+    },
+}

@@ -1,0 +1,145 @@
+//! Mass properties of a cloud: of the solid it encloses, or of the shell it samples.
+
+mod surfels;
+
+use rapier3d::glamx::{DMat3, DVec3};
+use rapier3d::prelude::MassProperties;
+use surfels::Surfel;
+use tldi::PointCloud;
+
+/// What of a cloud has mass.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum MassModel {
+    /// The solid that the points enclose. A cloud that encloses nothing (an open scan, or one that
+    /// is inside out) counts as a shell, 2 mean radii thick.
+    #[default]
+    Solid,
+    /// A sheet of even thickness along the sampled surface.
+    Shell {
+        /// Thickness of the sheet in metres.
+        thickness: f32,
+    },
+}
+
+/// A surface counts as closed if the vectors of its areas (area times outward normal), which
+/// cancel on a closed surface, add up to less than this part of the area. A sphere without a cap
+/// of 26° (5 % of its area) is still closed, and a cube without 29 % of one side.
+const OPEN: f64 = 0.05;
+
+/// Mass properties of `cloud` at a density of 1 kg/m³, in the cloud's own frame.
+///
+/// The cloud is taken as one small flat patch a point: its Voronoi cell among its neighbours, in
+/// its tangent plane, within 1.5 radii. Integrals over the solid become sums over the patches
+/// by Gauss's theorem, ∫ x dV = ½ ∮ x² n dA and the like. Normals are the cloud's own where they
+/// are oriented. Otherwise they are made outward by parity: the cloud is seen along its three
+/// axes, and where a ray meets an even number of surfaces, the ray enters at the first, third, …
+///
+/// Error: about that of a surface approximated by its tangent planes, (spacing / radius of
+/// curvature)², and (spacing / edge length) at sharp edges. Measured (volume, on random
+/// samples): sphere and box of 5,000 points below 1 %, Stanford Bunny of 30,000 points below 1 %;
+/// sheet areas below 4 %. Clouds of more than 100,000 points are thinned to about that number. Cost: 16 neighbours for each of those points, tens of milliseconds at most.
+pub fn unit_mass_properties(cloud: &PointCloud<'_>, model: MassModel) -> MassProperties {
+    let (surfels, thickness) = match model {
+        MassModel::Shell { thickness } => (surfels::areas(cloud), thickness),
+        MassModel::Solid => {
+            let surfels = surfels::outward(cloud);
+            if let Some(moments) = surfels.as_deref().and_then(solid) {
+                return moments.properties();
+            }
+            let surfels = surfels.unwrap_or_else(|| surfels::areas(cloud));
+            (surfels, 2.0 * cloud.mean_radius())
+        }
+    };
+    shell(&surfels, thickness.into()).properties()
+}
+
+/// Volume and its moments about the origin.
+struct Moments {
+    /// ∫ dV in m³.
+    volume: f64,
+    /// ∫ x dV in m⁴.
+    first: DVec3,
+    /// ∫ x xᵀ dV in m⁵.
+    second: DMat3,
+    /// Where the origin of the moments lies in the cloud's frame.
+    origin: DVec3,
+}
+
+impl Moments {
+    fn properties(&self) -> MassProperties {
+        let center = self.first / self.volume;
+        let central = self.second - outer(center, center) * self.volume;
+        let trace = central.x_axis.x + central.y_axis.y + central.z_axis.z;
+        let inertia = DMat3::from_diagonal(DVec3::splat(trace)) - central;
+        MassProperties::with_inertia_matrix(
+            (self.origin + center).as_vec3(),
+            self.volume as f32,
+            inertia.as_mat3(),
+        )
+    }
+}
+
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// A point near the middle, so that moments lose no digits far from the cloud's origin.
+fn middle(surfels: &[Surfel]) -> DVec3 {
+    surfels.iter().map(|s| s.position).sum::<DVec3>() / surfels.len() as f64
+}
+
+/// The moments of a sheet.
+fn shell(surfels: &[Surfel], thickness: f64) -> Moments {
+    let origin = middle(surfels);
+    let mut moments = Moments {
+        volume: 0.0,
+        first: DVec3::ZERO,
+        second: DMat3::ZERO,
+        origin,
+    };
+    for surfel in surfels {
+        let volume = surfel.area * thickness;
+        let p = surfel.position - origin;
+        moments.volume += volume;
+        moments.first += volume * p;
+        // A patch has an extent of its own, which alone keeps a single point's inertia above zero.
+        let within = DMat3::IDENTITY - outer(surfel.normal, surfel.normal);
+        let spread = surfel.area / (4.0 * std::f64::consts::PI);
+        moments.second += (outer(p, p) + within * spread) * volume;
+    }
+    moments
+}
+
+/// The moments of the enclosed solid, or `None` if the surfels do not enclose one.
+fn solid(surfels: &[Surfel]) -> Option<Moments> {
+    let origin = middle(surfels);
+    let mut area = 0.0;
+    let mut vector_area = DVec3::ZERO;
+    let mut volume = 0.0;
+    let mut first = DVec3::ZERO;
+    let mut second = DMat3::ZERO;
+    for surfel in surfels {
+        let p = surfel.position - origin;
+        let flux = surfel.area * surfel.normal;
+        area += surfel.area;
+        vector_area += flux;
+        volume += p.dot(flux) / 3.0;
+        first += 0.5 * p * p * flux;
+        // ∫ x² dV = ⅓ ∮ x³ n_x dA; ∫ xy dV = ½ ∮ x² y n_x dA = ½ ∮ x y² n_y dA: their mean.
+        let squares = p * p * flux;
+        for i in 0..3 {
+            second.col_mut(i)[i] += p[i] * squares[i] / 3.0;
+            let j = (i + 1) % 3;
+            let product = 0.25 * (squares[i] * p[j] + squares[j] * p[i]);
+            second.col_mut(i)[j] += product;
+            second.col_mut(j)[i] += product;
+        }
+    }
+    let closed = vector_area.length() < OPEN * area && volume > 0.0;
+    closed.then_some(Moments {
+        volume,
+        first,
+        second,
+        origin,
+    })
+}

@@ -1,0 +1,73 @@
+//! Until when measured contacts hold.
+//!
+//! Every comparison samples the surfaces anew and its depths scatter by a few hundredths of the
+//! point radius. Fed to a solver in every step, this noise keeps bodies from coming to rest. So
+//! contacts are measured only once the pair has moved by as much as that; until then the points
+//! that were found ride on their bodies. Rapier does the same for its own shapes
+//! (`contact_recycling`), with a distance that does not know how fine the cloud is.
+
+use crate::TldiConfig;
+use crate::parts::{ShapePair, clouds_of};
+use rapier3d::math::Pose;
+use rapier3d::parry::bounding_volume::Aabb;
+use rapier3d::parry::shape::Shape;
+
+/// Where a pair's contacts were measured, and for how long they hold.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct Measured {
+    pos12: Pose,
+    prediction: f32,
+    /// Bounds of the smaller shape, in its own frame: only where it is can there be contacts.
+    bounds: Aabb,
+    shape1_is_smaller: bool,
+    /// How far the smaller shape may move relative to the other, in metres.
+    max_drift: f32,
+}
+
+impl Measured {
+    /// The measurement of `pair`, or `None` where it does not outlive the step: shapes that deform
+    /// in place, or a configuration that says so.
+    pub(crate) fn new(pair: &ShapePair<'_>, config: &TldiConfig) -> Option<Self> {
+        let deforms = |shape: &dyn Shape| {
+            shape
+                .as_composite_shape()
+                .is_some_and(|shape| shape.is_deformable())
+        };
+        if deforms(pair.shape1) || deforms(pair.shape2) {
+            return None;
+        }
+        let finest = clouds_of(pair.shape1)
+            .chain(clouds_of(pair.shape2))
+            .map(|cloud| cloud.mean_radius())
+            .reduce(f32::min)?;
+        let max_drift = config.kept_drift * finest;
+        let bounds = [pair.shape1, pair.shape2].map(|shape| shape.compute_local_aabb());
+        let size = bounds.map(|bounds| bounds.extents().length_squared());
+        let shape1_is_smaller = size[0] < size[1];
+        (max_drift > 0.0).then_some(Self {
+            pos12: pair.pos12,
+            prediction: pair.prediction,
+            bounds: bounds[usize::from(!shape1_is_smaller)],
+            shape1_is_smaller,
+            max_drift,
+        })
+    }
+
+    /// Whether the contacts still hold at this relative pose.
+    pub(crate) fn holds(&self, pos12: &Pose, prediction: f32) -> bool {
+        if prediction != self.prediction {
+            return false;
+        }
+        let (before, now) = if self.shape1_is_smaller {
+            (self.pos12.inverse(), pos12.inverse())
+        } else {
+            (self.pos12, *pos12)
+        };
+        // A rigid motion moves no point of a box farther than the farthest of its corners.
+        let corners = self.bounds.vertices();
+        let limit = self.max_drift * self.max_drift;
+        corners
+            .into_iter()
+            .all(|corner| (now * corner).distance_squared(before * corner) <= limit)
+    }
+}

@@ -1,0 +1,331 @@
+//! The pipeline: a batch of comparisons, then rapier's step.
+
+use crate::batching::{Frame, PairMemory};
+use crate::candidates::CandidateSearch;
+use crate::exact::ExactShape;
+use crate::parts::{PartPair, append_queries};
+use crate::prepared::{Batch, PROBE_ANSWER, Shared};
+use crate::report::{cloud_pairs, contacts_of};
+use crate::{
+    Contact, PointCloudShape, StepReport, TldiConfig, TldiDispatcher, TldiError, cloud_collider,
+};
+use rapier3d::dynamics::{IntegrationParameters, RigidBodySet};
+use rapier3d::geometry::{ColliderBuilder, ColliderHandle, ColliderSet, NarrowPhase};
+use rapier3d::math::{Pose, Vector};
+use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher};
+use rapier3d::pipeline::{EventHandler, PhysicsHooks, PhysicsWorld};
+use std::sync::Arc;
+use std::time::Instant;
+use tldi::{Backend, BackendError, CpuBackend, PairQuery, PointCloud};
+
+/// Finds the contacts of point clouds for one physics world.
+///
+/// Before each of rapier's steps the pairs of colliders that may touch and of which one is a cloud
+/// are compared in one batch ([`prepare`](Self::prepare)); rapier then finds the results through
+/// the dispatcher that [`attach`](Self::attach) installs. [`step`](Self::step) does both.
+///
+/// Several worlds may be attached to one pipeline if each is prepared, stepped and finished before
+/// the next is prepared; a pipeline for each remembers more (the view axes of its pairs).
+pub struct TldiPipeline {
+    backend: Box<dyn Backend>,
+    backend_name: Arc<str>,
+    shared: Arc<Shared>,
+    search: CandidateSearch,
+    memory: PairMemory,
+    changed: Vec<ColliderHandle>,
+    sides: Vec<[ExactShape<'static>; 2]>,
+    queries: Vec<PairQuery<'static>>,
+    prepare_seconds: f64,
+}
+
+impl TldiPipeline {
+    /// A pipeline on the CPU.
+    ///
+    /// # Errors
+    /// [`TldiError::BadConfig`].
+    pub fn new(config: TldiConfig) -> Result<Self, TldiError> {
+        Self::with_backend(config, Box::new(CpuBackend::new()))
+    }
+
+    /// A pipeline whose batches `backend` compares. Pairs that are not in the batch are always
+    /// compared on the CPU.
+    ///
+    /// # Errors
+    /// [`TldiError::BadConfig`].
+    pub fn with_backend(config: TldiConfig, backend: Box<dyn Backend>) -> Result<Self, TldiError> {
+        Ok(Self {
+            backend_name: backend.name().into(),
+            backend,
+            shared: Arc::new(Shared::new(config.validated()?)),
+            search: CandidateSearch::default(),
+            memory: PairMemory::default(),
+            changed: Vec::new(),
+            sides: Vec::new(),
+            queries: Vec::new(),
+            prepare_seconds: 0.0,
+        })
+    }
+
+    /// Makes the world's narrow phase ask this pipeline, and rapier's own dispatcher about pairs
+    /// without a cloud. Needed once, and again after the world was deserialised.
+    pub fn attach(&self, world: &mut PhysicsWorld) {
+        self.attach_narrow_phase(&mut world.narrow_phase);
+    }
+
+    /// [`attach`](Self::attach) for split sets.
+    pub fn attach_narrow_phase(&self, narrow_phase: &mut NarrowPhase) {
+        narrow_phase.set_query_dispatcher(self.dispatcher().chain(DefaultQueryDispatcher));
+    }
+
+    /// The dispatcher that [`attach`](Self::attach) installs, for a chain of your own; it must come
+    /// before rapier's default one.
+    pub fn dispatcher(&self) -> TldiDispatcher {
+        TldiDispatcher::new(Arc::clone(&self.shared))
+    }
+
+    /// A collider for a cloud; see [`cloud_collider`]. For several bodies of one cloud, make one
+    /// [`PointCloudShape`] and give each a clone.
+    pub fn collider(&self, cloud: PointCloud<'static>) -> ColliderBuilder {
+        cloud_collider(PointCloudShape::new(cloud))
+    }
+
+    /// Replaces the points and, where given, the normals (one for each point) of a cloud's
+    /// collider, and tells rapier, which wakes the body and what it touches; see
+    /// [`PointCloud::set_points`] for the radii. The mass of a body whose collider has a density is
+    /// computed anew.
+    ///
+    /// Called in every step, it keeps what touches the collider awake for ever: where the points
+    /// rest, call it only when they did change. Bodies that share the points keep the old ones.
+    ///
+    /// # Errors
+    /// [`TldiError::NoSuchCollider`], [`TldiError::NotACloud`], and [`TldiError::Cloud`] where the
+    /// points are refused: the collider then keeps the old ones.
+    pub fn set_points(
+        &mut self,
+        world: &mut PhysicsWorld,
+        collider: ColliderHandle,
+        points: &[Vector],
+        normals: Option<&[Vector]>,
+    ) -> Result<(), TldiError> {
+        self.set_collider_points(&mut world.colliders, collider, points, normals)
+    }
+
+    /// [`set_points`](Self::set_points) for split sets.
+    ///
+    /// # Errors
+    /// Those of [`set_points`](Self::set_points).
+    pub fn set_collider_points(
+        &mut self,
+        colliders: &mut ColliderSet,
+        collider: ColliderHandle,
+        points: &[Vector],
+        normals: Option<&[Vector]>,
+    ) -> Result<(), TldiError> {
+        let current = colliders
+            .get(collider)
+            .ok_or(TldiError::NoSuchCollider(collider))?;
+        if current.shape().as_shape::<PointCloudShape>().is_none() {
+            return Err(TldiError::NotACloud(collider));
+        }
+        // The batch of a step that was not finished shares the shape: without it the change is
+        // made in place.
+        self.shared.batch_mut().clear();
+        let shape = colliders
+            .get_mut(collider)
+            .and_then(|collider| collider.shape_mut().as_shape_mut::<PointCloudShape>())
+            .ok_or(TldiError::NotACloud(collider))?;
+        shape
+            .set_points(points, normals)
+            .map_err(|source| TldiError::Cloud { collider, source })?;
+        if !self.changed.contains(&collider) {
+            self.changed.push(collider);
+        }
+        Ok(())
+    }
+
+    /// Compares the pairs that rapier is going to ask about in its next step, in one batch.
+    ///
+    /// The arguments are those of the [`PhysicsPipeline::step`](rapier3d::pipeline::PhysicsPipeline)
+    /// that follows. What is changed in between is compared on the spot. After the step, call
+    /// [`finish`](Self::finish).
+    ///
+    /// # Errors
+    /// [`TldiError::Pair`] or [`TldiError::Batch`] where the backend fails; the step should not be
+    /// taken then.
+    pub fn prepare(
+        &mut self,
+        gravity: Vector,
+        integration: &IntegrationParameters,
+        bodies: &RigidBodySet,
+        colliders: &ColliderSet,
+    ) -> Result<(), TldiError> {
+        let start = Instant::now();
+        let shared = Arc::clone(&self.shared);
+        shared.take_spot_counts();
+        // Taken out and put back: no lock is held during the comparison.
+        let mut batch = std::mem::take(&mut *shared.batch_mut());
+        batch.clear();
+        let candidates = self
+            .search
+            .find(bodies, colliders, integration, &self.changed);
+        let frame = Frame {
+            gravity,
+            integration,
+            bodies,
+            colliders,
+            config: &shared.config,
+            memory: &self.memory,
+            changed: &self.changed,
+        };
+        let mut sides = emptied(std::mem::take(&mut self.sides));
+        for candidate in candidates.iter().filter(|candidate| !candidate.asleep) {
+            frame.push_pair(candidate, &mut batch, &mut sides);
+        }
+
+        let mut queries = emptied(std::mem::take(&mut self.queries));
+        append_queries(&batch.parts, &sides, &mut queries);
+        let outcome = self.backend.compare(&queries, &mut batch.results);
+        let error = outcome.err().map(|source| name_the_pair(source, &batch));
+        self.queries = emptied(queries);
+        self.sides = emptied(sides);
+        if error.is_some() {
+            batch.clear();
+        } else {
+            self.changed.clear();
+        }
+        *shared.batch_mut() = batch;
+        self.prepare_seconds = start.elapsed().as_secs_f64();
+        error.map_or(Ok(()), Err)
+    }
+
+    /// Closes a step: what it did, and what failed inside it. Give it the narrow phase and the
+    /// colliders of the step.
+    ///
+    /// # Errors
+    /// [`TldiError::NotAttached`], and [`TldiError::OnTheSpot`] where comparisons inside the step
+    /// failed.
+    pub fn finish(
+        &mut self,
+        narrow_phase: &NarrowPhase,
+        colliders: &ColliderSet,
+    ) -> Result<StepReport, TldiError> {
+        let on_the_spot = self.shared.take_spot_counts();
+        let mut report = StepReport {
+            pairs_batched: 0,
+            pairs_kept: 0,
+            pairs_missed: on_the_spot.pairs,
+            pairs_in_contact: 0,
+            contact_pixels: on_the_spot.contact_pixels,
+            max_penetration: 0.0,
+            prepare_seconds: self.prepare_seconds,
+            backend: Arc::clone(&self.backend_name),
+        };
+        {
+            let mut batch = self.shared.batch_mut();
+            (report.pairs_batched, report.pairs_kept) = batch.counts();
+            report.contact_pixels += batch.contact_pixels();
+            self.memory.update(self.search.candidates(), &batch);
+            batch.clear();
+        }
+        if let Some((count, first)) = self.shared.take_failures() {
+            return Err(TldiError::OnTheSpot { count, first });
+        }
+        if !self.is_attached(narrow_phase) {
+            return Err(TldiError::NotAttached);
+        }
+        for pair in cloud_pairs(narrow_phase, colliders) {
+            report.pairs_in_contact += usize::from(pair.has_any_active_contact());
+            for contact in contacts_of(pair, colliders) {
+                report.max_penetration = report.max_penetration.max(contact.depth);
+            }
+        }
+        Ok(report)
+    }
+
+    /// Steps the world: [`prepare`](Self::prepare), rapier's step, [`finish`](Self::finish).
+    ///
+    /// # Errors
+    /// Those of `prepare`, and [`TldiError::NotAttached`]: the world was not stepped. Those of
+    /// `finish`: it was.
+    pub fn step(&mut self, world: &mut PhysicsWorld) -> Result<StepReport, TldiError> {
+        self.step_with_events(world, &(), &())
+    }
+
+    /// [`step`](Self::step) with physics hooks and an event handler.
+    ///
+    /// # Errors
+    /// Those of [`step`](Self::step).
+    pub fn step_with_events(
+        &mut self,
+        world: &mut PhysicsWorld,
+        hooks: &dyn PhysicsHooks,
+        events: &dyn EventHandler,
+    ) -> Result<StepReport, TldiError> {
+        if !self.is_attached(&world.narrow_phase) {
+            return Err(TldiError::NotAttached);
+        }
+        self.prepare(
+            world.gravity,
+            &world.integration_parameters,
+            &world.bodies,
+            &world.colliders,
+        )?;
+        world.step_with_events(hooks, events);
+        self.finish(&world.narrow_phase, &world.colliders)
+    }
+
+    /// The contact points of all pairs with a cloud, as of the last step in which each pair was
+    /// awake, at the colliders' present poses.
+    pub fn contacts<'a>(
+        &self,
+        narrow_phase: &'a NarrowPhase,
+        colliders: &'a ColliderSet,
+    ) -> impl Iterator<Item = Contact> + use<'a> {
+        cloud_pairs(narrow_phase, colliders).flat_map(|pair| contacts_of(pair, colliders))
+    }
+
+    /// Whether the narrow phase asks this pipeline.
+    pub fn is_attached(&self, narrow_phase: &NarrowPhase) -> bool {
+        let probe = &self.shared.probe;
+        narrow_phase
+            .query_dispatcher()
+            .distance(&Pose::IDENTITY, probe, probe)
+            .is_ok_and(|answer| answer.distance == PROBE_ANSWER)
+    }
+}
+
+/// A failed batch's error, with the colliders it is about.
+fn name_the_pair(source: BackendError, batch: &Batch) -> TldiError {
+    let query_of_error = match &source {
+        BackendError::Unsupported { pair, .. } => Some(*pair),
+        _ => None,
+    };
+    let is_culprit = |part: &PartPair| {
+        let query = part.comparison.as_ref().map(|c| c.query);
+        query.is_some() && query == query_of_error
+    };
+    let culprit = batch
+        .pairs
+        .iter()
+        .find(|pair| batch.parts[pair.parts.clone()].iter().any(is_culprit));
+    match culprit {
+        Some(pair) => TldiError::Pair {
+            collider1: pair.colliders[0],
+            collider2: pair.colliders[1],
+            source,
+        },
+        None => TldiError::Batch {
+            pairs: batch.pairs.len(),
+            source,
+        },
+    }
+}
+
+/// The same vector without elements, for elements that borrow from something else: the memory is
+/// kept, since the layouts are equal (collecting a vector's own iterator is done in place).
+fn emptied<T, U>(mut vec: Vec<T>) -> Vec<U> {
+    vec.clear();
+    vec.into_iter()
+        .map(|_| unreachable!("the vector was cleared"))
+        .collect()
+}

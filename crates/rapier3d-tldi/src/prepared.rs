@@ -1,0 +1,219 @@
+//! What the pipeline and the dispatchers it handed to rapier share: the results of the batch, the
+//! workspaces for pairs that are not in it, and the errors that rapier would drop.
+
+use crate::TldiConfig;
+use crate::measured::Measured;
+use crate::parts::{Hint, PartPair, ShapePair, append_part_pairs, append_queries, within_reach};
+use rapier3d::geometry::{ColliderHandle, SharedShape};
+use rapier3d::math::Pose;
+use rapier3d::parry::shape::{Ball, Shape};
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
+use tldi::{Backend, BackendError, CpuBackend, PairResult};
+
+/// A distance that no other dispatcher gives.
+pub(crate) const PROBE_ANSWER: f32 = -1.0;
+
+/// What the dispatcher sees of a pair: the addresses of both shapes, and the relative pose, bit by
+/// bit.
+#[derive(PartialEq, Eq, Hash)]
+pub(crate) struct PairKey {
+    shapes: [usize; 2],
+    pos12: [u32; 7],
+}
+
+impl PairKey {
+    pub(crate) fn new(shape1: &dyn Shape, shape2: &dyn Shape, pos12: &Pose) -> Self {
+        let address = |shape: &dyn Shape| std::ptr::from_ref(shape).cast::<()>() as usize;
+        let [x, y, z] = pos12.translation.to_array();
+        let [i, j, k, w] = pos12.rotation.to_array();
+        Self {
+            shapes: [address(shape1), address(shape2)],
+            pos12: [x, y, z, i, j, k, w].map(f32::to_bits),
+        }
+    }
+}
+
+/// A pair of the batch.
+pub(crate) struct PreparedPair {
+    pub(crate) colliders: [ColliderHandle; 2],
+    /// Contacts up to this gap were sought, metres.
+    pub(crate) prediction: f32,
+    /// Its parts, in [`Batch::parts`].
+    pub(crate) parts: Range<usize>,
+    /// Whether rapier asked for it and took this answer.
+    pub(crate) used: AtomicBool,
+    /// It is not compared: the manifolds that rapier has are expected to hold.
+    pub(crate) is_kept: bool,
+    /// The measurement that this is, or the earlier one that holds.
+    pub(crate) measured: Option<Measured>,
+    /// Keeps the shapes alive, so that no other can come to lie at their addresses, and shared, so
+    /// that a change of theirs in place moves them to other ones.
+    pub(crate) _shapes: [SharedShape; 2],
+}
+
+/// The pairs of a step and their results.
+#[derive(Default)]
+pub(crate) struct Batch {
+    index: HashMap<PairKey, usize>,
+    pub(crate) pairs: Vec<PreparedPair>,
+    pub(crate) parts: Vec<PartPair>,
+    /// The result of query `k` is `results[k]`; there may be left-over ones behind.
+    pub(crate) results: Vec<PairResult>,
+}
+
+impl Batch {
+    /// Forgets the pairs, keeping the memory.
+    pub(crate) fn clear(&mut self) {
+        self.index.clear();
+        self.pairs.clear();
+        self.parts.clear();
+    }
+
+    /// Appends a pair. Where two have the same key (bodies that share a shape and lie alike), the
+    /// first answers for both.
+    pub(crate) fn push(&mut self, key: PairKey, pair: PreparedPair) {
+        self.index.entry(key).or_insert(self.pairs.len());
+        self.pairs.push(pair);
+    }
+
+    /// The pair with this key.
+    pub(crate) fn get(&self, key: &PairKey) -> Option<&PreparedPair> {
+        self.index.get(key).map(|&i| &self.pairs[i])
+    }
+
+    /// Pairs that are compared, and those whose earlier contacts hold.
+    pub(crate) fn counts(&self) -> (usize, usize) {
+        let kept = self.pairs.iter().filter(|pair| pair.is_kept).count();
+        (self.pairs.len() - kept, kept)
+    }
+
+    /// Contact pixels of the pairs that rapier asked for.
+    pub(crate) fn contact_pixels(&self) -> usize {
+        let used = self
+            .pairs
+            .iter()
+            .filter(|pair| pair.used.load(Ordering::Relaxed));
+        used.map(|pair| count_pixels(&self.parts[pair.parts.clone()], &self.results))
+            .sum()
+    }
+}
+
+pub(crate) fn count_pixels(parts: &[PartPair], results: &[PairResult]) -> usize {
+    let comparisons = parts.iter().filter_map(|part| part.comparison.as_ref());
+    comparisons.map(|c| results[c.query].contacts.len()).sum()
+}
+
+/// A CPU backend and its memory, for one pair at a time.
+#[derive(Default)]
+pub(crate) struct Spot {
+    backend: CpuBackend,
+    pub(crate) parts: Vec<PartPair>,
+    pub(crate) results: Vec<PairResult>,
+}
+
+/// Comparisons on the spot since the batch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct SpotCounts {
+    pub(crate) pairs: usize,
+    pub(crate) contact_pixels: usize,
+}
+
+/// State shared by a pipeline and its dispatchers.
+pub(crate) struct Shared {
+    pub(crate) config: TldiConfig,
+    /// A shape that only this pipeline's dispatchers know, by its address: its distance to itself
+    /// is [`PROBE_ANSWER`].
+    pub(crate) probe: Ball,
+    batch: RwLock<Batch>,
+    /// Taken out while in use: no lock is held during a comparison.
+    spots: Mutex<Vec<Spot>>,
+    spot_pairs: AtomicUsize,
+    spot_pixels: AtomicUsize,
+    failed: Mutex<Option<(usize, BackendError)>>,
+}
+
+impl Shared {
+    pub(crate) fn new(config: TldiConfig) -> Self {
+        Self {
+            config,
+            probe: Ball::new(1.0),
+            batch: RwLock::default(),
+            spots: Mutex::default(),
+            spot_pairs: AtomicUsize::new(0),
+            spot_pixels: AtomicUsize::new(0),
+            failed: Mutex::default(),
+        }
+    }
+
+    pub(crate) fn batch(&self) -> std::sync::RwLockReadGuard<'_, Batch> {
+        self.batch.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn batch_mut(&self) -> std::sync::RwLockWriteGuard<'_, Batch> {
+        self.batch.write().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Compares a pair that is not in the batch and hands its parts and their results to `read`
+    /// (none where it is out of reach). `None` if the comparison failed, which is kept for
+    /// [`take_failures`](Self::take_failures).
+    pub(crate) fn compare_on_the_spot<R>(
+        &self,
+        pair: ShapePair<'_>,
+        read: impl FnOnce(&[PartPair], &[PairResult]) -> R,
+    ) -> Option<R> {
+        if !within_reach(pair.shape1, pair.shape2, &pair.pos12, pair.prediction) {
+            return Some(read(&[], &[]));
+        }
+        self.spot_pairs.fetch_add(1, Ordering::Relaxed);
+        let mut spot = locked(&self.spots).pop().unwrap_or_default();
+        let answer = match spot.compare(pair, &self.config) {
+            Ok(()) => {
+                let pixels = count_pixels(&spot.parts, &spot.results);
+                self.spot_pixels.fetch_add(pixels, Ordering::Relaxed);
+                Some(read(&spot.parts, &spot.results))
+            }
+            Err(error) => {
+                match &mut *locked(&self.failed) {
+                    Some((count, _)) => *count += 1,
+                    failed @ None => *failed = Some((1, error)),
+                }
+                None
+            }
+        };
+        locked(&self.spots).push(spot);
+        answer
+    }
+
+    /// Comparisons on the spot since the last call.
+    pub(crate) fn take_spot_counts(&self) -> SpotCounts {
+        SpotCounts {
+            pairs: self.spot_pairs.swap(0, Ordering::Relaxed),
+            contact_pixels: self.spot_pixels.swap(0, Ordering::Relaxed),
+        }
+    }
+
+    /// How many comparisons on the spot failed since the last call, and the first error.
+    pub(crate) fn take_failures(&self) -> Option<(usize, BackendError)> {
+        locked(&self.failed).take()
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Spot {
+    fn compare(&mut self, pair: ShapePair<'_>, config: &TldiConfig) -> Result<(), BackendError> {
+        let mut sides = Vec::new();
+        self.parts.clear();
+        append_part_pairs(pair, config, &mut self.parts, &mut sides, |_, _, _| {
+            Hint::default()
+        });
+        let mut queries = Vec::with_capacity(sides.len());
+        append_queries(&self.parts, &sides, &mut queries);
+        self.backend.compare(&queries, &mut self.results)
+    }
+}

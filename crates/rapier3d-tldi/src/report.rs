@@ -1,0 +1,86 @@
+//! What a step did, and the contacts it left.
+
+use crate::parts::has_cloud;
+use rapier3d::geometry::{ColliderHandle, ColliderSet, ContactPair, NarrowPhase};
+use rapier3d::math::Vector;
+use std::sync::Arc;
+
+/// What one step of a [`TldiPipeline`](crate::TldiPipeline) did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepReport {
+    /// Pairs of colliders that were compared in one batch before the step.
+    pub pairs_batched: usize,
+    /// Pairs that were not compared because the contacts of an earlier step still hold
+    /// ([`TldiConfig::kept_drift`](crate::TldiConfig::kept_drift)).
+    pub pairs_kept: usize,
+    /// Pairs that rapier asked for and the batch did not hold (their poses or shapes changed after
+    /// it, or rapier split the step): compared on the spot, one by one.
+    pub pairs_missed: usize,
+    /// Pairs with a cloud whose colliders rapier holds to be in contact (closer than its
+    /// prediction distance), sleeping ones included.
+    pub pairs_in_contact: usize,
+    /// Pixels in which surfaces were close or penetrated, over the pairs that were compared and
+    /// that rapier asked for.
+    pub contact_pixels: usize,
+    /// Deepest penetration before the step over all contacts of clouds, sleeping ones included, in
+    /// metres; 0 without any.
+    pub max_penetration: f32,
+    /// Wall-clock time from the search for candidate pairs to the results of the batch.
+    pub prepare_seconds: f64,
+    /// Name of the backend that compared the batch.
+    pub backend: Arc<str>,
+}
+
+/// A contact point between two colliders of which at least one holds a cloud.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// The collider with the lower index.
+    pub collider1: ColliderHandle,
+    /// The other collider.
+    pub collider2: ColliderHandle,
+    /// Middle between the two surfaces, in world space, metres.
+    pub point: Vector,
+    /// Unit normal from the first collider towards the second, in world space.
+    pub normal: Vector,
+    /// Penetration depth in metres; negative: gap.
+    pub depth: f32,
+}
+
+/// The contact pairs with a cloud.
+pub(crate) fn cloud_pairs<'a>(
+    narrow_phase: &'a NarrowPhase,
+    colliders: &'a ColliderSet,
+) -> impl Iterator<Item = &'a ContactPair> {
+    let is_cloud = |handle| {
+        colliders
+            .get(handle)
+            .is_some_and(|collider| has_cloud(collider.shape()))
+    };
+    narrow_phase
+        .contact_pairs()
+        .filter(move |pair| is_cloud(pair.collider1) || is_cloud(pair.collider2))
+}
+
+/// The contact points of a pair.
+pub(crate) fn contacts_of<'a>(
+    pair: &'a ContactPair,
+    colliders: &'a ColliderSet,
+) -> impl Iterator<Item = Contact> {
+    let poses = colliders
+        .get(pair.collider1)
+        .zip(colliders.get(pair.collider2))
+        .map(|(collider1, collider2)| (*collider1.position(), *collider2.position()));
+    poses.into_iter().flat_map(move |(pose1, pose2)| {
+        pair.manifolds().iter().flat_map(move |manifold| {
+            let pose1 = manifold.subshape_pos1().map_or(pose1, |part| pose1 * *part);
+            let pose2 = manifold.subshape_pos2().map_or(pose2, |part| pose2 * *part);
+            manifold.points.iter().map(move |point| Contact {
+                collider1: pair.collider1,
+                collider2: pair.collider2,
+                point: (pose1 * point.local_p1).midpoint(pose2 * point.local_p2),
+                normal: pose1.rotation * manifold.local_n1,
+                depth: -point.dist,
+            })
+        })
+    })
+}

@@ -1,0 +1,264 @@
+//! Gathers points, whatever the format, into a [`RawCloud`].
+
+use crate::scalar::Scalar;
+use crate::slot::{Columns, Slot};
+use crate::{RawCloud, ReadOptions, SourceErrorKind};
+use tldi::glamx::{DVec3, Vec3};
+
+/// Points seen before the origin is chosen.
+const ORIGIN_SAMPLE: usize = 1024;
+
+/// Farther than this from zero, in units of the file, coordinates are moved: there, steps of `f32`
+/// reach 2⁻¹¹ (half a millimetre in metres).
+pub(crate) const FAR: f64 = 4096.0;
+
+/// Points reserved for at most before any has been read.
+const MAX_RESERVED: u64 = 1 << 16;
+
+/// How colour channels are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ColorScale {
+    /// 0 to 255.
+    Bytes,
+    /// Integers of more than 8 bits: 0 to 255, or to 65535 if any of the file is above 255.
+    Integers,
+    /// Reals: 0 to 1, or as integers if any of the file is above 1.
+    Reals,
+}
+
+/// What each point of a file has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layout {
+    pub(crate) normals: bool,
+    pub(crate) colors: Option<ColorScale>,
+    pub(crate) radii: bool,
+    /// Whether coordinates may not fit into `f32`.
+    pub(crate) wide: bool,
+}
+
+impl Layout {
+    pub(crate) fn of(columns: &Columns) -> Self {
+        let colors = if columns.has_packed_color() {
+            Some(ColorScale::Bytes)
+        } else if !columns.has(Slot::Color(0)) {
+            None
+        } else if columns.color_scalars().all(|s| s == Scalar::U8) {
+            Some(ColorScale::Bytes)
+        } else if columns.color_scalars().all(Scalar::is_integer) {
+            Some(ColorScale::Integers)
+        } else {
+            Some(ColorScale::Reals)
+        };
+        Self {
+            normals: columns.has_normal(),
+            colors,
+            radii: columns.has(Slot::Radius),
+            wide: columns.has_wide_position(),
+        }
+    }
+}
+
+/// One point as it is in the file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sample {
+    pub(crate) position: [f64; 3],
+    pub(crate) normal: [f32; 3],
+    /// Red, green, blue, alpha on the scale of the file; alpha NaN where there is none.
+    pub(crate) color: [f32; 4],
+    pub(crate) radius: f32,
+}
+
+impl Sample {
+    pub(crate) const EMPTY: Self = Self {
+        position: [f64::NAN; 3],
+        normal: [0.0; 3],
+        color: [0.0, 0.0, 0.0, f32::NAN],
+        radius: 0.0,
+    };
+
+    /// Sets what `slot` stands for, for all but packed colours.
+    #[inline]
+    pub(crate) fn set(&mut self, slot: Slot, value: f64) {
+        match slot {
+            Slot::Position(axis) => self.position[axis] = value,
+            Slot::Normal(axis) => self.normal[axis] = value as f32,
+            Slot::Color(channel) => self.color[channel] = value as f32,
+            Slot::Radius => self.radius = value as f32,
+            Slot::PackedRgb | Slot::PackedRgba => {}
+        }
+    }
+
+    /// Sets the colour from bits 0xAARRGGBB.
+    #[inline]
+    pub(crate) fn set_packed(&mut self, slot: Slot, bits: u32) {
+        let [blue, green, red, alpha] = bits.to_le_bytes().map(f32::from);
+        let alpha = if slot == Slot::PackedRgba {
+            alpha
+        } else {
+            f32::NAN
+        };
+        self.color = [red, green, blue, alpha];
+    }
+}
+
+/// Colours so far.
+enum Colors {
+    None,
+    Bytes(Vec<[u8; 4]>),
+    Unscaled {
+        channels: Vec<[f32; 4]>,
+        scale: ColorScale,
+    },
+}
+
+/// Gathers the points of one file.
+pub(crate) struct Collector {
+    max_points: u64,
+    points: Vec<Vec3>,
+    normals: Option<Vec<Vec3>>,
+    colors: Colors,
+    radii: Option<Vec<f32>>,
+    origin: DVec3,
+    /// Positions kept back until the origin is chosen; `None` once it is.
+    pending: Option<Vec<DVec3>>,
+}
+
+impl Collector {
+    /// For about `expected` points.
+    pub(crate) fn new(layout: Layout, expected: u64, options: &ReadOptions) -> Self {
+        // Fits: small.
+        let reserve = expected.min(MAX_RESERVED).min(options.max_points) as usize;
+        Self {
+            max_points: options.max_points,
+            points: Vec::with_capacity(reserve),
+            normals: layout.normals.then(|| Vec::with_capacity(reserve)),
+            colors: match layout.colors {
+                None => Colors::None,
+                Some(ColorScale::Bytes) => Colors::Bytes(Vec::with_capacity(reserve)),
+                Some(scale) => Colors::Unscaled {
+                    channels: Vec::with_capacity(reserve),
+                    scale,
+                },
+            },
+            radii: layout.radii.then(|| Vec::with_capacity(reserve)),
+            origin: options.origin.unwrap_or(DVec3::ZERO),
+            pending: (layout.wide && options.origin.is_none()).then(Vec::new),
+        }
+    }
+
+    /// Number of points so far.
+    pub(crate) fn count(&self) -> u64 {
+        (self.points.len() + self.pending.as_ref().map_or(0, Vec::len)) as u64
+    }
+
+    #[inline]
+    pub(crate) fn push(&mut self, sample: &Sample) -> Result<(), SourceErrorKind> {
+        if self.count() >= self.max_points {
+            return Err(too_many(self.max_points));
+        }
+        let position = DVec3::from_array(sample.position);
+        match &mut self.pending {
+            None => self.points.push((position - self.origin).as_vec3()),
+            Some(pending) => {
+                pending.push(position);
+                if pending.len() == ORIGIN_SAMPLE {
+                    self.choose_origin();
+                }
+            }
+        }
+        if let Some(normals) = &mut self.normals {
+            normals.push(Vec3::from_array(sample.normal));
+        }
+        match &mut self.colors {
+            Colors::None => {}
+            Colors::Bytes(colors) => colors.push(color_bytes(sample.color, 1.0)),
+            Colors::Unscaled { channels, .. } => channels.push(sample.color),
+        }
+        if let Some(radii) = &mut self.radii {
+            radii.push(sample.radius);
+        }
+        Ok(())
+    }
+
+    /// Chooses the origin from the points kept back, and passes them on.
+    fn choose_origin(&mut self) {
+        let Some(pending) = self.pending.take() else {
+            return;
+        };
+        for axis in 0..3 {
+            let mut coordinates: Vec<f64> = pending
+                .iter()
+                .map(|p| p[axis])
+                .filter(|c| c.is_finite())
+                .collect();
+            coordinates.sort_unstable_by(f64::total_cmp);
+            let median = coordinates.get(coordinates.len() / 2).copied();
+            self.origin[axis] = median.filter(|m| m.abs() > FAR).map_or(0.0, f64::round);
+        }
+        let origin = self.origin;
+        self.points
+            .extend(pending.iter().map(|p| (*p - origin).as_vec3()));
+    }
+
+    /// The cloud, without faces.
+    pub(crate) fn finish(mut self) -> Result<RawCloud, SourceErrorKind> {
+        self.choose_origin();
+        if self.points.is_empty() {
+            return Err(SourceErrorKind::NoPoints);
+        }
+        let colors = match self.colors {
+            Colors::None => None,
+            Colors::Bytes(colors) => Some(colors),
+            Colors::Unscaled { channels, scale } => {
+                let factor = color_factor(&channels, scale);
+                Some(channels.iter().map(|c| color_bytes(*c, factor)).collect())
+            }
+        };
+        Ok(RawCloud {
+            points: self.points,
+            normals: self.normals,
+            colors,
+            radii: self.radii,
+            faces: Vec::new(),
+            origin: self.origin,
+            viewpoint: None,
+        })
+    }
+}
+
+/// Fails if a header promises more points than are allowed.
+pub(crate) fn check_count(count: u64, options: &ReadOptions) -> Result<(), SourceErrorKind> {
+    if count > options.max_points {
+        return Err(too_many(options.max_points));
+    }
+    Ok(())
+}
+
+fn too_many(limit: u64) -> SourceErrorKind {
+    SourceErrorKind::TooManyPoints { limit }
+}
+
+/// What takes the channels of a file to 0 to 255.
+fn color_factor(channels: &[[f32; 4]], scale: ColorScale) -> f32 {
+    let most = channels
+        .iter()
+        .flat_map(|c| &c[..3])
+        .fold(0.0_f32, |most, c| most.max(*c));
+    if scale == ColorScale::Reals && most <= 1.0 {
+        255.0
+    } else if most <= 255.0 {
+        1.0
+    } else {
+        1.0 / 257.0
+    }
+}
+
+/// Rounded and limited to 0 to 255; NaN becomes 0, but a missing alpha opaque.
+#[inline]
+fn color_bytes(color: [f32; 4], factor: f32) -> [u8; 4] {
+    // `as` saturates, and takes NaN to 0.
+    let byte = |channel: f32| (channel * factor).round() as u8;
+    let [red, green, blue, alpha] = color;
+    let alpha = if alpha.is_nan() { 255 } else { byte(alpha) };
+    [byte(red), byte(green), byte(blue), alpha]
+}

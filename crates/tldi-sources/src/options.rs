@@ -1,0 +1,127 @@
+//! What to read and how.
+
+use std::fmt;
+use std::path::Path;
+use tldi::glamx::DVec3;
+
+/// A family of file formats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Format {
+    /// Polygon file format (Stanford): ascii, binary of either byte order.
+    Ply,
+    /// Point cloud data (PCL): ascii, binary, binary_compressed.
+    Pcd,
+    /// One point a line, in columns: XYZ, TXT, CSV, ASC, PTS.
+    Text,
+    /// ASPRS LAS and LAZ (feature `las`).
+    Las,
+    /// ASTM E57 (feature `e57`).
+    E57,
+}
+
+impl Format {
+    /// The format that a file's extension stands for; `.gz` at its end is passed over.
+    ///
+    /// ```
+    /// use tldi_sources::Format;
+    /// assert_eq!(Format::from_extension("scan.PLY.gz"), Some(Format::Ply));
+    /// assert_eq!(Format::from_extension("scan.csv"), Some(Format::Text));
+    /// assert_eq!(Format::from_extension("scan"), None);
+    /// ```
+    pub fn from_extension(path: impl AsRef<Path>) -> Option<Self> {
+        let path = path.as_ref();
+        let mut extension = path.extension()?.to_ascii_lowercase();
+        if extension == "gz" {
+            extension = Path::new(path.file_stem()?)
+                .extension()?
+                .to_ascii_lowercase();
+        }
+        match extension.to_str()? {
+            "ply" => Some(Self::Ply),
+            "pcd" => Some(Self::Pcd),
+            "xyz" | "txt" | "csv" | "asc" | "pts" | "xyzrgb" | "xyzn" => Some(Self::Text),
+            "las" | "laz" => Some(Self::Las),
+            "e57" => Some(Self::E57),
+            _ => None,
+        }
+    }
+
+    /// The format that the first bytes of an uncompressed file give away. Columns of text have no
+    /// mark of their own.
+    ///
+    /// ```
+    /// use tldi_sources::Format;
+    /// assert_eq!(Format::from_magic(b"ply\nformat ascii 1.0\n"), Some(Format::Ply));
+    /// assert_eq!(Format::from_magic(b"1.0 2.0 3.0\n"), None);
+    /// ```
+    pub fn from_magic(start: &[u8]) -> Option<Self> {
+        if start.starts_with(b"ply\n") || start.starts_with(b"ply\r") {
+            return Some(Self::Ply);
+        }
+        if start.starts_with(b"LASF") {
+            return Some(Self::Las);
+        }
+        if start.starts_with(b"ASTM-E57") {
+            return Some(Self::E57);
+        }
+        let first_entry = start
+            .split(|b| *b == b'\n')
+            .map(<[u8]>::trim_ascii)
+            .find(|line| !line.is_empty() && !line.starts_with(b"#"))?;
+        let is_pcd = [&b"VERSION "[..], b"FIELDS ", b"COLUMNS "]
+            .iter()
+            .any(|key| first_entry.starts_with(key));
+        is_pcd.then_some(Self::Pcd)
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Ply => "PLY",
+            Self::Pcd => "PCD",
+            Self::Text => "XYZ/CSV",
+            Self::Las => "LAS/LAZ",
+            Self::E57 => "E57",
+        })
+    }
+}
+
+/// How to read.
+///
+/// ```
+/// use tldi_sources::ReadOptions;
+/// let options = ReadOptions { max_points: 5_000_000, ..Default::default() };
+/// assert_eq!(options.origin, None);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadOptions {
+    /// More points than this are an error, found before memory is taken for them. 100 million.
+    pub max_points: u64,
+    /// What is subtracted from every coordinate before it is narrowed to `f32`, in units of the
+    /// file. `None`: chosen per file as [`RawCloud::origin`](crate::RawCloud::origin) tells. Give
+    /// the same for several files whose clouds belong together.
+    pub origin: Option<DVec3>,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            max_points: 100_000_000,
+            origin: None,
+        }
+    }
+}
+
+/// How far reading has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Bytes read from the source, before decompression. Of LAS and E57 files, which are not read
+    /// in order, the part of all that corresponds to the points read.
+    pub bytes_read: u64,
+    /// Bytes in the source, before decompression, where known.
+    pub total_bytes: Option<u64>,
+    /// Points read.
+    pub points_read: u64,
+}

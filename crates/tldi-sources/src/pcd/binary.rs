@@ -1,0 +1,95 @@
+//! Binary data, point by point, or compressed and field by field. Little endian, as the machines
+//! that write it are.
+
+use super::header::Header;
+use super::{lzf, set};
+use crate::collector::{Collector, Sample};
+use crate::error::Result;
+use crate::input::Input;
+use crate::scalar::{Endian, Scalar};
+use crate::slot::{Column, Columns};
+use crate::{SourceError, SourceErrorKind};
+
+/// Sets the column from its bytes.
+#[inline]
+fn decode(sample: &mut Sample, column: &Column, bytes: &[u8]) {
+    let value = column.scalar.decode(bytes, Endian::Little);
+    let bits = if column.scalar.size() == 4 {
+        // Exact: 32 bits fit into f64.
+        Scalar::U32.decode(bytes, Endian::Little) as u32
+    } else {
+        0
+    };
+    set(sample, column, value, bits);
+}
+
+pub(super) fn read(
+    input: &mut Input<'_>,
+    header: &Header,
+    columns: &Columns,
+    collector: &mut Collector,
+) -> Result<()> {
+    let size = header.record_size();
+    let mut left = header.points;
+    while left > 0 {
+        let position = input.byte_position();
+        let records = input.records(size, left, "the points")?;
+        left -= (records.len() / size) as u64;
+        for record in records.chunks_exact(size) {
+            let mut sample = Sample::EMPTY;
+            for column in &columns.0 {
+                decode(&mut sample, column, &record[column.place..]);
+            }
+            collector
+                .push(&sample)
+                .map_err(|kind| SourceError::new(kind, position))?;
+        }
+        input.points_read = collector.count();
+    }
+    Ok(())
+}
+
+/// One block of LZF: two sizes, then data that unpacks to all of the first field, all of the
+/// second, and so on.
+pub(super) fn read_compressed(
+    input: &mut Input<'_>,
+    header: &Header,
+    columns: &Columns,
+    collector: &mut Collector,
+) -> Result<()> {
+    let position = input.byte_position();
+    let sizes = input.bytes(8, "the sizes of the compressed points")?;
+    let size = |bytes| Scalar::U32.decode(bytes, Endian::Little) as u64;
+    let (packed, unpacked) = (size(&sizes[..4]), size(&sizes[4..]));
+    // Fits: points are limited, and a record has at most 128 KiB.
+    let expected = header.points.saturating_mul(header.record_size() as u64);
+    if unpacked != expected {
+        let reason = format!("it unpacks to {unpacked} bytes, but the points need {expected}");
+        return Err(SourceError::new(
+            SourceErrorKind::Compression { reason },
+            position,
+        ));
+    }
+    let packed = input.gather(packed, "the compressed points")?;
+    let unpacked = lzf::unpack(&packed, unpacked).map_err(|reason| {
+        let reason = format!("LZF: {reason}");
+        SourceError::new(SourceErrorKind::Compression { reason }, position)
+    })?;
+    drop(packed);
+
+    // Each field takes what its size is per point: offsets within a record scale with the number
+    // of points.
+    let points = unpacked.len() / header.record_size().max(1);
+    for index in 0..points {
+        let mut sample = Sample::EMPTY;
+        for column in &columns.0 {
+            let start = column.place * points + index * column.scalar.size();
+            decode(&mut sample, column, &unpacked[start..]);
+        }
+        collector
+            .push(&sample)
+            .map_err(|kind| SourceError::new(kind, position))?;
+    }
+    input.points_read = collector.count();
+    Ok(())
+}

@@ -1,0 +1,56 @@
+//! PCD: point cloud data of the Point Cloud Library (format version 0.7).
+//!
+//! The parser is our own because the crate at hand, pcd-rs 0.13, allocates whatever the two sizes
+//! before `binary_compressed` data say, panics if they do not fit the number of points, and reads
+//! lines of any length into memory.
+
+mod ascii;
+mod binary;
+mod header;
+mod lzf;
+
+use crate::collector::{Collector, Layout, Sample, check_count};
+use crate::error::Result;
+use crate::input::Input;
+use crate::slot::{Column, Slot};
+use crate::{Format, RawCloud, ReadOptions, SourceErrorKind};
+use header::{Encoding, Header};
+
+pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawCloud> {
+    let header = Header::read(input)?;
+    let columns = header.columns();
+    if !columns.has_position() {
+        let kind = bad_header("it lacks one of the fields x, y, z".to_owned());
+        return Err(input.error_at_line(kind));
+    }
+    check_count(header.points, options).map_err(|kind| input.error_at_line(kind))?;
+    let mut collector = Collector::new(Layout::of(&columns), header.points, options);
+    match header.encoding {
+        Encoding::Ascii => ascii::read(input, &header, &columns, &mut collector)?,
+        Encoding::Binary => binary::read(input, &header, &columns, &mut collector)?,
+        Encoding::BinaryCompressed => {
+            binary::read_compressed(input, &header, &columns, &mut collector)?;
+        }
+    }
+    let mut cloud = collector.finish()?;
+    cloud.viewpoint = header
+        .viewpoint
+        .map(|viewpoint| (viewpoint - cloud.origin).as_vec3());
+    Ok(cloud)
+}
+
+fn bad_header(reason: String) -> SourceErrorKind {
+    SourceErrorKind::Header {
+        format: Format::Pcd,
+        reason,
+    }
+}
+
+/// Sets the value of one column; `bits` are the first four bytes of the value.
+#[inline]
+fn set(sample: &mut Sample, column: &Column, value: f64, bits: u32) {
+    match column.slot {
+        Slot::PackedRgb | Slot::PackedRgba => sample.set_packed(column.slot, bits),
+        slot => sample.set(slot, value),
+    }
+}

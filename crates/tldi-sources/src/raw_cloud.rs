@@ -1,0 +1,136 @@
+//! What a file holds, before it becomes a cloud.
+
+use std::fmt;
+use tldi::glamx::{DVec3, Vec3};
+use tldi::{CloudBuilder, PointCloud};
+
+/// Points of a file with the attributes it gives them, in its own order and units.
+///
+/// Nothing is filtered: points may be NaN or infinite, normals zero, faces degenerate; the builder
+/// of [`PointCloud`] deals with that. Attributes, where there, have one entry for each point.
+#[derive(Clone, Default, PartialEq)]
+pub struct RawCloud {
+    /// Positions relative to [`origin`](Self::origin), in units of the file.
+    pub points: Vec<Vec3>,
+    /// Normals as the file gives them: not checked for length, orientation or finiteness. `None`
+    /// if the file has none; [`vertex_normals`](Self::vertex_normals) are never put here.
+    pub normals: Option<Vec<Vec3>>,
+    /// Red, green, blue, alpha; opaque where the file has no alpha.
+    ///
+    /// Colours of more than 8 bits are reduced to 8: integers from 0 to 65535, or from 0 to 255 if
+    /// none in the file is above 255; reals likewise, or from 0 to 1 if none is above 1.
+    pub colors: Option<Vec<[u8; 4]>>,
+    /// Radius of the ball around each point, in units of the file.
+    pub radii: Option<Vec<f32>>,
+    /// Triangles: indices of points, all in range. Polygons are cut into fans.
+    pub faces: Vec<[u32; 3]>,
+    /// What was subtracted from the file's coordinates, in `f64`, before they were narrowed to
+    /// `f32`: position in the file = `origin` + point.
+    ///
+    /// Unless [`ReadOptions::origin`](crate::ReadOptions::origin) fixes it, it is zero on each axis
+    /// but where the file's type of number is wider than `f32` (always so in text and LAS) and the
+    /// median of its first 1,024 coordinates is farther than 4,096 units from zero: there, `f32`
+    /// steps would reach half a millimetre in metres. It is then that median, rounded to a whole
+    /// number. Put it into the pose of the body.
+    pub origin: DVec3,
+    /// Where the sensor was, relative to `origin`, if the file tells it for all points together.
+    pub viewpoint: Option<Vec3>,
+}
+
+impl RawCloud {
+    /// Normals of the vertices from the faces around them, weighted by area: unit length, on the
+    /// side from which the corners run anticlockwise, which is outside for meshes in the usual
+    /// winding. `None` if there are no faces; zero for points that belong to no face, or whose
+    /// faces cancel out.
+    ///
+    /// Linear in points and faces.
+    ///
+    /// ```
+    /// use tldi_sources::RawCloud;
+    /// use tldi::glamx::Vec3;
+    /// let triangle = RawCloud {
+    ///     points: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE],
+    ///     faces: vec![[0, 1, 2]],
+    ///     ..Default::default()
+    /// };
+    /// let normals = triangle.vertex_normals().unwrap();
+    /// assert_eq!(normals, [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::ZERO]);
+    /// ```
+    pub fn vertex_normals(&self) -> Option<Vec<Vec3>> {
+        if self.faces.is_empty() {
+            return None;
+        }
+        // In f64: the areas of fine meshes, squares of small edges, stay far from underflow.
+        let mut sums = vec![DVec3::ZERO; self.points.len()];
+        for face in &self.faces {
+            let corners = face.map(|i| self.points.get(i as usize).map(|p| p.as_dvec3()));
+            let [Some(a), Some(b), Some(c)] = corners else {
+                continue;
+            };
+            // Twice the area, along the normal.
+            let weighted = (b - a).cross(c - a);
+            if weighted.is_finite() {
+                for &i in face {
+                    sums[i as usize] += weighted;
+                }
+            }
+        }
+        let unit = |sum: &DVec3| sum.normalize_or_zero().as_vec3();
+        Some(sums.iter().map(unit).collect())
+    }
+
+    /// Hands points, colours, radii, normals and viewpoint to the builder of a cloud.
+    ///
+    /// The normals are those of the file or else, if there are faces, the
+    /// [`vertex_normals`](Self::vertex_normals); none are given if not one is usable. Radii are
+    /// given only if all are finite and greater than zero; what the caller sets on the builder
+    /// replaces them.
+    ///
+    /// ```
+    /// use tldi_sources::RawCloud;
+    /// use tldi::glamx::Vec3;
+    /// let raw = RawCloud { points: vec![Vec3::ZERO, Vec3::X], ..Default::default() };
+    /// let cloud = raw.into_builder().radius(0.5).build()?;
+    /// assert_eq!(cloud.len(), 2);
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    pub fn into_builder(mut self) -> CloudBuilder<'static> {
+        let usable = |normals: &Vec<Vec3>| {
+            normals
+                .iter()
+                .any(|n| n.is_finite() && n.length_squared() > 0.0)
+        };
+        let from_file = self.normals.take().filter(usable);
+        let normals = from_file.or_else(|| self.vertex_normals().filter(usable));
+        let mut builder = PointCloud::builder(self.points);
+        if let Some(normals) = normals {
+            builder = builder.normals(normals);
+        }
+        if let Some(colors) = self.colors {
+            builder = builder.colors(colors);
+        }
+        if let Some(radii) = self.radii
+            && radii.iter().all(|r| r.is_finite() && *r > 0.0)
+        {
+            builder = builder.radii(radii);
+        }
+        if let Some(viewpoint) = self.viewpoint {
+            builder = builder.viewpoint(viewpoint);
+        }
+        builder
+    }
+}
+
+impl fmt::Debug for RawCloud {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("RawCloud")
+            .field("points", &self.points.len())
+            .field("normals", &self.normals.is_some())
+            .field("colors", &self.colors.is_some())
+            .field("radii", &self.radii.is_some())
+            .field("faces", &self.faces.len())
+            .field("origin", &self.origin)
+            .field("viewpoint", &self.viewpoint)
+            .finish()
+    }
+}

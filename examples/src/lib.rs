@@ -1,0 +1,13 @@
+//! What the runnable stories share: command-line options, generated scenes, loading, finding up,
+//! spots to drop bodies on, the simulation, pictures and reports.
+
+pub mod cli;
+pub mod load;
+pub mod render;
+pub mod report;
+pub mod scene;
+pub mod simulation;
+pub mod spots;
+pub mod surface_sampling;
+pub mod up;
+pub mod viewpoint;

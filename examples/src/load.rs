@@ -1,0 +1,124 @@
+//! Turns raw points into the clouds of a scan and of a body.
+
+use crate::surface_sampling::SampledSurface;
+use anyhow::Context;
+use std::path::Path;
+use tldi::glamx::Vec3;
+use tldi::{CloudBuilder, CloudError, PointCloud};
+
+/// Neighbours for the normals of a scan: enough to average the noise of a depth camera.
+const SCAN_NORMAL_NEIGHBORS: usize = 24;
+/// Neighbours for the normals of a body that brings none.
+const BODY_NORMAL_NEIGHBORS: usize = 16;
+/// Extents in metres that a body from a file is believed to have in earnest.
+const PLAUSIBLE_BODY_SIZES: std::ops::RangeInclusive<f32> = 0.02..=1.0;
+/// Least extent of a body in mean radii of the scan: a smaller one would lie in the noise.
+const LEAST_BODY_RADII: f32 = 10.0;
+
+/// Loads a scan: radii from neighbours, normals by principal component analysis, colours kept.
+///
+/// # Errors
+/// Those of reading the file and of building the cloud, with the path.
+pub fn scan_from_file(path: &Path) -> anyhow::Result<PointCloud<'static>> {
+    let raw = tldi_sources::read(path, &tldi_sources::ReadOptions::default())
+        .with_context(|| format!("cannot read the scan {}", path.display()))?;
+    finish_scan(raw.into_builder())
+        .with_context(|| format!("cannot use the scan {}", path.display()))
+}
+
+/// The cloud of a generated scene, made like that of a file: its exact normals are not used.
+///
+/// # Errors
+/// Those of building the cloud.
+pub fn scan_from_surface(surface: SampledSurface) -> Result<PointCloud<'static>, CloudError> {
+    finish_scan(PointCloud::builder(surface.points).colors(surface.colors))
+}
+
+fn finish_scan(builder: CloudBuilder<'_>) -> Result<PointCloud<'static>, CloudError> {
+    let cloud = builder
+        .knn_radii(7, 0.65)
+        .pca_normals(SCAN_NORMAL_NEIGHBORS)
+        .spatial_order()
+        .build()?;
+    Ok(cloud.into_owned())
+}
+
+/// Loads a body: as in the file, or with its largest extent scaled to `size` metres.
+///
+/// # Errors
+/// Those of reading the file and of building the cloud, with the path.
+pub fn body_from_file(path: &Path) -> anyhow::Result<PointCloud<'static>> {
+    let raw = tldi_sources::read(path, &tldi_sources::ReadOptions::default())
+        .with_context(|| format!("cannot read the body {}", path.display()))?;
+    let cloud = raw
+        .into_builder()
+        .knn_radii(7, 0.65)
+        .pca_normals(BODY_NORMAL_NEIGHBORS)
+        .build()
+        .with_context(|| format!("cannot use the body {}", path.display()))?;
+    Ok(cloud.into_owned())
+}
+
+/// The cloud of a generated body.
+///
+/// # Errors
+/// Those of building the cloud.
+pub fn body_from_surface(surface: SampledSurface) -> Result<PointCloud<'static>, CloudError> {
+    PointCloud::builder(surface.points)
+        .normals(surface.normals)
+        .knn_radii(7, 0.65)
+        .build()
+}
+
+/// The size in metres of a body whose file gives it `file_size`, in a scan with points of
+/// `scan_radius`: the file's own where that is plausible and not lost in the scan, else 0.2 m or
+/// 15 radii.
+///
+/// ```
+/// use tldi_examples::load::default_size;
+/// assert_eq!(default_size(0.156, 0.008), 0.156); // a model in metres
+/// assert_eq!(default_size(150.9, 0.008), 0.2); // a model in units of its own
+/// assert_eq!(default_size(0.156, 0.07), 1.05); // too small for a coarse outdoor scan
+/// ```
+pub fn default_size(file_size: f32, scan_radius: f32) -> f32 {
+    if PLAUSIBLE_BODY_SIZES.contains(&file_size) && file_size >= LEAST_BODY_RADII * scan_radius {
+        file_size
+    } else {
+        f32::max(0.2, 1.5 * LEAST_BODY_RADII * scan_radius)
+    }
+}
+
+/// The cloud moved so that its bounds are centred on its origin, and scaled so that its largest
+/// extent is `size` metres.
+///
+/// # Errors
+/// [`CloudError`] if the cloud cannot have that size.
+pub fn resized(cloud: &PointCloud<'_>, size: f32) -> Result<PointCloud<'static>, CloudError> {
+    let center = cloud.bounds().center();
+    let scale = size / cloud.bounds().extents().max_element();
+    derived(cloud, 1, |p| scale * (p - center), |radius| scale * radius)
+}
+
+/// Every `step`-th point of a cloud with its normal and colour, at another place and with another
+/// radius. Normals stay: `place` must not turn the cloud.
+///
+/// # Errors
+/// [`CloudError`] if places or radii are refused.
+pub fn derived(
+    cloud: &PointCloud<'_>,
+    step: usize,
+    place: impl Fn(Vec3) -> Vec3,
+    radius: impl Fn(f32) -> f32,
+) -> Result<PointCloud<'static>, CloudError> {
+    let kept = || (0..cloud.len()).step_by(step);
+    let points: Vec<Vec3> = kept().map(|i| place(cloud.point(i))).collect();
+    let radii: Vec<f32> = kept().map(|i| radius(cloud.radius(i))).collect();
+    let mut builder = PointCloud::builder(points).radii(radii);
+    if let Some(normals) = cloud.normals() {
+        builder = builder.normals(kept().map(|i| normals[i]).collect::<Vec<_>>());
+    }
+    if let Some(colors) = cloud.colors() {
+        builder = builder.colors(kept().map(|i| colors[i]).collect::<Vec<_>>());
+    }
+    builder.build()
+}

@@ -1,0 +1,343 @@
+//! Finds places in a scan where a body can be dropped and come to rest.
+//!
+//! The scan is looked at from above with an orthographic camera; the first layers of its image
+//! are what a falling body meets. A spot is good where a disc as wide as the body is without
+//! holes and level.
+
+use fastrand::Rng;
+use thiserror::Error;
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{Params, PointCloud, Tldi, VirtualCamera};
+
+/// A place to drop a body on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// Highest surface point under the body's footprint, moved to the middle of it; in the frame
+    /// of the scan, metres.
+    pub surface: Vec3,
+    /// How many bodies were given this place before: a stack.
+    pub level: usize,
+}
+
+/// What the bodies need.
+#[derive(Clone, Copy, Debug)]
+pub struct Demand {
+    /// How many bodies are to be dropped.
+    pub count: usize,
+    /// Radius in metres of a ball around a body.
+    pub body_radius: f32,
+    /// Seed of the choice.
+    pub seed: u64,
+}
+
+/// There is nowhere to drop a body.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[error(
+    "the scan has no level surface without holes that is {diameter:.3} m wide: give a smaller --size, or --up if the direction is wrong"
+)]
+pub struct NoSpot {
+    /// Diameter in metres of what was looked for.
+    pub diameter: f32,
+}
+
+/// Height differences within a footprint, in body radii, from ideal to barely acceptable.
+const LEVEL_TOLERANCES: [f32; 4] = [0.15, 0.3, 0.6, 1.0];
+/// Share of a footprint's pixels that must be seen and within the tolerance.
+const SEEN_SHARE: f32 = 0.97;
+/// Least distance of two spots, in body radii: bodies that tip over do not reach each other.
+const LEAST_DISTANCE: f32 = 3.0;
+/// Random groups of spots that are compared.
+const GROUPS: usize = 64;
+
+/// Chooses places for bodies on the surfaces of `scan` that face `up` (unit length): close enough
+/// together for one picture, on as many levels as there are, and never two bodies on one place
+/// unless there is no other.
+///
+/// # Errors
+/// [`NoSpot`] if not even one place is level and without holes.
+pub fn find_spots(scan: &PointCloud<'_>, up: Vec3, demand: &Demand) -> Result<Vec<Spot>, NoSpot> {
+    let map = HeightMap::of(scan, up, demand.body_radius);
+    let candidates = map.level_places(demand.body_radius);
+    if candidates.is_empty() {
+        return Err(NoSpot {
+            diameter: 2.0 * demand.body_radius,
+        });
+    }
+    let places = best_group(&candidates, up, demand);
+    Ok((0..demand.count)
+        .map(|k| Spot {
+            surface: places[k % places.len()],
+            level: k / places.len(),
+        })
+        .collect())
+}
+
+/// Heights of the topmost surfaces over a grid of pixels.
+struct HeightMap {
+    image: Tldi,
+    /// Edge of a pixel in metres.
+    pixel_size: f32,
+    /// Depth below the camera of each pixel's topmost layer, row by row; NaN: nothing there.
+    depth: Vec<f32>,
+}
+
+impl HeightMap {
+    fn of(scan: &PointCloud<'_>, up: Vec3, body_radius: f32) -> Self {
+        let pixel_size = f32::max(2.0 * scan.mean_radius(), body_radius / 6.0);
+        let camera = VirtualCamera::along(-up, pixel_size);
+        let params = Params::for_radius(scan.mean_radius()).with_pixel_size(pixel_size);
+        let image = tldi::build(scan, &Pose3::IDENTITY, &camera, &params);
+        let [width, height] = image.size;
+        let mut map = Self {
+            depth: Vec::new(),
+            image,
+            pixel_size,
+        };
+        let roof = map.roof_depth();
+        map.depth = (0..height)
+            .flat_map(|j| (0..width).map(move |i| (i, j)))
+            .map(|(i, j)| {
+                let mut layers = map.image.layers_at(i, j).iter().map(|layer| layer.depth);
+                layers.find(|depth| *depth > roof).unwrap_or(f32::NAN)
+            })
+            .collect();
+        map
+    }
+
+    /// Depth down to which there is a roof or a ceiling over most of the scan, with surfaces
+    /// under it: nothing is dropped on top of that. `-∞` without one.
+    fn roof_depth(&self) -> f32 {
+        let [width, height] = self.image.size;
+        let pixels = || (0..height).flat_map(|j| (0..width).map(move |i| (i, j)));
+        let columns: Vec<&[tldi::Layer]> = pixels()
+            .map(|(i, j)| self.image.layers_at(i, j))
+            .filter(|layers| !layers.is_empty())
+            .collect();
+        let depths = || {
+            columns
+                .iter()
+                .flat_map(|layers| layers.iter().map(|layer| layer.depth))
+        };
+        let (top, bottom) = depths().fold((f32::MAX, f32::MIN), |(a, b), d| (a.min(d), b.max(d)));
+        let under_roof = top + 0.15 * (bottom - top);
+        let roofed = columns
+            .iter()
+            .filter(|layers| {
+                layers[0].depth < under_roof && layers[layers.len() - 1].depth > under_roof
+            })
+            .count();
+        if 2 * roofed > columns.len() {
+            under_roof
+        } else {
+            f32::NEG_INFINITY
+        }
+    }
+
+    /// Middles of discs of `radius` metres that are seen without holes and level, with the best
+    /// tolerance for which there are any; each is as high as the disc's highest point.
+    fn level_places(&self, radius: f32) -> Vec<Vec3> {
+        let reach = (radius / self.pixel_size).ceil() as i32;
+        let disc: Vec<[i32; 2]> = (-reach..=reach)
+            .flat_map(|y| (-reach..=reach).map(move |x| [x, y]))
+            .filter(|[x, y]| x * x + y * y <= reach * reach)
+            .collect();
+        let [width, height] = self.image.size.map(|n| n as i32);
+        let inner = |n: i32| (reach..n - reach).step_by((reach / 3).max(1) as usize);
+        for tolerance in LEVEL_TOLERANCES.map(|share| share * radius) {
+            let places: Vec<Vec3> = inner(height)
+                .flat_map(|j| inner(width).map(move |i| [i, j]))
+                .filter_map(|middle| self.level_place(middle, &disc, tolerance))
+                .collect();
+            if !places.is_empty() {
+                return places;
+            }
+        }
+        Vec::new()
+    }
+
+    /// The highest point of a disc around pixel `[i, j]`, moved to its middle, if the disc is
+    /// level. Nothing may stand out above the tolerance; a few holes may be there.
+    fn level_place(&self, [i, j]: [i32; 2], disc: &[[i32; 2]], tolerance: f32) -> Option<Vec3> {
+        let width = self.image.size[0] as i32;
+        let depth_at = |[x, y]: [i32; 2]| self.depth[((j + y) * width + i + x) as usize];
+        let middle = depth_at([0, 0]);
+        let (mut seen, mut top) = (0usize, middle);
+        for depth in disc.iter().map(|offset| depth_at(*offset)) {
+            if depth < middle - tolerance {
+                return None;
+            }
+            seen += usize::from(depth <= middle + tolerance);
+            top = top.min(depth);
+        }
+        if middle.is_nan() || (seen as f32) < SEEN_SHARE * disc.len() as f32 {
+            return None;
+        }
+        let pixel = [i, j].map(|k| k as f32 + 0.5);
+        let [u, v] = [0, 1].map(|k| self.image.origin[k] as f32 + pixel[k]);
+        Some(self.image.camera.point_at(u, v, top))
+    }
+}
+
+/// Up to `count` places that lie together, well apart and on many levels.
+fn best_group(candidates: &[Vec3], up: Vec3, demand: &Demand) -> Vec<Vec3> {
+    let mut rng = Rng::with_seed(demand.seed);
+    let mut best: (f32, Vec<Vec3>) = (f32::MIN, Vec::new());
+    let mut reach = 4.0 * demand.body_radius * (demand.count as f32).sqrt();
+    // Twice as far in each round, up to where every candidate is within reach.
+    for _ in 0..8 {
+        for _ in 0..GROUPS {
+            let group = random_group(candidates, up, reach, demand, &mut rng);
+            let score = group_score(&group, up, demand.body_radius);
+            if score > best.0 {
+                best = (score, group);
+            }
+        }
+        if best.1.len() >= demand.count {
+            break;
+        }
+        reach *= 2.0;
+    }
+    best.1
+}
+
+/// Places within `reach` metres of a random one, picked at random, those on new levels first.
+fn random_group(
+    candidates: &[Vec3],
+    up: Vec3,
+    reach: f32,
+    demand: &Demand,
+    rng: &mut Rng,
+) -> Vec<Vec3> {
+    let first = candidates[rng.usize(..candidates.len())];
+    let mut near: Vec<Vec3> = candidates
+        .iter()
+        .copied()
+        .filter(|place| place.distance(first) <= reach)
+        .collect();
+    rng.shuffle(&mut near);
+    let mut group = vec![first];
+    for on_new_level in [true, false] {
+        for place in &near {
+            if group.len() >= demand.count {
+                return group;
+            }
+            let apart = group.iter().all(|other| {
+                (*place - *other).reject_from(up).length() >= LEAST_DISTANCE * demand.body_radius
+            });
+            let new_level =
+                || (group.iter()).all(|other| (*place - *other).dot(up).abs() > demand.body_radius);
+            if apart && (!on_new_level || new_level()) {
+                group.push(*place);
+            }
+        }
+    }
+    group
+}
+
+/// How good a group is: full ones first, then those on many levels.
+fn group_score(group: &[Vec3], up: Vec3, body_radius: f32) -> f32 {
+    let mut heights: Vec<f32> = group.iter().map(|place| place.dot(up)).collect();
+    heights.sort_unstable_by(f32::total_cmp);
+    let steps = heights
+        .windows(2)
+        .filter(|pair| pair[1] - pair[0] > body_radius)
+        .count();
+    group.len() as f32 + 0.3 * steps.min(3) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tldi::glamx::Quat;
+
+    /// A square of 3 × 3 m with a hole of 1 m radius in its middle, z up, and a table over part
+    /// of it.
+    fn holed_floor() -> Vec<Vec3> {
+        let mut points = Vec::new();
+        for i in 0..150 {
+            for j in 0..150 {
+                let p = Vec3::new(i as f32 * 0.02 - 1.5, j as f32 * 0.02 - 1.5, 0.0);
+                if p.length() > 1.0 {
+                    points.push(p);
+                }
+            }
+        }
+        points
+    }
+
+    #[test]
+    fn spots_avoid_holes_and_rims_in_any_frame() {
+        let demand = |seed| Demand {
+            count: 4,
+            body_radius: 0.15,
+            seed,
+        };
+        for (seed, rotation) in [
+            (1, Quat::IDENTITY),
+            (2, Quat::from_rotation_x(2.0)),
+            (3, Quat::from_rotation_y(-0.7)),
+        ] {
+            let points: Vec<Vec3> = holed_floor().iter().map(|p| rotation * *p).collect();
+            let scan = PointCloud::builder(points).radius(0.015).build().unwrap();
+            let spots = find_spots(&scan, rotation * Vec3::Z, &demand(seed)).unwrap();
+            assert_eq!(spots.len(), 4);
+            for spot in &spots {
+                let p = rotation.inverse() * spot.surface;
+                // One pixel is 3 cm: the disc may reach that far over a rim, and 3 % of it again.
+                assert!(p.truncate().length() > 1.0 + 0.15 - 0.05, "{p}");
+                assert!(p.truncate().abs().max_element() < 1.5 - 0.15 + 0.05, "{p}");
+                assert!(p.z.abs() < 0.01, "{p}");
+                assert_eq!(spot.level, 0);
+            }
+            for (k, a) in spots.iter().enumerate() {
+                for b in &spots[..k] {
+                    assert!(a.surface.distance(b.surface) >= 0.45 - 1e-4);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn more_bodies_than_places_are_stacked() {
+        let points: Vec<Vec3> = (0..400)
+            .map(|i| Vec3::new((i % 20) as f32 * 0.02, (i / 20) as f32 * 0.02, 1.0))
+            .collect();
+        let scan = PointCloud::builder(points).radius(0.015).build().unwrap();
+        let demand = Demand {
+            count: 3,
+            body_radius: 0.15,
+            seed: 1,
+        };
+        let levels: Vec<usize> = find_spots(&scan, Vec3::Z, &demand)
+            .unwrap()
+            .iter()
+            .map(|spot| spot.level)
+            .collect();
+        assert_eq!(levels, [0, 1, 2]);
+        let error = find_spots(
+            &scan,
+            Vec3::Z,
+            &Demand {
+                body_radius: 0.5,
+                ..demand
+            },
+        )
+        .unwrap_err();
+        assert_eq!(error, NoSpot { diameter: 1.0 });
+    }
+
+    #[test]
+    fn nothing_is_dropped_on_a_ceiling() {
+        let mut points = holed_floor();
+        points.extend(holed_floor().iter().map(|p| *p + 2.4 * Vec3::Z));
+        let scan = PointCloud::builder(points).radius(0.015).build().unwrap();
+        let demand = Demand {
+            count: 3,
+            body_radius: 0.15,
+            seed: 1,
+        };
+        for spot in find_spots(&scan, Vec3::Z, &demand).unwrap() {
+            assert!(spot.surface.z < 0.01, "{}", spot.surface);
+        }
+    }
+}

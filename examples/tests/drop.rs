@@ -1,0 +1,217 @@
+//! Runs the binary `drop` as a user would.
+
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// An empty folder of this test's own.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).unwrap();
+    }
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn write_ply(path: &Path, points: &[[f32; 3]]) {
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\n\
+         property float x\nproperty float y\nproperty float z\nend_header\n",
+        points.len()
+    );
+    for [x, y, z] in points {
+        text += &format!("{x} {y} {z}\n");
+    }
+    fs::write(path, text).unwrap();
+}
+
+/// A level floor of 1.6 × 1.6 m with a block on it, z up.
+fn floor_with_block() -> Vec<[f32; 3]> {
+    let mut points = Vec::new();
+    for i in 0..80 {
+        for j in 0..80 {
+            let on_block = i < 20 && j < 20;
+            points.push([
+                i as f32 * 0.02,
+                j as f32 * 0.02,
+                if on_block { 0.2 } else { 0.0 },
+            ]);
+        }
+    }
+    for i in 0..20 {
+        for k in 1..10 {
+            points.push([i as f32 * 0.02, 0.39, k as f32 * 0.02]);
+            points.push([0.39, i as f32 * 0.02, k as f32 * 0.02]);
+        }
+    }
+    points
+}
+
+/// The surface of a cube 20 cm wide.
+fn cube() -> Vec<[f32; 3]> {
+    let mut points = Vec::new();
+    for i in 0..=20 {
+        for j in 0..=20 {
+            for k in 0..=20 {
+                if [i, j, k].iter().any(|c| *c == 0 || *c == 20) {
+                    points.push([i, j, k].map(|c| c as f32 * 0.01));
+                }
+            }
+        }
+    }
+    points
+}
+
+fn drop_in(folder: &Path, options: &[&str]) -> Output {
+    write_ply(&folder.join("scan.ply"), &floor_with_block());
+    write_ply(&folder.join("body.ply"), &cube());
+    Command::new(env!("CARGO_BIN_EXE_drop"))
+        .current_dir(folder)
+        .args(["--scan", "scan.ply", "--body", "body.ply", "--count", "2"])
+        .args(options)
+        .output()
+        .unwrap()
+}
+
+fn json(path: PathBuf) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    let mut keys: Vec<&str> = value
+        .as_object()
+        .unwrap()
+        .keys()
+        .map(String::as_str)
+        .collect();
+    keys.sort_unstable();
+    keys
+}
+
+#[test]
+fn bodies_come_to_rest_and_equal_seeds_give_equal_reports() {
+    let folder = folder("rest");
+    let run = |json_file: &str, seed: &str| {
+        let options = ["--steps", "120", "--seed", seed, "--json", json_file];
+        let output = drop_in(&folder, &options);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{stderr}");
+        let mut report = json(folder.join(json_file));
+        assert!(report["wall_seconds"].as_f64().unwrap() > 0.0);
+        report["wall_seconds"] = Value::Null;
+        report["real_time_factor"] = Value::Null;
+        (report, String::from_utf8(output.stdout).unwrap())
+    };
+    let (report, table) = run("a.json", "7");
+    assert_eq!(run("b.json", "7").0, report);
+    assert_ne!(run("c.json", "8").0, report);
+
+    assert_eq!(
+        keys(&report),
+        [
+            "adapter",
+            "backend",
+            "bodies",
+            "contact_steps",
+            "dt",
+            "max_penetration",
+            "mean_radius",
+            "pairs_batched",
+            "pairs_missed",
+            "real_time_factor",
+            "scan_points",
+            "steps",
+            "up",
+            "wall_seconds"
+        ]
+    );
+    assert_eq!(report["backend"], "cpu");
+    assert_eq!(report["adapter"], Value::Null);
+    assert_eq!(report["steps"], 120);
+    assert_eq!(report["scan_points"], floor_with_block().len());
+    assert!(report["up"][2].as_f64().unwrap() > 0.999);
+    assert!(report["contact_steps"].as_u64().unwrap() > 60);
+    let bodies = report["bodies"].as_array().unwrap();
+    assert_eq!(bodies.len(), 2);
+    for body in bodies {
+        assert_eq!(
+            keys(body),
+            [
+                "inside_bounds",
+                "linear_speed",
+                "max_penetration",
+                "name",
+                "points",
+                "sleeping",
+                "slept_at_seconds",
+                "translation"
+            ]
+        );
+        assert_eq!(body["points"], cube().len());
+        assert_eq!(body["inside_bounds"], true);
+        let name = body["name"].as_str().unwrap();
+        assert!(name.starts_with("body ") && table.contains(name), "{table}");
+        // A cube 20 cm wide at rest on the floor or on the block: its middle is 10 cm above.
+        // Half a centimetre: half the radii of scan and body.
+        let height = body["translation"][2].as_f64().unwrap();
+        assert!(
+            (height - 0.1).abs() < 0.005 || (height - 0.3).abs() < 0.005,
+            "{body}"
+        );
+    }
+    for name in ["initial.png", "mid.png", "final.png"] {
+        let png = fs::read(folder.join("out/drop").join(name)).unwrap();
+        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+    }
+}
+
+#[test]
+fn a_body_that_falls_out_of_the_scan_is_a_failure() {
+    let folder = folder("lost");
+    // A floor 40° off level, where the default friction of 0.5 holds up to 27°: all slide off.
+    let options = [
+        "--up",
+        "0.643,0,0.766",
+        "--steps",
+        "150",
+        "--json",
+        "lost.json",
+    ];
+    let output = drop_in(&folder, &options);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert!(
+        stderr.contains("fell out of the scan: body 1, body 2"),
+        "{stderr}"
+    );
+    // The report is written all the same, and says so too.
+    assert_eq!(
+        json(folder.join("lost.json"))["bodies"][0]["inside_bounds"],
+        false
+    );
+}
+
+#[test]
+fn bad_options_say_what_is_wrong() {
+    let folder = folder("options");
+    for (options, code, message) in [
+        (&["--backend", "gpu"][..], 2, "not built"),
+        (&["--up", "0,0,0"], 2, "not an up direction"),
+        (&["--size", "-1"], 2, "greater than 0"),
+        (&["--size", "5"], 1, "no level surface"),
+        (&["--scan-file", "x"], 2, "unexpected argument"),
+    ] {
+        let output = drop_in(&folder, options);
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{options:?}: {stderr}");
+        assert!(stderr.contains(message), "{options:?}: {stderr}");
+    }
+    let output = Command::new(env!("CARGO_BIN_EXE_drop"))
+        .args(["--scan", "missing.ply"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("missing.ply"));
+}
