@@ -54,6 +54,10 @@ struct Args {
     common: Common,
 }
 
+/// Distance between the points of the generated room and standard deviation of their error, in
+/// metres: those of a good terrestrial scanner.
+const ROOM_SPACING: f32 = 0.015;
+const ROOM_NOISE: f32 = 0.001;
 /// Distance between the points of a generated body, as a share of its width.
 const BODY_SPACING: f32 = 0.025;
 /// The step in which `mid.png` is made: bodies have just landed.
@@ -116,10 +120,9 @@ fn load_scan(args: &Args) -> anyhow::Result<PointCloud<'static>> {
         }
         None => {
             eprintln!("generating a room");
-            // Spacing and noise in metres, as of a good terrestrial scanner.
             Ok(load::scan_from_surface(furnished_room(
-                0.012,
-                0.001,
+                ROOM_SPACING,
+                ROOM_NOISE,
                 args.common.seed,
             ))?)
         }

@@ -6,6 +6,7 @@ pub mod load;
 pub mod render;
 pub mod report;
 pub mod scene;
+mod shading;
 pub mod simulation;
 pub mod spots;
 pub mod surface_sampling;

@@ -4,6 +4,7 @@
 //! (Radwan, Ohrhallinger and Wimmer 2014, section 6): the same images that find collisions carry
 //! the colours. Shadows come from images seen from the sun.
 
+use crate::shading::Frame;
 use rayon::prelude::*;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Layer, Params, PointCloud, Tldi, VirtualCamera};
@@ -59,18 +60,12 @@ pub struct Scene<'a> {
 }
 
 /// The front layer of every pixel over all clouds.
-struct FrontLayers {
-    size: [u32; 2],
+pub(crate) struct FrontLayers {
+    pub(crate) size: [u32; 2],
     /// Index of the item and its layer, row by row.
-    pixels: Vec<Option<(u16, Layer)>>,
+    pub(crate) pixels: Vec<Option<(u16, Layer)>>,
 }
 
-/// Direction from the scene to the sun: this much of up, the rest towards the camera's left.
-const SUN_HEIGHT: f32 = 0.85;
-/// Distance at which a shadow has faded, in sizes of detail. Scans throw and stop no shadows: this
-/// keeps that of a body on a table from the floor below it.
-const SHADOW_REACH: f32 = 6.0;
-const BACKGROUND: [[f32; 3]; 2] = [[0.93, 0.94, 0.96], [0.80, 0.83, 0.87]];
 const CONTACT_COLOR: [u8; 3] = [255, 230, 40];
 const CONTACT_RIM: [u8; 3] = [40, 20, 20];
 
@@ -163,208 +158,6 @@ pub fn pixels_of(image: &Tldi, size: [u32; 2]) -> impl Iterator<Item = (usize, &
             })
         })
     })
-}
-
-/// What the pixels of a picture are computed from.
-struct Frame<'a> {
-    scene: &'a Scene<'a>,
-    camera: VirtualCamera,
-    front: &'a FrontLayers,
-    /// Directions in the view frame.
-    up: Vec3,
-    sun: Vec3,
-    /// Image of each body from the sun, with its index.
-    shadows: Vec<(u16, Tldi)>,
-    /// Lowest and highest point of the scan along up, outliers aside, in metres.
-    heights: [f32; 2],
-}
-
-impl<'a> Frame<'a> {
-    fn new(scene: &'a Scene<'a>, camera: &VirtualCamera, front: &'a FrontLayers) -> Self {
-        let view_from_scene = camera.view_from_frame.rotation;
-        let up = view_from_scene * scene.up;
-        // Left of the camera and a little behind it, as in a studio.
-        let aside = Vec3::new(-0.8, 0.0, -0.6)
-            .reject_from(up)
-            .normalize_or(Vec3::X);
-        let sun = SUN_HEIGHT * up + (1.0 - SUN_HEIGHT * SUN_HEIGHT).sqrt() * aside;
-        let sun_in_scene = view_from_scene.inverse() * sun;
-        let shadows = (0u16..)
-            .zip(&scene.items)
-            .filter(|(_, item)| matches!(item.paint, Paint::Body(_)))
-            .map(|(index, item)| {
-                let pixel_size = 1.5 * item.cloud.mean_radius();
-                (
-                    index,
-                    item.image(&VirtualCamera::along(-sun_in_scene, pixel_size)),
-                )
-            })
-            .collect();
-        let mut heights: Vec<f32> = scene
-            .items
-            .iter()
-            .filter(|item| item.paint == Paint::Scan)
-            .flat_map(|item| {
-                item.cloud
-                    .points()
-                    .step_by(16)
-                    .map(|p| (item.scene_from_cloud * p).dot(scene.up))
-            })
-            .collect();
-        heights.sort_unstable_by(f32::total_cmp);
-        let quantile = |q: f32| {
-            heights
-                .get((q * heights.len() as f32) as usize)
-                .copied()
-                .unwrap_or(0.0)
-        };
-        let heights = [quantile(0.01), quantile(0.99)];
-        Self {
-            scene,
-            camera: *camera,
-            front,
-            up,
-            sun,
-            shadows,
-            heights,
-        }
-    }
-
-    fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
-        let linear = match self.layer(x as i32, y as i32) {
-            None => {
-                let t = y as f32 / self.front.size[1] as f32;
-                mix(BACKGROUND[0], BACKGROUND[1], t)
-            }
-            Some((item, layer)) => self.shaded(x, y, item, &layer),
-        };
-        linear.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8)
-    }
-
-    fn layer(&self, x: i32, y: i32) -> Option<(u16, Layer)> {
-        let [width, height] = self.front.size.map(|n| n as i32);
-        let inside = (0..width).contains(&x) && (0..height).contains(&y);
-        inside
-            .then(|| self.front.pixels[(y * width + x) as usize])
-            .flatten()
-    }
-
-    fn shaded(&self, x: u32, y: u32, item: u16, layer: &Layer) -> [f32; 3] {
-        let view = self
-            .camera
-            .view_at(x as f32 + 0.5, y as f32 + 0.5, layer.depth);
-        let to_camera = -view.normalize_or(Vec3::Z);
-        let normal = layer.normal.normalize_or(to_camera);
-        let normal = if normal.dot(to_camera) < 0.0 {
-            -normal
-        } else {
-            normal
-        };
-        let scene_point = self.camera.view_from_frame.inverse_transform_point(view);
-        let albedo = self.albedo(item, layer, scene_point);
-        let sky = 0.5 + 0.5 * normal.dot(self.up);
-        let ambient = (0.30 + 0.22 * sky) * self.openness(x, y, view, normal);
-        let head = 0.16 * normal.dot(to_camera).max(0.0);
-        let sun = 0.50 * normal.dot(self.sun).max(0.0) * self.sunlight(item, scene_point);
-        albedo.map(|c| c * (ambient + head + sun))
-    }
-
-    fn albedo(&self, item: u16, layer: &Layer, scene_point: Vec3) -> [f32; 3] {
-        if layer.color[3] > 0 {
-            let [r, g, b, _] = layer.color;
-            return [r, g, b].map(|c| 1.15 * f32::from(c) / 255.0);
-        }
-        match self.scene.items[item as usize].paint {
-            Paint::Body(color) => color.map(|c| 1.15 * c),
-            Paint::Scan => {
-                let [low, high] = self.heights;
-                let height = scene_point.dot(self.scene.up);
-                height_color((height - low) / (high - low).max(1e-6))
-            }
-        }
-    }
-
-    /// Share of the hemisphere over a pixel that its surroundings leave open, 0 to 1: ambient
-    /// obscurance of neighbouring front layers (McGuire et al. 2011, "The Alchemy Screen-Space
-    /// Ambient Obscurance Algorithm").
-    fn openness(&self, x: u32, y: u32, view: Vec3, normal: Vec3) -> f32 {
-        const SAMPLES: u32 = 20;
-        let reach = 0.5 * self.scene.detail;
-        let reach_px = (reach / self.camera.pixel_size_at(view.z)).min(80.0);
-        // Turns the spiral of samples differently in each pixel of a block of 4 × 4.
-        let turn = ((x % 4) * 4 + y % 4) as f32 * 0.4;
-        let mut obscured = 0.0;
-        for k in 0..SAMPLES {
-            let t = (k as f32 + 0.5) / SAMPLES as f32;
-            let (sin, cos) = (turn + 2.4 * k as f32).sin_cos();
-            let at =
-                |start: u32, offset: f32| start as i32 + (offset * t * reach_px).round() as i32;
-            let (sx, sy) = (at(x, cos), at(y, sin));
-            let Some((_, layer)) = self.layer(sx, sy) else {
-                continue;
-            };
-            let other = self
-                .camera
-                .view_at(sx as f32 + 0.5, sy as f32 + 0.5, layer.depth);
-            let to_other = other - view;
-            let distance = to_other.length();
-            if distance < reach && distance > 0.0 {
-                let rise = normal.dot(to_other) / distance - 0.15;
-                obscured += rise.max(0.0) * (1.0 - distance / reach);
-            }
-        }
-        (1.0 - 3.0 * obscured / SAMPLES as f32).clamp(0.2, 1.0)
-    }
-
-    /// Share of the sun that bodies leave to a point, 0 to 1, with soft rims.
-    fn sunlight(&self, item: u16, scene_point: Vec3) -> f32 {
-        let mut light: f32 = 1.0;
-        for (body, image) in &self.shadows {
-            if *body == item {
-                continue;
-            }
-            let seen = image.camera.view_from_point(scene_point);
-            let [u, v] = image.camera.pixel_from_view(seen);
-            let reach = SHADOW_REACH * self.scene.detail;
-            let shade = |du: i16, dv: i16| {
-                let i = (u + f32::from(du)).floor() as i32 - image.origin[0];
-                let j = (v + f32::from(dv)).floor() as i32 - image.origin[1];
-                let inside = (0..image.size[0] as i32).contains(&i)
-                    && (0..image.size[1] as i32).contains(&j);
-                let layers = if inside {
-                    image.layers_at(i as u32, j as u32)
-                } else {
-                    &[]
-                };
-                let last = layers.iter().rfind(|layer| layer.depth < seen.z);
-                last.map_or(0.0, |layer| {
-                    (2.0 - 2.0 * (seen.z - layer.depth) / reach).clamp(0.0, 1.0)
-                })
-            };
-            let taps = (-2..=2).flat_map(|dv| (-2..=2).map(move |du| (du, dv)));
-            let shadow = taps.map(|(du, dv)| shade(du, dv)).sum::<f32>() / 25.0;
-            light = light.min(1.0 - shadow);
-        }
-        light
-    }
-}
-
-/// Colour of a scan without colours at a share of its height: dark and cool below, light and warm
-/// above, with a change of tone about every tenth.
-fn height_color(share: f32) -> [f32; 3] {
-    const STOPS: [[f32; 3]; 4] = [
-        [0.42, 0.47, 0.55],
-        [0.62, 0.64, 0.64],
-        [0.78, 0.74, 0.66],
-        [0.90, 0.88, 0.84],
-    ];
-    let at = share.clamp(0.0, 1.0) * 2.999;
-    let k = at as usize;
-    mix(STOPS[k], STOPS[k + 1], at - k as f32)
-}
-
-fn mix(a: [f32; 3], b: [f32; 3], t: f32) -> [f32; 3] {
-    [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * t)
 }
 
 impl Picture {

@@ -24,7 +24,7 @@ pub fn furnished_room(spacing: f32, noise: f32, seed: u64) -> SampledSurface {
         distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
     };
     let mut room = sample_surface(
-        |p| nearest(p).map_or(f32::MAX, |(_, distance)| distance),
+        |p| (solids.iter()).fold(f32::MAX, |least, (distance, _)| least.min(distance(p))),
         |p| {
             let [r, g, b] = nearest(p).map_or([0; 3], |(k, _)| solids[k].1(p));
             [r, g, b, 255]
@@ -48,18 +48,18 @@ fn room_solids() -> Vec<Solid> {
         (Box::new(|p| p.x), Box::new(|_| [214, 206, 190])),
         (Box::new(|p| p.y), Box::new(|_| [198, 204, 206])),
     ];
-    let mut block = |center: [f32; 3], half: [f32; 3], color: [u8; 3]| {
+    let mut block = |center: [f32; 3], half: [f32; 3], color: [u8; 3], grain: f32| {
         let (center, half) = (Vec3::from(center), Vec3::from(half));
         solids.push((
             Box::new(move |p| rounded_block(p - center, half, 0.01)),
-            Box::new(move |p| grained(p, color)),
+            Box::new(move |p| grained(p, color, grain)),
         ));
     };
     let wood = [164, 116, 72];
     // Table.
-    block([1.9, 1.5, 0.70], [0.75, 0.48, 0.025], wood);
+    block([1.9, 1.5, 0.70], [0.75, 0.48, 0.025], wood, WOOD_GRAIN);
     for (x, y) in [(1.22, 1.09), (2.58, 1.09), (1.22, 1.91), (2.58, 1.91)] {
-        block([x, y, 0.34], [0.03, 0.03, 0.34], [120, 84, 52]);
+        block([x, y, 0.34], [0.03, 0.03, 0.34], [120, 84, 52], WOOD_GRAIN);
     }
     // Steps along the wall y = 0.
     for (k, height) in [0.2, 0.4, 0.6].into_iter().enumerate() {
@@ -68,14 +68,15 @@ fn room_solids() -> Vec<Solid> {
             [3.45, y - 0.35, 0.5 * height],
             [0.42, 0.18, 0.5 * height],
             [146, 148, 152],
+            0.0,
         );
     }
     // Bookcase along the wall x = 0.
     for y in [0.5, 1.7] {
-        block([0.2, y, 0.5], [0.19, 0.02, 0.5], wood);
+        block([0.2, y, 0.5], [0.19, 0.02, 0.5], wood, WOOD_GRAIN);
     }
     for z in [0.1, 0.55, 1.0] {
-        block([0.2, 1.1, z], [0.19, 0.6, 0.02], wood);
+        block([0.2, 1.1, z], [0.19, 0.6, 0.02], wood, WOOD_GRAIN);
     }
     let book_colors = [[150, 52, 48], [52, 92, 130], [196, 160, 70], [70, 110, 74]];
     for k in 0..9 {
@@ -85,13 +86,14 @@ fn room_solids() -> Vec<Solid> {
             [0.17, y, 0.57 + height],
             [0.12, 0.026, height],
             book_colors[k % 4],
+            0.0,
         );
     }
     // Crate without a lid.
     let crate_center = Vec3::new(0.75, 2.75, 0.0);
     solids.push((
         Box::new(move |p| open_crate(yawed(p - crate_center, 0.4))),
-        Box::new(|p| grained(p, [186, 152, 98])),
+        Box::new(|p| grained(p, [186, 152, 98], WOOD_GRAIN)),
     ));
     // Stool.
     let stool = Vec3::new(2.75, 2.75, 0.23);
@@ -127,10 +129,13 @@ fn floor_color(p: Vec3) -> [u8; 3] {
     [150.0, 124.0, 96.0].map(|c: f32| (c * shade) as u8)
 }
 
-/// A colour with a faint grain along x.
-fn grained(p: Vec3, color: [u8; 3]) -> [u8; 3] {
-    let grain = 1.0 + 0.05 * (55.0 * (p.y + p.z) + 1.5 * (3.0 * p.x).sin()).sin();
-    color.map(|c| (f32::from(c) * grain).min(255.0) as u8)
+/// Strength of the grain of wood, as a share of its brightness.
+const WOOD_GRAIN: f32 = 0.05;
+
+/// A colour with a grain along x.
+fn grained(p: Vec3, color: [u8; 3], grain: f32) -> [u8; 3] {
+    let shade = 1.0 + grain * (55.0 * (p.y + p.z) + 1.5 * (3.0 * p.x).sin()).sin();
+    color.map(|c| (f32::from(c) * shade).min(255.0) as u8)
 }
 
 // Signed distances in metres; see Inigo Quilez, "distance functions",

@@ -40,6 +40,9 @@ pub struct NoSpot {
     pub diameter: f32,
 }
 
+/// Radius of the disc around a spot, in body radii: with room for a body that tips over, else just
+/// for the body.
+const ROOM: [f32; 2] = [2.5, 1.0];
 /// Height differences within a footprint, in body radii, from ideal to barely acceptable.
 const LEVEL_TOLERANCES: [f32; 4] = [0.15, 0.3, 0.6, 1.0];
 /// Share of a footprint's pixels that must be seen and within the tolerance.
@@ -57,12 +60,13 @@ const GROUPS: usize = 64;
 /// [`NoSpot`] if not even one place is level and without holes.
 pub fn find_spots(scan: &PointCloud<'_>, up: Vec3, demand: &Demand) -> Result<Vec<Spot>, NoSpot> {
     let map = HeightMap::of(scan, up, demand.body_radius);
-    let candidates = map.level_places(demand.body_radius);
-    if candidates.is_empty() {
-        return Err(NoSpot {
+    let candidates = ROOM
+        .iter()
+        .map(|room| map.level_places(room * demand.body_radius))
+        .find(|places| !places.is_empty())
+        .ok_or(NoSpot {
             diameter: 2.0 * demand.body_radius,
-        });
-    }
+        })?;
     let places = best_group(&candidates, up, demand);
     Ok((0..demand.count)
         .map(|k| Spot {

@@ -19,7 +19,7 @@ pub struct TldiConfig {
     /// most that the points tell; 2 averages noise as large as the radii.
     pub pixel_scale: f32,
     /// Contacts are kept, riding on their bodies, until the pair has moved by this much relative
-    /// to each other since they were measured, in mean radii of its finer cloud. Less than what a
+    /// to each other since they were measured, in mean radii of its coarser cloud. Less than what a
     /// comparison scatters by, so nothing is lost, and bodies come to rest; 0 measures in every
     /// step.
     pub kept_drift: f32,

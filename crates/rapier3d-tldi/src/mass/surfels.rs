@@ -1,8 +1,10 @@
 //! The cloud as small flat patches: position, area, outward normal.
 
-use rapier3d::glamx::{DMat3, DSymmetricEigen3, DVec2, DVec3, Pose3, Vec3};
+use super::orient::orient;
+use arrayvec::ArrayVec;
+use rapier3d::glamx::{DMat3, DSymmetricEigen3, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
-use tldi::{KdTree, Neighbor, Params, PointCloud, Tldi, VirtualCamera};
+use tldi::{KdTree, Neighbor, PointCloud};
 
 /// Most points, about, whose patches are computed.
 const MAX_SAMPLES: usize = 100_000;
@@ -11,8 +13,8 @@ const MAX_SAMPLES: usize = 100_000;
 /// neighbours miss none on an even sample, and few on a random one.
 const NEIGHBORS: usize = 16;
 
-/// Neighbours, beside the point itself, that a normal is fitted to.
-const FITTED_NEIGHBORS: usize = 12;
+/// Points, with the point itself, that a normal is fitted to.
+const FITTED_POINTS: usize = 13;
 
 /// Cosine of the angle between normals from which on there is an edge of the surface between two
 /// points: 37°.
@@ -25,41 +27,18 @@ const REACH: f64 = 1.5;
 /// Corners of the polygon that stands for the disc of `REACH` radii.
 const CORNERS: usize = 16;
 
-/// Most pixels along an edge of the images that tell inside from outside.
-const MAX_PIXELS: f32 = 512.0;
-
 /// A patch of the surface around a point.
 pub(super) struct Surfel {
     /// In metres, in the cloud's frame.
     pub(super) position: DVec3,
-    /// Unit normal; zero where inside and outside could not be told.
+    /// Outward unit normal.
     pub(super) normal: DVec3,
+    /// How far the patch reaches at most, in metres.
+    reach: f64,
     /// In square metres.
     pub(super) area: f64,
-}
-
-/// The patches with normals of any sign.
-pub(super) fn areas(cloud: &PointCloud<'_>) -> Vec<Surfel> {
-    patches(cloud, &thinned(cloud))
-}
-
-/// The patches with outward normals, or `None` if those of more than a fifth of the area could not
-/// be told.
-pub(super) fn outward(cloud: &PointCloud<'_>) -> Option<Vec<Surfel>> {
-    let mut surfels = areas(cloud);
-    if cloud.normals().is_none() || !cloud.normals_oriented() {
-        orient(cloud, &mut surfels);
-    }
-    let area = |surfels: &mut dyn Iterator<Item = &Surfel>| surfels.map(|s| s.area).sum::<f64>();
-    let all = area(&mut surfels.iter());
-    let told = area(&mut surfels.iter().filter(|s| s.normal != DVec3::ZERO));
-    if told < 0.8 * all {
-        return None;
-    }
-    // Those that are not told are like the others.
-    surfels.retain(|s| s.normal != DVec3::ZERO);
-    surfels.iter_mut().for_each(|s| s.area *= all / told);
-    Some(surfels)
+    /// Indices of the nearest patches, nearest first.
+    pub(super) neighbors: ArrayVec<u32, NEIGHBORS>,
 }
 
 /// Indices of at most about [`MAX_SAMPLES`] points at distinct positions.
@@ -89,10 +68,10 @@ fn thinning(count: usize) -> f64 {
     (MAX_SAMPLES as f64 / count as f64).min(1.0)
 }
 
-fn patches(cloud: &PointCloud<'_>, indices: &[usize]) -> Vec<Surfel> {
+/// The patches of a cloud, with outward normals as far as [`orient`] can tell.
+pub(super) fn surfels(cloud: &PointCloud<'_>) -> Vec<Surfel> {
+    let indices = thinned(cloud);
     let points: Vec<Vec3> = indices.iter().map(|&i| cloud.point(i)).collect();
-    // Distances grow as points are left out.
-    let reach = REACH / thinning(cloud.len()).sqrt();
     let Ok(samples) = PointCloud::builder(&points)
         .radius(cloud.max_radius())
         .build()
@@ -101,43 +80,49 @@ fn patches(cloud: &PointCloud<'_>, indices: &[usize]) -> Vec<Surfel> {
         return Vec::new();
     };
     let tree = KdTree::new(&samples);
-    let normals: Vec<DVec3> = match cloud.normals() {
-        Some(normals) => indices.iter().map(|&i| normals[i].as_dvec3()).collect(),
-        None => points
-            .par_iter()
-            .map_init(Vec::new, |neighbors, &point| {
-                tree.k_nearest(point, FITTED_NEIGHBORS + 1, neighbors);
-                fitted_normal(&points, neighbors)
-            })
-            .collect(),
-    };
-    let signed = cloud.normals().is_some() && cloud.normals_oriented();
-    (0..points.len())
-        .into_par_iter()
-        .map_init(
-            Default::default,
-            |(neighbors, cell): &mut (Vec<_>, Cell), k| {
-                let (point, normal) = (points[k].as_dvec3(), normals[k]);
-                tree.k_nearest(points[k], NEIGHBORS + 1, neighbors);
-                cell.start(normal, reach * f64::from(cloud.radius(indices[k])));
-                for neighbor in neighbors.iter() {
-                    let other = normals[neighbor.index];
-                    let agreement = normal.dot(other);
-                    let to_neighbor = points[neighbor.index].as_dvec3() - point;
-                    if (if signed { agreement } else { agreement.abs() }) < CREASE {
-                        cell.keep_side_of_plane(to_neighbor, other);
-                    } else {
-                        cell.keep_nearer_than(to_neighbor);
-                    }
+    // Distances grow as points are left out.
+    let reach = REACH / thinning(cloud.len()).sqrt();
+    let mut surfels: Vec<Surfel> = indices
+        .par_iter()
+        .map_init(Vec::new, |found, &index| {
+            tree.k_nearest(cloud.point(index), NEIGHBORS + 1, found);
+            let reach = reach * f64::from(cloud.radius(index));
+            Surfel {
+                position: cloud.point(index).as_dvec3(),
+                normal: match cloud.normals() {
+                    Some(normals) => normals[index].as_dvec3(),
+                    None => fitted_normal(&points, &found[..found.len().min(FITTED_POINTS)]),
+                },
+                reach,
+                area: std::f64::consts::PI * reach * reach,
+                // The first is the point itself.
+                neighbors: found[1..].iter().map(|n| n.index as u32).collect(),
+            }
+        })
+        .collect();
+    if cloud.normals().is_none() || !cloud.normals_oriented() {
+        orient(&mut surfels);
+    }
+    let areas: Vec<f64> = surfels
+        .par_iter()
+        .map_init(Cell::default, |cell, surfel| {
+            cell.start(surfel.normal, surfel.reach);
+            for &neighbor in &surfel.neighbors {
+                let other = &surfels[neighbor as usize];
+                let offset = other.position - surfel.position;
+                if surfel.normal.dot(other.normal) < CREASE {
+                    cell.keep_side_of_plane(offset, other.normal);
+                } else {
+                    cell.keep_nearer_than(offset);
                 }
-                Surfel {
-                    position: point,
-                    normal,
-                    area: cell.area(),
-                }
-            },
-        )
-        .collect()
+            }
+            cell.area()
+        })
+        .collect();
+    for (surfel, area) in surfels.iter_mut().zip(areas) {
+        surfel.area = area;
+    }
+    surfels
 }
 
 /// Normal of the plane that fits the neighbours best.
@@ -218,47 +203,4 @@ impl Cell {
             .sum();
         0.5 * twice
     }
-}
-
-/// Turns the normals outward by the parity of the layers along the three axes; zero where all
-/// axes are undecided.
-fn orient(cloud: &PointCloud<'_>, surfels: &mut [Surfel]) {
-    let radius = cloud.mean_radius();
-    let pixel_size = radius.max(cloud.bounds().extents().max_element() / MAX_PIXELS);
-    let params = Params::paper(radius).with_pixel_size(pixel_size);
-    let mut votes = vec![0.0; surfels.len()];
-    for axis in Vec3::AXES {
-        let camera = VirtualCamera::along(axis, pixel_size);
-        let image = tldi::build(cloud, &Pose3::IDENTITY, &camera, &params);
-        for (surfel, vote) in surfels.iter().zip(&mut votes) {
-            // The ray enters against the outward normal.
-            *vote -= match is_entry(&image, surfel.position.as_vec3()) {
-                Some(true) => surfel.normal.dot(axis.as_dvec3()),
-                Some(false) => -surfel.normal.dot(axis.as_dvec3()),
-                None => 0.0,
-            };
-        }
-    }
-    for (surfel, vote) in surfels.iter_mut().zip(votes) {
-        surfel.normal *= if vote == 0.0 { 0.0 } else { vote.signum() };
-    }
-}
-
-/// Whether the ray through `point` enters the body there or leaves it; `None` where the number of
-/// layers is odd.
-fn is_entry(image: &Tldi, point: Vec3) -> Option<bool> {
-    let view = image.camera.view_from_point(point);
-    let [column, row] = image.camera.pixel_from_view(view).map(|c| c.floor() as i32);
-    let (i, j) = (column - image.origin[0], row - image.origin[1]);
-    let (i, j) = (u32::try_from(i).ok()?, u32::try_from(j).ok()?);
-    if i >= image.size[0] || j >= image.size[1] {
-        return None;
-    }
-    let layers = image.layers_at(i, j);
-    if layers.len() % 2 == 1 {
-        return None;
-    }
-    let off = |k: &usize| (layers[*k].depth - view.z).abs();
-    let nearest = (0..layers.len()).min_by(|a, b| off(a).total_cmp(&off(b)))?;
-    Some(nearest % 2 == 0)
 }
