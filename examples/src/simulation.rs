@@ -14,6 +14,9 @@ const DENSITY: f32 = 500.0;
 const GRAVITY: f32 = 9.81;
 /// Length of a step in seconds.
 const DT: f32 = 1.0 / 60.0;
+/// Angular damping of the bodies, per second: what rolling costs on a real surface, which rapier
+/// does not model.
+const ROLLING_RESISTANCE: f32 = 1.0;
 /// Largest tilt of a body at the start, in radians (5°).
 const MAX_TILT: f32 = 0.087;
 
@@ -89,7 +92,9 @@ impl DropSimulation {
             .map(|(named, spot)| {
                 let pose = start_pose(&named.cloud, up, spot, &mut rng);
                 let (handle, collider) = world.insert(
-                    RigidBodyBuilder::dynamic().pose(pose),
+                    RigidBodyBuilder::dynamic()
+                        .pose(pose)
+                        .angular_damping(ROLLING_RESISTANCE),
                     tldi.collider(named.cloud.clone()).density(DENSITY),
                 );
                 Body {

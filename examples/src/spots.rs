@@ -50,7 +50,7 @@ const SEEN_SHARE: f32 = 0.97;
 /// Least distance of two spots, in body radii: bodies that tip over do not reach each other.
 const LEAST_DISTANCE: f32 = 3.0;
 /// Random groups of spots that are compared.
-const GROUPS: usize = 64;
+const GROUPS: usize = 256;
 
 /// Chooses places for bodies on the surfaces of `scan` that face `up` (unit length): close enough
 /// together for one picture, on as many levels as there are, and never two bodies on one place
@@ -186,7 +186,7 @@ impl HeightMap {
 fn best_group(candidates: &[Vec3], up: Vec3, demand: &Demand) -> Vec<Vec3> {
     let mut rng = Rng::with_seed(demand.seed);
     let mut best: (f32, Vec<Vec3>) = (f32::MIN, Vec::new());
-    let mut reach = 4.0 * demand.body_radius * (demand.count as f32).sqrt();
+    let mut reach = 5.0 * demand.body_radius * (demand.count as f32).sqrt();
     // Twice as far in each round, up to where every candidate is within reach.
     for _ in 0..8 {
         for _ in 0..GROUPS {

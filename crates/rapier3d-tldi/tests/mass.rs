@@ -147,6 +147,19 @@ fn walls_three_spacings_thick_have_two_sides() {
 }
 
 #[test]
+fn walls_one_spacing_thick_are_not_taken_for_one_sheet() {
+    // Half of the 13 points that a normal is fitted to are on the other side.
+    let half = Vec3::new(0.5, 0.5, 0.01);
+    let mut expected = MassProperties::from_cuboid(1.0, half);
+    expected.local_com = CENTER;
+    for seed in 0..3 {
+        let wall = cloud(cuboid_of(half, 6000, CENTER, seed), false);
+        let actual = unit_mass_properties(&wall, MassModel::Solid);
+        assert_close(&actual, &expected, 0.5, [0.3, 0.05, 0.3]);
+    }
+}
+
+#[test]
 fn even_grids_weigh_like_random_samples() {
     // 21 × 21 points a side of the unit cube, corners and edges counted once.
     let mut points = Vec::new();
@@ -234,6 +247,16 @@ fn what_encloses_nothing_is_a_shell() {
     assert_eq!(
         unit_mass_properties(&room, MassModel::Solid).mass(),
         unit_mass_properties(&room, shell).mass()
+    );
+    // A sheet scanned from both sides, a hair apart.
+    let sheet = cuboid_of(Vec3::new(0.5, 0.5, 1e-5), 6000, CENTER, 13);
+    let sheet = cloud(sheet, true);
+    let shell = MassModel::Shell {
+        thickness: 2.0 * sheet.mean_radius(),
+    };
+    assert_eq!(
+        unit_mass_properties(&sheet, MassModel::Solid).mass(),
+        unit_mass_properties(&sheet, shell).mass()
     );
     // One point, two points and a hundred at the same place: some mass, finite and positive.
     for points in [

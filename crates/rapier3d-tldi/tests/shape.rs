@@ -237,6 +237,7 @@ fn new_points_move_everything_but_the_mass_and_leave_clones_alone() {
 
     // No clone shares the points any more: the same again, in place.
     let before = shape.revision();
+    assert!((shape.cast_local_ray(&ray, 10.0, true).unwrap() - 3.0).abs() < 0.02);
     let shrunk: Vec<Vec3> = doubled.iter().map(|p| 0.75 * *p).collect();
     shape.set_points(&shrunk, Some(&normals)).unwrap();
     assert!(shape.revision() > before);

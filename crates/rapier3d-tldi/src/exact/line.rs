@@ -13,12 +13,11 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// `None` if the ray is not finite or has no direction: it crosses nothing.
+    /// `None` without a direction: the ray crosses nothing.
     pub(super) fn new(origin: Vec3, direction: Vec3, max_distance: f32) -> Option<Self> {
-        let direction = direction.as_dvec3().try_normalize()?;
-        (origin.is_finite() && max_distance >= 0.0).then_some(Self {
+        Some(Self {
             origin: origin.as_dvec3(),
-            direction,
+            direction: direction.as_dvec3().try_normalize()?,
             max: max_distance.into(),
         })
     }

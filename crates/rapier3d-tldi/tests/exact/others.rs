@@ -168,6 +168,9 @@ fn a_ray_or_point_that_is_not_finite_ends() {
         for (origin, direction, max) in [
             (nan, Vec3::X, 1.0),
             (nan, Vec3::X, f32::INFINITY),
+            (Vec3::INFINITY, -Vec3::X, f32::INFINITY),
+            (Vec3::ZERO, Vec3::INFINITY, f32::INFINITY),
+            (Vec3::ZERO, Vec3::X, f32::NAN),
             (Vec3::ZERO, nan, 1.0),
             (Vec3::ZERO, Vec3::ZERO, 1.0),
             (Vec3::splat(-1e30), Vec3::X, f32::INFINITY),
