@@ -30,7 +30,7 @@ impl Default for TldiConfig {
         Self {
             variant: Variant::default(),
             pixel_scale: 1.0,
-            kept_drift: 0.05,
+            kept_drift: 0.1,
         }
     }
 }

@@ -28,7 +28,7 @@ use tldi::{Aabb, RayHit, RaySurface};
 /// | ball, cuboid, capsule, cylinder, cone, convex polyhedron, their round versions, round triangle | entry and exit | yes |
 /// | half-space | one | yes; bounds are infinite |
 /// | voxels | outer faces only | yes |
-/// | triangle mesh | every triangle, once; normals by winding | if it has `TriMeshFlags::ORIENTED`, or a half-edge topology without border |
+/// | triangle mesh | every triangle, once; normals by winding | if it has `TriMeshFlags::ORIENTED`, or a half-edge topology without border; the signed distance is negative behind the normal in any case |
 /// | height field, triangle | every triangle, once; a height field's normals point to +y | no; the signed distance is negative behind the normal |
 /// | segment, polyline | none | no |
 /// | any other | by repeated ray casts, see below | by the shape's own test |

@@ -298,10 +298,7 @@ impl RayCast for PointCloudShape {
         let (leaf, t) = self.bvh().find_best(
             max_time_of_impact,
             |node: &BvhNode, best| node.cast_ray(ray, best),
-            |leaf, _| {
-                self.disc_hit(leaf as usize, ray)
-                    .filter(|&t| t <= max_time_of_impact)
-            },
+            |leaf, _| self.disc_hit(leaf as usize, ray),
         )?;
         let normal = self.cloud().normals().map_or(-ray.dir, |normals| {
             let normal = normals[leaf as usize];

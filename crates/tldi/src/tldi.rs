@@ -77,6 +77,16 @@ impl Tldi {
         self.layers_of((j * self.size[0] + i) as usize)
     }
 
+    /// Empties the image, keeping its memory, for pixels from `origin` on.
+    pub(crate) fn begin(&mut self, camera: &VirtualCamera, origin: [i32; 2], size: [u32; 2]) {
+        self.camera = *camera;
+        self.origin = origin;
+        self.size = size;
+        self.layers.clear();
+        self.offsets.clear();
+        self.offsets.push(0);
+    }
+
     /// The layers of the `k`-th pixel, row by row.
     pub(crate) fn layers_of(&self, k: usize) -> &[Layer] {
         &self.layers[self.offsets[k] as usize..self.offsets[k + 1] as usize]

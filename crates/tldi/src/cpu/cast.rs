@@ -20,12 +20,7 @@ pub(crate) fn cast(
         origin: cover.origin,
         size: cover.size,
     };
-    out.camera = *camera;
-    out.origin = rect.origin;
-    out.size = rect.size;
-    out.layers.clear();
-    out.offsets.clear();
-    out.offsets.push(0);
+    out.begin(camera, rect.origin, rect.size);
     let closed = surface.is_closed();
     let direction = frame_from_surface.rotation.inverse() * camera.axis();
     let view_from_surface = camera.view_from_frame.rotation * frame_from_surface.rotation;

@@ -28,12 +28,7 @@ pub(crate) fn sweep(
     scale: &DepthScale,
     out: &mut Tldi,
 ) {
-    out.camera = *camera;
-    out.origin = rect.origin;
-    out.size = rect.size;
-    out.layers.clear();
-    out.offsets.clear();
-    out.offsets.push(0);
+    out.begin(camera, rect.origin, rect.size);
     let gap_steps = (params.merge_gap / scale.step) as i32;
     for pixel in 0..rect.pixels() {
         let range = fragments.offsets[pixel] as usize..fragments.offsets[pixel + 1] as usize;
