@@ -6,7 +6,8 @@
 //! that this axis sees edge-on (a corner, a groove), up to two more axes follow.
 
 use crate::AXIS_HYSTERESIS;
-use glamx::{Mat3, SymmetricEigen3, Vec3};
+use crate::normals::least_variance_axis;
+use glamx::{DMat3, DVec3, Mat3, Vec3};
 
 /// Most views of one pair: three axes span all directions.
 pub(crate) const MAX_VIEWS: usize = 3;
@@ -135,10 +136,9 @@ fn top_eigenvector(m: &Mat3) -> Option<Vec3> {
     if trace.is_nan() || trace <= 0.0 {
         return None;
     }
-    let eigen = SymmetricEigen3::new(*m);
-    let values = eigen.eigenvalues.to_array();
-    let top = (0..3).max_by(|&i, &j| values[i].total_cmp(&values[j]))?;
-    eigen.eigenvectors.col(top).try_normalize()
+    // The largest eigenvalue of m is the least of trace − m.
+    let rest = DMat3::from_diagonal(DVec3::splat(f64::from(trace))) - m.as_dmat3();
+    least_variance_axis(rest).as_vec3().try_normalize()
 }
 
 #[cfg(test)]
