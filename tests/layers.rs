@@ -1,7 +1,7 @@
 //! The image of one cloud against brute force and analytic truth.
 
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{Facing, Params, PointCloud, VirtualCamera, build};
+use tldi::{Facing, Layer, Params, PointCloud, Tldi, VirtualCamera, build};
 use tldi_tests::{oracle_layers, random_unit, sampled_sphere};
 
 /// Every pixel's layers equal those of an O(n²) sort-and-merge in f64.
@@ -104,48 +104,93 @@ fn a_sphere_has_two_layers_at_the_analytic_depths() {
     }
 }
 
-/// 10⁵ points in one pixel are one layer, exactly in the middle, in any order.
+/// The image along +z over the camera's own frame, with pixels of 1 cm.
+fn image_along_z(cloud: &PointCloud) -> Tldi {
+    let camera = VirtualCamera::along(Vec3::Z, 0.01);
+    let frame_from_cloud = camera.view_from_frame.inverse();
+    let params = Params::for_radius(0.01);
+    build(cloud, &frame_from_cloud, &camera, &params)
+}
+
+/// Layers of the pixel with the corners (0, 0) and (1 cm, 1 cm).
+fn layers_at_origin(image: &Tldi) -> &[Layer] {
+    let [i, j] = image.origin.map(|k| (0 - k) as u32);
+    image.layers_at(i, j)
+}
+
+/// 10⁵ points in one pixel are one layer, exactly in the middle.
 #[test]
 fn a_hot_pixel_is_one_layer() {
-    let count = 100_000;
-    let mut points: Vec<_> = (0..count)
+    let points: Vec<_> = (0..100_000)
         .map(|k| Vec3::new(0.005, 0.005, k as f32 * 1e-6 - 0.05))
         .collect();
-    let image = |points: &[Vec3]| {
-        let cloud = PointCloud::builder(points)
-            .radius(0.01)
-            .normals(vec![Vec3::Z; points.len()])
+    let cloud = PointCloud::builder(&points)
+        .radius(0.01)
+        .normals(vec![Vec3::Z; points.len()])
+        .build()
+        .expect("the points are valid");
+    let image = image_along_z(&cloud);
+    let layers = layers_at_origin(&image);
+    assert_eq!(layers.len(), 1);
+    assert!(layers[0].depth.abs() < 1e-5, "{:?}", layers[0]);
+}
+
+/// Points of many weights, depths, slopes and colours in few pixels: the same bits in any order.
+#[test]
+fn layers_do_not_depend_on_the_order_of_points() {
+    let mut rng = fastrand::Rng::with_seed(5);
+    // Depths from a set of 50: fragments of equal depth have no order of their own.
+    let mut points: Vec<_> = (0..20_000)
+        .map(|_| {
+            let depth = f32::from(rng.u8(..50)) * 0.01;
+            let point = Vec3::new(0.03 * rng.f32(), 0.03 * rng.f32(), depth);
+            let radius = 0.005 + 0.01 * rng.f32();
+            let color: [u8; 4] = std::array::from_fn(|_| rng.u8(..));
+            let flat = rng.bool();
+            let normal = if flat { Vec3::Z } else { random_unit(&mut rng) };
+            (point, radius, normal, color)
+        })
+        .collect();
+    let image = |points: &[(Vec3, f32, Vec3, [u8; 4])]| {
+        let cloud = PointCloud::builder(points.iter().map(|p| p.0).collect::<Vec<_>>())
+            .radii(points.iter().map(|p| p.1).collect::<Vec<_>>())
+            .normals(points.iter().map(|p| p.2).collect::<Vec<_>>())
+            .colors(points.iter().map(|p| p.3).collect::<Vec<_>>())
             .build()
             .expect("the points are valid");
-        let camera = VirtualCamera::along(Vec3::Z, 0.01);
-        let frame_from_cloud = camera.view_from_frame.inverse();
-        build(
-            &cloud,
-            &frame_from_cloud,
-            &camera,
-            &Params::for_radius(0.01),
-        )
+        image_along_z(&cloud)
     };
     let straight = image(&points);
-    let [i, j] = [0, 1].map(|k| (0 - straight.origin[k]) as u32);
-    let layers = straight.layers_at(i, j);
-    assert_eq!(layers.len(), 1);
-    assert!((layers[0].depth - 0.0).abs() < 1e-5, "{:?}", layers[0]);
-    fastrand::Rng::with_seed(5).shuffle(&mut points);
+    assert!(straight.max_layers() >= 2);
+    rng.shuffle(&mut points);
     assert_eq!(straight.layers(), image(&points).layers());
 }
 
 /// Colours blend with the same weights as depths; a cloud without colours has alpha 0.
 #[test]
 fn colours_blend() {
-    let cloud = PointCloud::builder(vec![Vec3::new(0.005, 0.005, 0.0); 2])
-        .radius(0.01)
-        .normals(vec![Vec3::Z; 2])
+    // Seen from the pixel's centre: full weight, 1 + 254, and 7 mm off: 1 + 254 · 0.51, cut to 130.
+    let points = vec![Vec3::new(0.005, 0.005, 0.0), Vec3::new(0.012, 0.005, 0.0)];
+    let builder = || {
+        PointCloud::builder(&points)
+            .radius(0.01)
+            .normals(vec![Vec3::Z; 2])
+    };
+    let colored = builder()
         .colors(vec![[200, 0, 100, 255], [100, 50, 0, 255]])
         .build()
         .expect("the points are valid");
-    let camera = VirtualCamera::along(Vec3::Z, 0.01);
-    let params = Params::for_radius(0.01);
-    let image = build(&cloud, &camera.view_from_frame.inverse(), &camera, &params);
-    assert!(image.layers().iter().all(|l| l.color == [150, 25, 50, 255]));
+    let blend = |c: [f32; 2]| ((255.0 * c[0] + 130.0 * c[1]) / 385.0).round() as u8;
+    let expected = [
+        blend([200.0, 100.0]),
+        blend([0.0, 50.0]),
+        blend([100.0, 0.0]),
+        255,
+    ];
+    let image = image_along_z(&colored);
+    let layers = layers_at_origin(&image);
+    assert_eq!(layers.len(), 1);
+    assert_eq!(layers[0].color, expected);
+    let bare = image_along_z(&builder().build().expect("the points are valid"));
+    assert_eq!(layers_at_origin(&bare)[0].color, [0; 4]);
 }

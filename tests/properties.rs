@@ -1,25 +1,22 @@
 //! Properties of whole pairs on random clouds and poses, each with a replayable seed.
 
+use tldi::PointCloud;
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{Backend, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View};
-use tldi_tests::{Samples, random_pose, random_unit, sampled_box, sampled_sphere};
+use tldi_tests::{
+    Samples, compare_clouds, deepest_point, random_pose, random_unit, sampled_box, sampled_sphere,
+};
 
 const R: f32 = 0.012;
 
 fn random_body(rng: &mut fastrand::Rng) -> Samples {
-    let mut body = match rng.u8(0..2) {
+    let body = match rng.u8(0..2) {
         0 => sampled_sphere(0.06 + 0.06 * rng.f32(), R),
         _ => {
             let half = Vec3::from_array(std::array::from_fn(|_| 0.04 + 0.08 * rng.f32()));
             sampled_box(half, R, rng)
         }
     };
-    let pose = random_pose(rng, 0.05);
-    for (p, n) in body.points.iter_mut().zip(&mut body.normals) {
-        *p = pose * *p;
-        *n = pose.rotation * *n;
-    }
-    body
+    body.moved(&random_pose(rng, 0.05))
 }
 
 /// Two bodies at a pose where they are somewhere between apart and halfway into each other.
@@ -34,28 +31,6 @@ fn random_pair(seed: u64) -> (PointCloud<'static>, PointCloud<'static>, Pose3) {
     (a, b, a_from_b)
 }
 
-fn compare(a: &PointCloud<'static>, b: &PointCloud<'static>, a_from_b: Pose3) -> PairResult {
-    let mut results = Vec::new();
-    let query = PairQuery {
-        a: Surface::Cloud(a),
-        b: Surface::Cloud(b),
-        a_from_b,
-        view: View::Aim {
-            toward_b: a_from_b.translation,
-            last_axis: None,
-        },
-        params: Params::for_radius(R),
-    };
-    CpuBackend::new()
-        .compare(&[query], &mut results)
-        .expect("the query is supported");
-    results.remove(0)
-}
-
-fn least_gap(result: &PairResult) -> Option<f32> {
-    result.gap
-}
-
 /// Exchanging the bodies may move the pixel grid but not the answer.
 #[test]
 fn symmetric_in_a_and_b() {
@@ -63,10 +38,10 @@ fn symmetric_in_a_and_b() {
     for seed in 0..200 {
         let (a, b, a_from_b) = random_pair(seed);
         let (ab, ba) = (
-            compare(&a, &b, a_from_b),
-            compare(&b, &a, a_from_b.inverse()),
+            compare_clouds(&a, &b, a_from_b, R),
+            compare_clouds(&b, &a, a_from_b.inverse(), R),
         );
-        let (Some(gap_ab), Some(gap_ba)) = (least_gap(&ab), least_gap(&ba)) else {
+        let (Some(gap_ab), Some(gap_ba)) = (ab.gap, ba.gap) else {
             assert!(!ab.collides && !ba.collides, "seed {seed}");
             continue;
         };
@@ -92,14 +67,44 @@ fn invariant_under_a_common_motion() {
         let mut rng = fastrand::Rng::with_seed(seed);
         let world_from_a = random_pose(&mut rng, 10.0);
         let world_from_b = world_from_a * a_from_b;
-        let moved = compare(&a, &b, world_from_a.inv_mul(&world_from_b));
-        let still = compare(&a, &b, a_from_b);
-        match (least_gap(&still), least_gap(&moved)) {
+        let moved = compare_clouds(&a, &b, world_from_a.inv_mul(&world_from_b), R);
+        let still = compare_clouds(&a, &b, a_from_b, R);
+        match (still.gap, moved.gap) {
             // 10 m away f32 poses are good to 2 µm and 2⁻²² rad: a point may still fall into the
             // next pixel, which moves a layer by a fraction of r̄.
             (Some(g), Some(h)) => assert!((g - h).abs() < 0.3 * R, "seed {seed}: {g} {h}"),
             (g, h) => assert_eq!(g.is_some(), h.is_some(), "seed {seed}"),
         }
+    }
+}
+
+/// The frame in which a body's points are given does not matter: results turn with that of the
+/// first, and do not change with that of the second.
+#[test]
+fn independent_of_the_frames_of_the_bodies() {
+    for seed in 0..100 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let (ra, rb) = (0.06 + 0.06 * rng.f32(), 0.06 + 0.06 * rng.f32());
+        let (a, b) = (sampled_sphere(ra, R), sampled_sphere(rb, R));
+        let gap = (1.0 - 3.0 * rng.f32()) * R;
+        let mut a_from_b = random_pose(&mut rng, 0.0);
+        let direction = random_unit(&mut rng);
+        a_from_b.translation = direction * (ra + rb + gap);
+        let (frame_from_a, frame_from_b) = (random_pose(&mut rng, 0.3), random_pose(&mut rng, 0.3));
+        let moved = compare_clouds(
+            &a.moved(&frame_from_a).cloud(R),
+            &b.moved(&frame_from_b).cloud(R),
+            frame_from_a * a_from_b * frame_from_b.inverse(),
+            R,
+        );
+        let (found, place) = deepest_point(&moved).expect("the spheres touch");
+        let true_place = frame_from_a * (direction * (ra + 0.5 * gap));
+        let true_normal = frame_from_a.rotation * direction;
+        let angle = true_normal.angle_between(moved.patches[0].normal);
+        // On spheres of 5 r̄ the pixel grid, which turns with the frame, leaves this much.
+        assert!((found - gap).abs() < 0.5 * R, "seed {seed}: {found} {gap}");
+        assert!(place.distance(true_place) < 2.0 * R, "seed {seed}");
+        assert!(angle < 0.2, "seed {seed}: {angle} rad off");
     }
 }
 
@@ -117,7 +122,8 @@ fn gaps_follow_the_distance() {
         let direction = random_unit(&mut rng);
         let gap_at = |gap: f32| {
             let pose = Pose3::from_translation(direction * (ra + rb + gap));
-            least_gap(&compare(&a, &b, pose)).expect("the spheres share pixels")
+            let result = compare_clouds(&a, &b, pose, R);
+            result.gap.expect("the spheres share pixels")
         };
         let (near, far) = (gap_at(-0.5 * R), gap_at(0.5 * R));
         // Each within 0.3 r̄ of the truth on these curvatures.

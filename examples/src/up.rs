@@ -2,8 +2,8 @@
 //!
 //! Floors, table tops and ground make the normals of a scan cluster around one axis, and walls are
 //! perpendicular to it. In a room the directions of the walls cluster as well; there the extent
-//! decides, as rooms are wider than high. Which end of the axis is up shows in what stands near
-//! the level surfaces: on them, hardly ever under them.
+//! decides, as rooms are wider than high. Which end of the axis is up shows in what stands on the
+//! level surfaces: furniture on a floor, hardly anything hangs from a ceiling or under a table.
 
 use std::collections::HashMap;
 use tldi::glamx::Vec3;
@@ -40,9 +40,14 @@ const EXTENT_WEIGHT: f32 = 0.3;
 /// Normals and points looked at, at most.
 const SAMPLES: usize = 20_000;
 const COLUMN_SAMPLES: usize = 100_000;
-/// Evidence for the sign of the axis, as the logarithm of a ratio of counts, below which the
-/// convention of the file decides.
-const MIN_SIGN_EVIDENCE: f32 = 0.3;
+/// Evidence for the sign of the axis below which the convention of the file decides: a mean height
+/// that is 5 % of the scan's height off the middle, or as much of a difference of two mean heights.
+const MIN_SIGN_EVIDENCE: f32 = 0.1;
+/// Height at either end of the scan, as a share of its height, in which a floor or a ceiling is.
+const END: f32 = 0.1;
+/// Share of the level points that make an end a floor or a ceiling. Level surfaces at any height
+/// would leave 0.1 in each end.
+const MIN_END_SHARE: f32 = 0.16;
 
 /// Finds the up direction from the points of a scan and their normals (unit length, of either
 /// sign; one for each point).
@@ -54,7 +59,7 @@ const MIN_SIGN_EVIDENCE: f32 = 0.3;
 /// ```
 /// use tldi::glamx::Vec3;
 /// use tldi_examples::up::detect_up;
-/// // A floor with a box on it: level along y. (Which end is up takes more of a scene to tell.)
+/// // A floor with a box on it, heights along −y.
 /// let mut points = Vec::new();
 /// let mut normals = Vec::new();
 /// for i in 0..100 {
@@ -69,7 +74,7 @@ const MIN_SIGN_EVIDENCE: f32 = 0.3;
 ///         }
 ///     }
 /// }
-/// assert!(detect_up(&points, &normals).direction.y.abs() > 0.999);
+/// assert!(detect_up(&points, &normals).direction.y < -0.999);
 /// ```
 ///
 /// # Panics
@@ -211,15 +216,72 @@ fn snapped_to_file_axis(sampled: &[(Vec3, Vec3)], axis: Vec3) -> Vec3 {
         .unwrap_or(axis)
 }
 
-/// Positive if `axis` points up, negative if down: the logarithm of how many points are found
-/// closely above level surfaces to how many below.
+/// Positive if `axis` points up, negative if down, 2 to 3 at most.
+///
+/// Between level surfaces at both ends, floor and ceiling, things stand on the lower one. Else what
+/// is not level (walls, sides of furniture) is above the middle of what is, and stands on it.
 fn sign_evidence(points: &[Vec3], normals: &[Vec3], axis: Vec3) -> f32 {
-    let (right, forward) = axis.any_orthonormal_pair();
-    let (min, max) = points
+    let picked: Vec<usize> = every_nth(points.len(), COLUMN_SAMPLES)
+        .filter(|&i| points[i].is_finite() && normals[i].is_normalized())
+        .collect();
+    let mut heights: Vec<f32> = picked.iter().map(|&i| points[i].dot(axis)).collect();
+    heights.sort_unstable_by(f32::total_cmp);
+    let tail = heights.len() / 100;
+    let (low, high) = (heights[tail], heights[heights.len() - 1 - tail]);
+    if high <= low {
+        return 0.0;
+    }
+    // Height of each point as a share of what holds 98 % of them, and whether it is level there.
+    let places: Vec<(f32, bool)> = picked
         .iter()
-        .filter(|p| p.is_finite())
+        .map(|&i| {
+            let share = (points[i].dot(axis) - low) / (high - low);
+            (share.clamp(0.0, 1.0), is_level(normals[i], axis))
+        })
+        .collect();
+    let mean_of = |keep: &dyn Fn(f32, bool) -> bool| {
+        let kept = places.iter().filter(|(share, level)| keep(*share, *level));
+        let (sum, count) = kept.fold((0.0, 0u32), |(sum, count), (share, _)| {
+            (sum + f64::from(*share), count + 1)
+        });
+        (count > 0).then(|| (sum / f64::from(count)) as f32)
+    };
+    let level_points = || places.iter().filter(|(_, level)| *level);
+    let is_floor_or_ceiling = |is_in_end: fn(f32) -> bool| {
+        let in_end = level_points()
+            .filter(|(share, _)| is_in_end(*share))
+            .count();
+        in_end as f32 > MIN_END_SHARE * level_points().count() as f32
+    };
+    if is_floor_or_ceiling(|share| share < END) && is_floor_or_ceiling(|share| share > 1.0 - END) {
+        let between = mean_of(&|share, _| (END..=1.0 - END).contains(&share));
+        return between.map_or(0.0, |mean| 1.0 - 2.0 * mean);
+    }
+    let (level, other) = (mean_of(&|_, level| level), mean_of(&|_, level| !level));
+    let rise = level.zip(other).map_or(0.0, |(level, other)| other - level);
+    let [above, below] = beside_level_points(points, normals, axis, &picked);
+    let all = above + below + level_points().count();
+    (above as f32 - below as f32) / all.max(1) as f32 + 2.0 * rise
+}
+
+fn is_level(normal: Vec3, axis: Vec3) -> bool {
+    normal.dot(axis).abs() >= PARALLEL
+}
+
+/// How many of the picked points are closely above and below level ones: pairs, in columns along
+/// the axis.
+fn beside_level_points(
+    points: &[Vec3],
+    normals: &[Vec3],
+    axis: Vec3,
+    picked: &[usize],
+) -> [usize; 2] {
+    let (right, forward) = axis.any_orthonormal_pair();
+    let (min, max) = picked
+        .iter()
+        .map(|&i| points[i])
         .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| {
-            (min.min(*p), max.max(*p))
+            (min.min(p), max.max(p))
         });
     let size = (max - min).max_element();
     // Columns as wide as 1 % of the scan, looked at between 2 % and 20 % of it from each level
@@ -230,10 +292,7 @@ fn sign_evidence(points: &[Vec3], normals: &[Vec3], axis: Vec3) -> f32 {
     };
     let (near, far) = (0.02 * size, 0.2 * size);
     let mut columns: HashMap<(i32, i32), Vec<f32>> = HashMap::new();
-    let picked: Vec<usize> = every_nth(points.len(), COLUMN_SAMPLES)
-        .filter(|&i| points[i].is_finite())
-        .collect();
-    for &i in &picked {
+    for &i in picked {
         columns
             .entry(column_of(points[i]))
             .or_default()
@@ -242,18 +301,15 @@ fn sign_evidence(points: &[Vec3], normals: &[Vec3], axis: Vec3) -> f32 {
     for heights in columns.values_mut() {
         heights.sort_unstable_by(f32::total_cmp);
     }
-    let (mut above, mut below) = (0usize, 0usize);
-    for &i in &picked {
-        if normals[i].dot(axis).abs() < PARALLEL {
-            continue;
-        }
+    let (mut above, mut below) = (0, 0);
+    for &i in picked.iter().filter(|&&i| is_level(normals[i], axis)) {
         let heights = &columns[&column_of(points[i])];
         let height = points[i].dot(axis);
         let count_to = |limit: f32| heights.partition_point(|h| *h < limit);
         above += count_to(height + far) - count_to(height + near);
         below += count_to(height - near) - count_to(height - far);
     }
-    ((above + 1) as f32 / (below + 1) as f32).ln()
+    [above, below]
 }
 
 #[cfg(test)]
@@ -289,19 +345,52 @@ mod tests {
         detect_up(&points, &normals)
     }
 
+    /// Up of a scene with z up, turned, is the turned z; `case` is named on failure.
+    #[track_caller]
+    fn assert_up_is_found(scene: &SampledSurface, rotation: Quat, case: (u64, usize)) {
+        let up = turned(scene, rotation);
+        let angle = (rotation * Vec3::Z)
+            .angle_between(up.direction)
+            .to_degrees();
+        // 2°: within it a level floor does not make bodies slide.
+        assert!(angle < 2.0, "case {case:?}, {rotation}: {angle}° off");
+        assert_eq!(
+            up.confidence,
+            Confidence::Clear,
+            "case {case:?}, {rotation}"
+        );
+    }
+
     #[test]
     fn up_is_found_in_a_room_turned_in_any_way() {
         let room = furnished_room(0.04, 0.003, 2);
         let mut rng = Rng::with_seed(11);
         for case in 0..40 {
-            let rotation = random_rotation(&mut rng);
-            let up = turned(&room, rotation);
-            let angle = (rotation * Vec3::Z)
-                .angle_between(up.direction)
-                .to_degrees();
-            // 2°: within it a level floor does not make bodies slide.
-            assert!(angle < 2.0, "case {case}, {rotation}: {angle}° off");
-            assert_eq!(up.confidence, Confidence::Clear, "case {case}, {rotation}");
+            assert_up_is_found(&room, random_rotation(&mut rng), (2, case));
+        }
+    }
+
+    /// The room of the other tests with a ceiling 2.4 m over its floor.
+    fn room_with_ceiling(seed: u64) -> SampledSurface {
+        let mut room = furnished_room(0.04, 0.003, seed);
+        let mut rng = Rng::with_seed(seed);
+        for _ in 0..(4.2 * 3.6 / (0.04 * 0.04)) as usize {
+            let noise = 0.01 * (rng.f32() - 0.5);
+            room.points
+                .push(Vec3::new(4.2 * rng.f32(), 3.6 * rng.f32(), 2.4 + noise));
+            room.normals.push(-Vec3::Z);
+        }
+        room
+    }
+
+    #[test]
+    fn up_is_found_under_a_ceiling() {
+        for seed in 1..4 {
+            let room = room_with_ceiling(seed);
+            let mut rng = Rng::with_seed(seed);
+            for case in 0..12 {
+                assert_up_is_found(&room, random_rotation(&mut rng), (seed, case));
+            }
         }
     }
 

@@ -132,6 +132,10 @@ fn bodies_come_to_rest_and_equal_seeds_give_equal_reports() {
     assert_eq!(report["steps"], 120);
     assert_eq!(report["scan_points"], floor_with_block().len());
     assert!(report["up"][2].as_f64().unwrap() > 0.999);
+    // The scan is the coarser cloud: 0.65 of a diagonal of its grid of 2 cm, where the 7th
+    // neighbour is; 5 %: points at rims and edges have farther or nearer ones.
+    let mean_radius = report["mean_radius"].as_f64().unwrap();
+    assert!((mean_radius / 0.0184 - 1.0).abs() < 0.05, "{mean_radius}");
     assert!(report["contact_steps"].as_u64().unwrap() > 60);
     let bodies = report["bodies"].as_array().unwrap();
     assert_eq!(bodies.len(), 2);

@@ -1,7 +1,7 @@
 //! Points on analytic surfaces, with their true outward normals.
 
 use tldi::PointCloud;
-use tldi::glamx::{Vec2, Vec3};
+use tldi::glamx::{Pose3, Vec2, Vec3};
 
 /// Points and outward normals of a surface.
 #[derive(Clone, Debug, Default)]
@@ -28,6 +28,14 @@ impl Samples {
             .radius(radius)
             .build()
             .expect("analytic samples are valid")
+    }
+
+    /// The same surface in another frame.
+    pub fn moved(&self, pose: &Pose3) -> Self {
+        Self {
+            points: self.points.iter().map(|p| *pose * *p).collect(),
+            normals: self.normals.iter().map(|n| pose.rotation * *n).collect(),
+        }
     }
 
     fn push(&mut self, point: Vec3, normal: Vec3) {

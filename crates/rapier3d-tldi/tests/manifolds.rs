@@ -199,6 +199,22 @@ fn some_solver_contact() -> SolverContact {
     pair.manifolds()[0].data.solver_contacts[0]
 }
 
+/// Asks for the manifolds of two clouds as rapier's narrow phase does.
+fn measure(
+    tldi: &TldiPipeline,
+    pos12: &Pose,
+    shapes: &[PointCloudShape; 2],
+    prediction: f32,
+    manifolds: &mut Vec<ContactManifold>,
+    workspace: &mut Option<ContactManifoldsWorkspace>,
+) {
+    tldi.dispatcher()
+        .contact_manifolds(
+            pos12, &shapes[0], &shapes[1], prediction, manifolds, workspace,
+        )
+        .expect("clouds are answered");
+}
+
 /// Manifolds, workspace and the impulses 1, 2, 3 … written to the points, as after a solve.
 fn solved(
     tldi: &TldiPipeline,
@@ -210,16 +226,7 @@ fn solved(
 ) {
     let shapes = [shape(&square(0.6)), shape(&cube(0.1))];
     let (mut manifolds, mut workspace) = (Vec::new(), None);
-    tldi.dispatcher()
-        .contact_manifolds(
-            pos12,
-            &shapes[0],
-            &shapes[1],
-            0.02,
-            &mut manifolds,
-            &mut workspace,
-        )
-        .expect("clouds are answered");
+    measure(tldi, pos12, &shapes, 0.02, &mut manifolds, &mut workspace);
     let contact = some_solver_contact();
     let mut impulse = 0.0;
     for manifold in &mut manifolds {
@@ -252,16 +259,7 @@ fn impulses_are_inherited() {
             workspace = None;
         }
         let moved = Pose::from_translation(Vector::new(0.001, 0.098, 0.0005));
-        tldi.dispatcher()
-            .contact_manifolds(
-                &moved,
-                &shapes[0],
-                &shapes[1],
-                0.02,
-                &mut manifolds,
-                &mut workspace,
-            )
-            .expect("clouds are answered");
+        measure(&tldi, &moved, &shapes, 0.02, &mut manifolds, &mut workspace);
         let mut inherited = impulses(&manifolds);
         for point in manifolds.iter().flat_map(|m| &m.points) {
             let nearest = old
@@ -295,16 +293,7 @@ fn an_impulse_is_inherited_once() {
     (old.local_p1, old.local_p2) = (Vector::ZERO, Vector::Y * -0.098);
     let old = old.data.warmstart_impulse;
     // Contacts match within the prediction distance: the middle of the face reaches all corners.
-    tldi.dispatcher()
-        .contact_manifolds(
-            &pose,
-            &shapes[0],
-            &shapes[1],
-            0.16,
-            &mut manifolds,
-            &mut workspace,
-        )
-        .expect("clouds are answered");
+    measure(&tldi, &pose, &shapes, 0.16, &mut manifolds, &mut workspace);
     let inherited = impulses(&manifolds);
     assert!(inherited.len() >= 3, "{inherited:?}");
     assert_eq!(inherited.iter().sum::<f32>(), old);
@@ -324,16 +313,7 @@ fn stale_impulses_are_dropped() {
                 .iter_mut()
                 .for_each(|m| m.data.solver_contacts.clear());
         }
-        tldi.dispatcher()
-            .contact_manifolds(
-                &pose,
-                &shapes[0],
-                &shapes[1],
-                0.02,
-                &mut manifolds,
-                &mut workspace,
-            )
-            .expect("clouds are answered");
+        measure(&tldi, &pose, &shapes, 0.02, &mut manifolds, &mut workspace);
         let inherited = impulses(&manifolds);
         assert!(!inherited.is_empty());
         assert!(inherited.iter().all(|i| *i == 0.0), "{inherited:?}");

@@ -41,6 +41,7 @@ mod collector;
 #[cfg(feature = "e57")]
 mod e57;
 mod error;
+mod header;
 mod input;
 #[cfg(feature = "las")]
 mod las;

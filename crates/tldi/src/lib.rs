@@ -14,6 +14,7 @@ mod cpu;
 mod error;
 mod gather;
 mod knn;
+mod links;
 mod morton;
 mod normals;
 pub mod paper;

@@ -4,16 +4,15 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
-use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, Params};
+use crate::links::Links;
+use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, PairResult, Params};
 use glamx::{Vec2, Vec3};
+use std::ops::Range;
 
 /// Most patches of one pair, the deepest: a solver gains nothing from more.
 pub const MAX_PATCHES: usize = 32;
 
-/// Neighbouring pixels are linked if their points on either surface are within this many pixels ...
-const SAME_SURFACE_PX: f32 = 3.0;
-
-/// ... and belong to one group if their smoothed normals are within 30° too.
+/// Linked pixels belong to one group if their smoothed normals are within 30°.
 const SAME_GROUP: f32 = 0.866;
 
 /// A patch whose unit normals have a mean shorter than this (a spread of about 14°) is split.
@@ -25,6 +24,11 @@ const LEAST_SPLIT: usize = 12;
 /// Splits in a row: at most eight parts a group.
 const MAX_SPLITS: u32 = 3;
 
+/// Parts with normals within 10° of each other share a patch, wherever they are: a solver needs the
+/// supports of one plane together to choose the few that it takes (rapier merges manifolds within
+/// 5.1° and keeps the deepest points, which need not be those that bear the load).
+const SAME_PLANE: f32 = 0.985;
+
 /// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal.
 const NORMAL_BAND: f32 = 2.0;
 
@@ -35,11 +39,12 @@ const SUPPORT_BAND: f32 = 1.0;
 /// the support points.
 const LEAST_ROUGHNESS: f32 = 0.05;
 
+/// Band above the smallest gap, in pixels, over which the deepest point is a mean.
+const DEEPEST_BAND: f32 = 0.1;
+
 /// Variance (1 − mean length) that a surface's normals are taken to have at least: keeps the
 /// weights of two perfectly flat surfaces finite.
 const LEAST_VARIANCE: f32 = 0.01;
-
-const NONE: u32 = u32::MAX;
 
 /// A contact pixel after averaging over its linked neighbours.
 #[derive(Clone, Copy, Debug)]
@@ -55,33 +60,39 @@ struct Smooth {
 /// Memory of [`PatchScratch::reduce`], kept from call to call.
 #[derive(Debug, Default)]
 pub struct PatchScratch {
-    /// First contact pixel at each pixel of a view's rectangle.
-    map: Vec<u32>,
     /// Union-find parents; after grouping, the group of each contact pixel.
     group: Vec<u32>,
-    /// Linked contact pixels.
-    links: Vec<(u32, u32)>,
+    links: Links,
     smooth: Vec<Smooth>,
     members: Vec<u32>,
     stack: Vec<(usize, usize, u32)>,
+    parts: Vec<Part>,
+    /// Members of the parts of one patch.
+    patch: Vec<u32>,
+}
+
+/// Some of the members, and what decides which patch they belong to.
+#[derive(Debug)]
+struct Part {
+    members: Range<usize>,
+    normal: Vec3,
+    least_gap: f32,
 }
 
 impl PatchScratch {
-    /// Fills `out` with the patches of `contacts`, deepest first.
+    /// Confirms the contact pixels of `result`, settles what they say of `collides` and `gap`, and
+    /// fills its patches, deepest first.
     ///
-    /// `contacts` are ordered by view, row and column, as the stage `compare` leaves them. Cost:
-    /// linear in contact pixels but for sorting the groups.
-    pub fn reduce(
-        &mut self,
-        contacts: &[ContactPixel],
-        params: &Params,
-        out: &mut Vec<ContactPatch>,
-    ) {
+    /// The contact pixels are ordered by view, row and column, as the stage `compare` leaves them.
+    /// Cost: linear in them but for sorting the groups.
+    pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
+        self.links.find(&result.contacts, params);
+        self.links.confirm(result, params);
+        let (contacts, out) = (&result.contacts, &mut result.patches);
         out.clear();
         if contacts.is_empty() {
             return;
         }
-        self.link(contacts, params);
         self.smooth(contacts);
         self.group();
         self.members.clear();
@@ -97,6 +108,7 @@ impl PatchScratch {
             self.stack.push((start, start + part.len(), 0));
             start += part.len();
         }
+        self.parts.clear();
         while let Some((start, end, splits)) = self.stack.pop() {
             let members = &mut self.members[start..end];
             let shape = Shape::of(members, contacts, &self.smooth, params);
@@ -108,56 +120,40 @@ impl PatchScratch {
                     continue;
                 }
             }
-            shape.emit(members, contacts, &self.smooth, params, out);
+            self.parts.push(Part {
+                members: start..end,
+                normal: shape.normal,
+                least_gap: shape.least_gap,
+            });
         }
+        self.emit_planes(contacts, params, out);
         let least = |p: &ContactPatch| p.points.iter().fold(f32::INFINITY, |m, c| m.min(c.gap));
         out.sort_by(|p, q| least(p).total_cmp(&least(q)));
         out.truncate(MAX_PATCHES);
     }
 
-    /// Finds the pairs of neighbouring pixels that continue each other on both surfaces.
-    fn link(&mut self, contacts: &[ContactPixel], params: &Params) {
-        self.links.clear();
-        let limit = SAME_SURFACE_PX * params.pixel_size;
-        let mut first = 0;
-        for view in contacts.chunk_by(|c, d| c.view == d.view) {
-            let (lo, hi) = view
-                .iter()
-                .fold(([i32::MAX; 2], [i32::MIN; 2]), |(lo, hi), c| {
-                    (
-                        [0, 1].map(|k| lo[k].min(c.pixel[k])),
-                        [0, 1].map(|k| hi[k].max(c.pixel[k])),
-                    )
-                });
-            // A rim of one pixel on the left and right spares the bounds checks.
-            let width = (hi[0] - lo[0] + 3) as usize;
-            let height = (hi[1] - lo[1] + 2) as usize;
-            let at = |p: [i32; 2]| (p[1] - lo[1]) as usize * width + (p[0] - lo[0] + 1) as usize;
-            self.map.clear();
-            self.map.resize(width * height, NONE);
-            for (k, c) in view.iter().enumerate().rev() {
-                self.map[at(c.pixel)] = k as u32;
-            }
-            for (k, c) in view.iter().enumerate() {
-                let own = at(c.pixel);
-                for next in [own + 1, own + width - 1, own + width, own + width + 1] {
-                    let Some(start) = self.map.get(next).copied().filter(|&m| m != NONE) else {
-                        continue;
-                    };
-                    let same_pixel = view[start as usize].pixel;
-                    for (l, d) in view.iter().enumerate().skip(start as usize) {
-                        if d.pixel != same_pixel {
-                            break;
-                        }
-                        if c.point_a.distance(d.point_a) <= limit
-                            && c.point_b.distance(d.point_b) <= limit
-                        {
-                            self.links.push(((first + k) as u32, (first + l) as u32));
-                        }
-                    }
+    /// Pushes a patch for the parts of each plane, starting with the deepest.
+    fn emit_planes(
+        &mut self,
+        contacts: &[ContactPixel],
+        params: &Params,
+        out: &mut Vec<ContactPatch>,
+    ) {
+        self.parts
+            .sort_by(|p, q| p.least_gap.total_cmp(&q.least_gap));
+        while let Some(deepest) = self.parts.first() {
+            let plane = deepest.normal;
+            self.patch.clear();
+            self.parts.retain(|part| {
+                let in_plane = part.normal.dot(plane) >= SAME_PLANE;
+                if in_plane {
+                    let members = &self.members[part.members.clone()];
+                    self.patch.extend_from_slice(members);
                 }
-            }
-            first += view.len();
+                !in_plane
+            });
+            let shape = Shape::of(&self.patch, contacts, &self.smooth, params);
+            out.push(shape.patch(&self.patch, contacts, &self.smooth, params));
         }
     }
 
@@ -172,7 +168,7 @@ impl PatchScratch {
             normal_b: c.normal_b,
             normal: Vec3::ZERO,
         }));
-        for &(k, l) in &self.links {
+        for &(k, l) in &self.links.pairs {
             for (to, from) in [(k, l), (l, k)] {
                 let (to, from) = (&mut self.smooth[to as usize], &contacts[from as usize]);
                 to.count += 1.0;
@@ -193,7 +189,7 @@ impl PatchScratch {
     fn group(&mut self) {
         self.group.clear();
         self.group.extend(0..self.smooth.len() as u32);
-        for &(k, l) in &self.links {
+        for &(k, l) in &self.links.pairs {
             let normal = |k: u32| self.smooth[k as usize].normal;
             if normal(k).dot(normal(l)) < SAME_GROUP {
                 continue;
@@ -378,20 +374,19 @@ impl Shape {
         members.partition_point(|&m| !behind(m))
     }
 
-    /// Pushes a patch of support points and, where the middle is deeper than these by more than
-    /// the roughness (a ball's), one of the deepest point alone: a manifold takes four points.
+    /// The patch's support points and, in place of the least of these, its deepest point where
+    /// that is deeper by more than the roughness (a ball's).
     ///
     /// Support points are what the body would rest on: in each quadrant the pixel that is farthest
     /// out and lowest, a sigma of extent against a sigma of roughness. They do not depend on how
     /// far the body is tilted, so that a lifted edge stays in the manifold.
-    fn emit(
+    fn patch(
         &self,
         members: &[u32],
         contacts: &[ContactPixel],
         smooth: &[Smooth],
         params: &Params,
-        out: &mut Vec<ContactPatch>,
-    ) {
+    ) -> ContactPatch {
         let mut corners = [members[0] as usize; PATCH_POINTS];
         let mut best = [f32::NEG_INFINITY; PATCH_POINTS];
         for m in self.in_band(members, smooth, params) {
@@ -408,29 +403,40 @@ impl Shape {
             normal: self.normal,
             ..Default::default()
         };
-        let mut least_corner = f32::INFINITY;
         for (k, &m) in corners.iter().enumerate() {
             if !corners[..k].contains(&m) {
-                let gap = smooth[m].gap;
-                least_corner = least_corner.min(gap);
-                patch.points.push(self.point(contacts[m].middle(), gap));
+                let point = self.point(contacts[m].middle(), smooth[m].gap);
+                patch.points.push(point);
             }
         }
-        out.push(patch);
+        let deepest = self.deepest(members, contacts, smooth, params);
+        patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
+        if deepest.gap < patch.points[0].gap - 0.5 * self.roughness {
+            patch.points.truncate(PATCH_POINTS - 1);
+            patch.points.insert(0, deepest);
+        }
+        patch
+    }
+
+    /// Mean of the pixels with the smallest gaps.
+    fn deepest(
+        &self,
+        members: &[u32],
+        contacts: &[ContactPixel],
+        smooth: &[Smooth],
+        params: &Params,
+    ) -> ContactPoint {
         let (mut middle, mut gap, mut total) = (Vec3::ZERO, 0.0, 0.0);
         for m in self.in_band(members, smooth, params) {
-            let w = falloff(smooth[m].gap - self.least_gap, self.roughness);
+            let w = falloff(
+                smooth[m].gap - self.least_gap,
+                DEEPEST_BAND * params.pixel_size,
+            );
             middle += w * contacts[m].middle();
             gap += w * smooth[m].gap;
             total += w;
         }
-        let deepest = self.point(middle / total, gap / total);
-        if deepest.gap < least_corner - 0.5 * self.roughness {
-            out.push(ContactPatch {
-                normal: self.normal,
-                points: std::iter::once(deepest).collect(),
-            });
-        }
+        self.point(middle / total, gap / total)
     }
 
     fn point(&self, middle: Vec3, gap: f32) -> ContactPoint {

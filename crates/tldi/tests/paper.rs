@@ -1,29 +1,13 @@
 //! The paper's variant on scenes whose layers are known.
 
+mod paper_support;
+
+use paper_support::build as build_at;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Facing, Layer, Params, PointCloud, Tldi, VirtualCamera, paper};
 
 fn build(cloud: &PointCloud, camera: &VirtualCamera, params: &Params) -> Tldi {
     build_at(cloud, &Pose3::IDENTITY, camera, params)
-}
-
-fn build_at(
-    cloud: &PointCloud,
-    frame_from_cloud: &Pose3,
-    camera: &VirtualCamera,
-    params: &Params,
-) -> Tldi {
-    let mut image = Tldi::default();
-    let mut scratch = paper::Scratch::default();
-    paper::build(
-        cloud,
-        frame_from_cloud,
-        camera,
-        params,
-        &mut scratch,
-        &mut image,
-    );
-    image
 }
 
 /// Looks along z with one pixel of 1 m whose centre is on the z axis.

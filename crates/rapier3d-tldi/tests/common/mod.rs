@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test binary uses a part")]
 
+pub(crate) mod worlds;
+
 use rapier3d::glamx::Vec3Swizzles;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -36,12 +38,4 @@ pub(crate) fn cloud(points: &[Vector]) -> PointCloud<'static> {
 
 pub(crate) fn shape(points: &[Vector]) -> PointCloudShape {
     PointCloudShape::new(cloud(points))
-}
-
-/// A world and a pipeline on the CPU, attached.
-pub(crate) fn attached() -> (PhysicsWorld, TldiPipeline) {
-    let mut world = PhysicsWorld::default();
-    let tldi = TldiPipeline::new(TldiConfig::default()).expect("default settings");
-    tldi.attach(&mut world);
-    (world, tldi)
 }

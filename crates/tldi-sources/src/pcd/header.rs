@@ -1,15 +1,11 @@
 //! The header: fields, number of points, encoding.
 
-use super::bad_header;
-use crate::SourceErrorKind;
 use crate::error::Result;
 use crate::input::{BUFFER_SIZE, Input};
 use crate::scalar::{Scalar, excerpt};
 use crate::slot::{Column, Columns, Slot};
+use crate::{Format, header};
 use tldi::glamx::DVec3;
-
-/// Most lines that a header may have.
-const MAX_LINES: usize = 1000;
 
 /// How the data after the header is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,23 +43,12 @@ pub(super) struct Header {
 impl Header {
     pub(super) fn read(input: &mut Input<'_>) -> Result<Self> {
         let mut parser = Parser::default();
-        for _ in 0..MAX_LINES {
-            let Some(line) = input.line()? else {
-                let what = "the header".to_owned();
-                return Err(input.error_at_line(SourceErrorKind::Truncated { what }));
-            };
-            match parser.line(line) {
-                Ok(None) => {}
-                Ok(Some(encoding)) => {
-                    return parser
-                        .finish(encoding)
-                        .map_err(|reason| input.error_at_line(bad_header(reason)));
-                }
-                Err(reason) => return Err(input.error_at_line(bad_header(reason))),
-            }
-        }
-        let reason = format!("it has more than {MAX_LINES} lines");
-        Err(input.error_at_line(bad_header(reason)))
+        header::read(input, Format::Pcd, |line| {
+            let encoding = parser.line(line)?;
+            encoding
+                .map(|encoding| std::mem::take(&mut parser).finish(encoding))
+                .transpose()
+        })
     }
 
     /// The fields that are kept: with byte offsets, or with indices into the line in text.
@@ -125,9 +110,7 @@ impl Parser {
         if line.is_empty() || line.starts_with(b"#") {
             return Ok(None);
         }
-        let text = std::str::from_utf8(line)
-            .map_err(|_| format!("expected text, found `{}`", excerpt(line)))?;
-        let mut words = text.split_ascii_whitespace();
+        let mut words = header::text(line)?.split_ascii_whitespace();
         let key = words.next().unwrap_or_default();
         let mut strings = || words.by_ref().map(str::to_owned).collect::<Vec<_>>();
         match key {

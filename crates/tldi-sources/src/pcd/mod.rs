@@ -20,8 +20,10 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
     let header = Header::read(input)?;
     let columns = header.columns();
     if !columns.has_position() {
-        let kind = bad_header("it lacks one of the fields x, y, z".to_owned());
-        return Err(input.error_at_line(kind));
+        return Err(input.error_at_line(SourceErrorKind::Header {
+            format: Format::Pcd,
+            reason: "it lacks one of the fields x, y, z".to_owned(),
+        }));
     }
     check_count(header.points, options).map_err(|kind| input.error_at_line(kind))?;
     let mut collector = Collector::new(Layout::of(&columns), header.points, options);
@@ -37,13 +39,6 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
         .viewpoint
         .map(|viewpoint| (viewpoint - cloud.origin).as_vec3());
     Ok(cloud)
-}
-
-fn bad_header(reason: String) -> SourceErrorKind {
-    SourceErrorKind::Header {
-        format: Format::Pcd,
-        reason,
-    }
 }
 
 /// Sets the value of one column; `bits` are the first four bytes of the value.

@@ -3,10 +3,7 @@
 use crate::error::Result;
 use crate::input::Input;
 use crate::scalar::{Endian, Scalar, excerpt};
-use crate::{Format, SourceErrorKind};
-
-/// Most lines that a header may have.
-const MAX_LINES: usize = 10_000;
+use crate::{Format, header};
 
 /// How the data after the header is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,30 +65,12 @@ pub(super) struct Header {
 impl Header {
     pub(super) fn read(input: &mut Input<'_>) -> Result<Self> {
         let mut parser = Parser::default();
-        for _ in 0..MAX_LINES {
-            let Some(line) = input.line()? else {
-                let what = "the header".to_owned();
-                return Err(input.error_at_line(SourceErrorKind::Truncated { what }));
-            };
-            match parser.line(line) {
-                Ok(false) => {}
-                Ok(true) => {
-                    return parser
-                        .finish()
-                        .map_err(|reason| input.error_at_line(bad(reason)));
-                }
-                Err(reason) => return Err(input.error_at_line(bad(reason))),
-            }
-        }
-        let reason = format!("it has more than {MAX_LINES} lines");
-        Err(input.error_at_line(bad(reason)))
-    }
-}
-
-fn bad(reason: String) -> SourceErrorKind {
-    SourceErrorKind::Header {
-        format: Format::Ply,
-        reason,
+        header::read(input, Format::Ply, |line| {
+            let is_last = parser.line(line)?;
+            is_last
+                .then(|| std::mem::take(&mut parser).finish())
+                .transpose()
+        })
     }
 }
 
@@ -122,9 +101,7 @@ impl Parser {
         if line.is_empty() || line.starts_with(b"comment") || line.starts_with(b"obj_info") {
             return Ok(false);
         }
-        let text = std::str::from_utf8(line)
-            .map_err(|_| format!("expected text, found `{}`", excerpt(line)))?;
-        let words: Vec<&str> = text.split_ascii_whitespace().collect();
+        let words: Vec<&str> = header::text(line)?.split_ascii_whitespace().collect();
         match words[..] {
             ["end_header"] => return Ok(true),
             ["format", encoding, "1.0"] => self.format(encoding)?,

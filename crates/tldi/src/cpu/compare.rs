@@ -159,12 +159,8 @@ fn contact_pixels(
         if !best_seen(normal, at.others) {
             continue;
         }
-        result.gap = Some(result.gap.map_or(gap, |g| g.min(gap)));
-        // Solids that overlap by more than a layer's thickness intersect, even if their surfaces
-        // cross where this view sees them edge-on.
-        let solid = exit.facing == Facing::Exit && entry.facing == Facing::Entry;
-        result.collides |= solid && along_view < -params.merge_gap;
         if gap > params.prediction {
+            result.gap = Some(result.gap.map_or(gap, |g| g.min(gap)));
             continue;
         }
         let in_frame = |v: Vec3| at.frame_from_view.rotation * v;
@@ -196,22 +192,19 @@ fn opposed(entry: &Layer, exit: &Layer) -> bool {
 }
 
 /// Depth at which the ray entered the part of a body that it leaves through the last of `layers`:
-/// unbounded where its normal says that there is an inside but the entry was culled.
+/// unbounded where its normal says that there is an inside but the entry was culled. A ray that
+/// leaves a body twice in a row has missed a layer and tells no more than that the surface is there.
 fn entered_at(layers: &[Layer], middle: Option<f32>, params: &Params) -> f32 {
     let Some((exit, before)) = layers.split_last() else {
         return f32::INFINITY;
     };
-    let entry = |facing| {
-        before
-            .iter()
-            .rfind(move |l| l.facing == facing && !is_edge_on(l))
-    };
-    match exit.facing {
-        Facing::Exit => entry(Facing::Entry).map_or(f32::NEG_INFINITY, |l| l.depth),
-        _ => entry(Facing::Unknown).map_or_else(
-            || (exit.depth - params.merge_gap).min(middle.unwrap_or(f32::INFINITY)),
-            |l| l.depth,
-        ),
+    let thin = exit.depth - params.merge_gap;
+    let before = before.iter().rfind(|l| !is_edge_on(l));
+    match (exit.facing, before) {
+        (Facing::Exit, None) => f32::NEG_INFINITY,
+        (Facing::Exit, Some(l)) if l.facing != Facing::Entry => thin,
+        (_, Some(l)) => l.depth,
+        (_, None) => thin.min(middle.unwrap_or(f32::INFINITY)),
     }
 }
 
@@ -220,17 +213,13 @@ fn left_at(layers: &[Layer], middle: Option<f32>, params: &Params) -> f32 {
     let Some((entry, behind)) = layers.split_first() else {
         return f32::NEG_INFINITY;
     };
-    let exit = |facing| {
-        behind
-            .iter()
-            .find(move |l| l.facing == facing && !is_edge_on(l))
-    };
-    match entry.facing {
-        Facing::Entry => exit(Facing::Exit).map_or(f32::INFINITY, |l| l.depth),
-        _ => exit(Facing::Unknown).map_or_else(
-            || (entry.depth + params.merge_gap).max(middle.unwrap_or(f32::NEG_INFINITY)),
-            |l| l.depth,
-        ),
+    let thin = entry.depth + params.merge_gap;
+    let behind = behind.iter().find(|l| !is_edge_on(l));
+    match (entry.facing, behind) {
+        (Facing::Entry, None) => f32::INFINITY,
+        (Facing::Entry, Some(l)) if l.facing != Facing::Exit => thin,
+        (_, Some(l)) => l.depth,
+        (_, None) => thin.max(middle.unwrap_or(f32::NEG_INFINITY)),
     }
 }
 

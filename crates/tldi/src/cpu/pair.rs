@@ -113,8 +113,7 @@ impl Scratch {
                 }
             }
         }
-        self.patches
-            .reduce(&result.contacts, &query.params, &mut result.patches);
+        self.patches.reduce(result, &query.params);
     }
 
     fn compare_paper(

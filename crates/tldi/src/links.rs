@@ -1,0 +1,114 @@
+//! Which contact pixels continue each other, and which of them that confirms.
+
+use crate::{ContactPixel, PairResult, Params};
+
+/// Neighbouring pixels are linked if their points on either surface are within this many pixels.
+const SAME_SURFACE_PX: f32 = 3.0;
+
+/// Linked neighbours, of eight, that confirm a penetration of a layer's thickness (the merge gap);
+/// fewer confirm as much less. At the rim of a body a ray runs along its side, whose depth is
+/// uncertain, or misses a layer and seems to run inside as far as the next one. Such pixels are
+/// alone or follow the rim in rows of one or two; surfaces that truly are so deep in each other
+/// overlap over more.
+const CONFIRMING: u32 = 5;
+
+const NONE: u32 = u32::MAX;
+
+/// Pairs of neighbouring contact pixels that continue each other on both surfaces.
+#[derive(Debug, Default)]
+pub(crate) struct Links {
+    /// Indices of the contact pixels, the lower one first.
+    pub(crate) pairs: Vec<(u32, u32)>,
+    /// First contact pixel at each pixel of a view's rectangle.
+    map: Vec<u32>,
+    /// Links of each contact pixel; then its new index, or [`NONE`].
+    counts: Vec<u32>,
+}
+
+impl Links {
+    /// Finds the links of `contacts`, which are ordered by view, row and column.
+    pub(crate) fn find(&mut self, contacts: &[ContactPixel], params: &Params) {
+        self.pairs.clear();
+        let limit = SAME_SURFACE_PX * params.pixel_size;
+        let mut first = 0;
+        for view in contacts.chunk_by(|c, d| c.view == d.view) {
+            let (lo, hi) = view
+                .iter()
+                .fold(([i32::MAX; 2], [i32::MIN; 2]), |(lo, hi), c| {
+                    (
+                        [0, 1].map(|k| lo[k].min(c.pixel[k])),
+                        [0, 1].map(|k| hi[k].max(c.pixel[k])),
+                    )
+                });
+            // A rim of one pixel on the left and right spares the bounds checks.
+            let width = (hi[0] - lo[0] + 3) as usize;
+            let height = (hi[1] - lo[1] + 2) as usize;
+            let at = |p: [i32; 2]| (p[1] - lo[1]) as usize * width + (p[0] - lo[0] + 1) as usize;
+            self.map.clear();
+            self.map.resize(width * height, NONE);
+            for (k, c) in view.iter().enumerate().rev() {
+                self.map[at(c.pixel)] = k as u32;
+            }
+            for (k, c) in view.iter().enumerate() {
+                let own = at(c.pixel);
+                for next in [own + 1, own + width - 1, own + width, own + width + 1] {
+                    let Some(start) = self.map.get(next).copied().filter(|&m| m != NONE) else {
+                        continue;
+                    };
+                    let same_pixel = view[start as usize].pixel;
+                    for (l, d) in view.iter().enumerate().skip(start as usize) {
+                        if d.pixel != same_pixel {
+                            break;
+                        }
+                        if c.point_a.distance(d.point_a) <= limit
+                            && c.point_b.distance(d.point_b) <= limit
+                        {
+                            self.pairs.push(((first + k) as u32, (first + l) as u32));
+                        }
+                    }
+                }
+            }
+            first += view.len();
+        }
+    }
+
+    /// Cuts the penetrations of `result` to what neighbours confirm: contact pixels deeper than a
+    /// layer are removed, with their links, others still touch. Those that are left decide on
+    /// `collides` and `gap`.
+    pub(crate) fn confirm(&mut self, result: &mut PairResult, params: &Params) {
+        let is_deep =
+            |c: &ContactPixel| c.point_a.distance(c.point_b) > params.merge_gap && c.gap < 0.0;
+        self.counts.clear();
+        self.counts.resize(result.contacts.len(), 0);
+        for &(k, l) in &self.pairs {
+            self.counts[k as usize] += 1;
+            self.counts[l as usize] += 1;
+        }
+        let mut kept = 0;
+        for (count, contact) in self.counts.iter_mut().zip(&mut result.contacts) {
+            if *count < CONFIRMING {
+                if is_deep(contact) {
+                    *count = NONE;
+                    continue;
+                }
+                let confirmed = *count as f32 / CONFIRMING as f32 * params.merge_gap;
+                contact.gap = contact.gap.max(-confirmed);
+            }
+            *count = kept;
+            kept += 1;
+            // Solids that overlap by more than a layer's thickness intersect, even if their
+            // surfaces cross where no view sees them well.
+            result.collides |= is_deep(contact);
+            result.gap = Some(result.gap.map_or(contact.gap, |g| g.min(contact.gap)));
+        }
+        let new_index = &self.counts;
+        let mut index = new_index.iter();
+        result
+            .contacts
+            .retain(|_| index.next().is_some_and(|&k| k != NONE));
+        self.pairs.retain_mut(|(k, l)| {
+            (*k, *l) = (new_index[*k as usize], new_index[*l as usize]);
+            *k != NONE && *l != NONE
+        });
+    }
+}

@@ -1,0 +1,144 @@
+//! Clouds against surfaces known exactly, which are seen by rays.
+
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{Aabb, Backend, BackendError, CpuBackend, Params, RayHit, RaySurface, Surface};
+use tldi_tests::{aimed, compare, deepest_point, random_pose, random_unit, sampled_sphere};
+
+/// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
+const R: f32 = 0.01;
+
+/// A ball known exactly, to check images made by rays.
+struct Ball(f32);
+
+impl RaySurface for Ball {
+    fn bounds(&self) -> Aabb {
+        Aabb {
+            min: Vec3::splat(-self.0),
+            max: Vec3::splat(self.0),
+        }
+    }
+
+    fn crossings(&self, origin: Vec3, direction: Vec3, max_distance: f32, hits: &mut Vec<RayHit>) {
+        let along = -origin.dot(direction);
+        let squared = self.0 * self.0 - (origin + along * direction).length_squared();
+        if squared > 0.0 {
+            let half = squared.sqrt();
+            for distance in [along - half, along + half] {
+                if (0.0..=max_distance).contains(&distance) {
+                    let normal = (origin + distance * direction) / self.0;
+                    hits.push(RayHit { distance, normal });
+                }
+            }
+        }
+    }
+
+    fn project(&self, point: Vec3) -> (f32, Vec3) {
+        (point.length() - self.0, point.normalize_or(Vec3::Y))
+    }
+
+    fn is_closed(&self) -> bool {
+        true
+    }
+}
+
+/// The half-space y < 0.
+struct Ground;
+
+impl RaySurface for Ground {
+    fn bounds(&self) -> Aabb {
+        Aabb {
+            min: Vec3::NEG_INFINITY,
+            max: Vec3::new(f32::INFINITY, 0.0, f32::INFINITY),
+        }
+    }
+
+    fn crossings(&self, origin: Vec3, direction: Vec3, max_distance: f32, hits: &mut Vec<RayHit>) {
+        let distance = -origin.y / direction.y;
+        if (0.0..=max_distance).contains(&distance) {
+            hits.push(RayHit {
+                distance,
+                normal: Vec3::Y,
+            });
+        }
+    }
+
+    fn project(&self, point: Vec3) -> (f32, Vec3) {
+        (point.y, Vec3::Y)
+    }
+
+    fn is_closed(&self) -> bool {
+        true
+    }
+}
+
+/// A cloud wholly inside a solid, deeper than it is wide, is pushed out the shortest way.
+#[test]
+fn clouds_deep_inside_exact_solids() {
+    let radius = 0.08;
+    let cloud = sampled_sphere(radius, R).cloud(R);
+    let surfaces: [&dyn RaySurface; 2] = [&Ball(0.6), &Ground];
+    for (surface, height) in surfaces.into_iter().zip([0.3, -0.3]) {
+        let result = compare(
+            Surface::Exact(surface),
+            Surface::Cloud(&cloud),
+            Pose3::translation(0.0, height, 0.0),
+            Params::for_radius(R),
+        );
+        assert!(result.collides);
+        assert!(result.patches[0].normal.y > 0.99, "{:?}", result.patches);
+        let gap = deepest_point(&result).expect("there is a patch").0;
+        assert!((gap + 0.3 + radius).abs() < 0.45 * R, "{gap}");
+    }
+}
+
+/// A cloud against exact surfaces, in both orders: sphere on ball and sphere on half-space.
+#[test]
+fn clouds_against_exact_surfaces() {
+    let mut rng = fastrand::Rng::with_seed(5);
+    let radius = 0.08;
+    let cloud = sampled_sphere(radius, R).cloud(R);
+    for _ in 0..100 {
+        let gap = (1.5 - 4.5 * rng.f32()) * R;
+        let direction = random_unit(&mut rng);
+        let turn = random_pose(&mut rng, 0.0);
+        let mut on_ball = turn;
+        on_ball.translation = direction * (0.1 + radius + gap);
+        let mut on_ground = turn;
+        on_ground.translation = Vec3::new(rng.f32(), radius + gap, rng.f32());
+        let cases: [(&dyn RaySurface, Pose3, Vec3); 2] = [
+            (&Ball(0.1), on_ball, direction),
+            (&Ground, on_ground, Vec3::Y),
+        ];
+        for (surface, exact_from_cloud, normal) in cases {
+            let params = Params::for_radius(R);
+            let (exact, cloud) = (Surface::Exact(surface), Surface::Cloud(&cloud));
+            let first = compare(exact, cloud, exact_from_cloud, params);
+            let second = compare(cloud, exact, exact_from_cloud.inverse(), params);
+            let turned = exact_from_cloud.rotation.inverse() * -normal;
+            for (result, normal) in [(first, normal), (second, turned)] {
+                let found = deepest_point(&result).expect("there is a patch").0;
+                let error = (found - gap).abs();
+                assert!(
+                    error < 0.45 * R,
+                    "gap {gap}, normal {normal}: off by {error}"
+                );
+                let angle = result.patches[0].normal.angle_between(normal).to_degrees();
+                assert!(angle < 3.0, "gap {gap}: normal off by {angle}°");
+            }
+        }
+    }
+}
+
+/// What cannot be compared is refused with the place in the batch.
+#[test]
+fn unsupported_pairs_are_named() {
+    let (ground, ball) = (Surface::Exact(&Ground), Surface::Exact(&Ball(1.0)));
+    let query = aimed(ground, ball, Pose3::IDENTITY, Params::for_radius(R));
+    let error = CpuBackend::new()
+        .compare(&[query], &mut Vec::new())
+        .expect_err("no cloud");
+    assert!(
+        matches!(error, BackendError::Unsupported { pair: 0, .. }),
+        "{error}"
+    );
+}

@@ -1,0 +1,48 @@
+//! One pair at a time, compared on the CPU.
+
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{Backend, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View};
+
+/// A query that aims its own camera, the second surface lying where its pose puts it.
+pub fn aimed<'a>(a: Surface<'a>, b: Surface<'a>, a_from_b: Pose3, params: Params) -> PairQuery<'a> {
+    PairQuery {
+        a,
+        b,
+        a_from_b,
+        view: View::Aim {
+            toward_b: a_from_b.translation,
+            last_axis: None,
+        },
+        params,
+    }
+}
+
+/// Compares two surfaces with [`aimed`] cameras and cold memory.
+pub fn compare(a: Surface, b: Surface, a_from_b: Pose3, params: Params) -> PairResult {
+    let mut results = Vec::new();
+    CpuBackend::new()
+        .compare(&[aimed(a, b, a_from_b, params)], &mut results)
+        .expect("the query is supported");
+    results.remove(0)
+}
+
+/// Compares two clouds of mean radius `radius`, metres, with the default parameters.
+pub fn compare_clouds(
+    a: &PointCloud<'_>,
+    b: &PointCloud<'_>,
+    a_from_b: Pose3,
+    radius: f32,
+) -> PairResult {
+    let (a, b) = (Surface::Cloud(a), Surface::Cloud(b));
+    compare(a, b, a_from_b, Params::for_radius(radius))
+}
+
+/// Gap and place (midway between the surfaces) of the deepest of all patch points, metres.
+pub fn deepest_point(result: &PairResult) -> Option<(f32, Vec3)> {
+    result
+        .patches
+        .iter()
+        .flat_map(|patch| &patch.points)
+        .min_by(|p, q| p.gap.total_cmp(&q.gap))
+        .map(|p| (p.gap, 0.5 * (p.point_a + p.point_b)))
+}
