@@ -39,12 +39,12 @@ fn spheres() {
             let mut pose = random_pose(&mut rng, 0.0);
             pose.translation = direction * (ra + rb + gap);
             let result = clouds(&a, &b, pose);
-            // Smoothing over 3 × 3 pixels lifts the middle of a contact of this curvature
-            // (1/0.1 + 1/0.07 per metre) by 0.16 r̄; splats of 1 r̄ blur as much again.
+            // Splats of 1 r̄ blur a contact of this curvature (1/0.1 + 1/0.07 per metre) by
+            // 0.1 r̄; the rest is the sampling.
             let (found, place) = deepest_point(&result).expect("there is a patch");
             let error = (found - gap).abs();
             assert!(
-                error < 0.45 * R,
+                error < 0.2 * R,
                 "gap {gap}, direction {direction}: off by {error}"
             );
             sum_aside += place.distance(direction * (ra + 0.5 * gap));
@@ -70,10 +70,10 @@ fn spheres() {
             }
         }
     }
-    // The gap is flat around its middle (1 r̄ aside it is 0.1 r̄ wider), but support points are
-    // farther out: where a ball touches is given by a point of its own.
+    // The gap is flat around its middle (1 r̄ aside it is 0.1 r̄ wider): its least is found to a
+    // pixel.
     let mean_aside = sum_aside / 600.0;
-    assert!(mean_aside < 0.6 * R, "{mean_aside} m aside on average");
+    assert!(mean_aside < R, "{mean_aside} m aside on average");
     // Closer than half a radius the pixel grid may decide otherwise, once in a hundred.
     assert!(wrong <= 6, "{wrong} of 600 wrong between 0.3 and 0.5 r̄");
 }
@@ -145,10 +145,11 @@ fn box_on_plane() {
                         })
                         .expect("there are four");
                     // The diagonal of one and a half pixels, and half the gap. Without true
-                    // normals the splats at the edges mix in the side walls, for 3 pixels.
+                    // normals the splats at the edges mix in the side walls, for 3 pixels, and the
+                    // fit of the gaps reaches 2 pixels farther.
                     let (reach, tolerance) = match boxed.normals() {
                         Some(_) => (2.2 * R, 0.02 * R),
-                        None => (5.2 * R, 0.4 * R),
+                        None => (6.2 * R, 0.4 * R),
                     };
                     let limit = reach + 0.5 * gap.abs();
                     assert!(

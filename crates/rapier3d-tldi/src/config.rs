@@ -18,11 +18,12 @@ pub struct TldiConfig {
     /// Edge of a pixel in mean radii of the pair's coarser cloud, greater than 0. 1 resolves the
     /// most that the points tell; 2 averages noise as large as the radii.
     pub pixel_scale: f32,
-    /// Contacts are kept, riding on their bodies, until the pair has moved by this much relative
-    /// to each other since they were measured, in mean radii of its coarser cloud. Less than what a
-    /// comparison scatters by, so nothing is lost, and bodies come to rest; 0 measures in every
-    /// step.
-    pub kept_drift: f32,
+    /// By how much measured gaps scatter from one comparison to the next, in mean radii of the
+    /// pair's coarser cloud. A solver that was fed this noise would keep bodies from coming to
+    /// rest, so contacts are kept, riding on their bodies, until the pair has moved by as much
+    /// relative to each other, and a penetration that is measured then pushes only by what it is
+    /// deeper. 0 measures in every step and pushes out all of it.
+    pub scatter: f32,
 }
 
 impl Default for TldiConfig {
@@ -30,7 +31,7 @@ impl Default for TldiConfig {
         Self {
             variant: Variant::default(),
             pixel_scale: 1.0,
-            kept_drift: 0.1,
+            scatter: 0.1,
         }
     }
 }
@@ -56,9 +57,9 @@ impl TldiConfig {
             "it must be finite and greater than 0",
         )?;
         check(
-            "kept_drift",
-            self.kept_drift,
-            self.kept_drift >= 0.0,
+            "scatter",
+            self.scatter,
+            self.scatter >= 0.0,
             "it must be finite and not negative",
         )?;
         Ok(self)

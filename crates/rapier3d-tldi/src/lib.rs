@@ -63,6 +63,7 @@ mod mass;
 mod measured;
 mod parts;
 mod pipeline;
+mod planes;
 pub mod prelude;
 mod prepared;
 mod report;

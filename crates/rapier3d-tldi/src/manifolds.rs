@@ -7,6 +7,7 @@
 
 use crate::measured::Measured;
 use crate::parts::{PartPair, ShapePair, part};
+use crate::planes::share_planes;
 use rapier3d::geometry::{ContactManifold, ContactManifoldData};
 use rapier3d::parry::query::details::{
     ContactManifoldsWorkspace, TypedWorkspaceData, WorkspaceData,
@@ -49,15 +50,8 @@ pub(crate) fn keep(
         return false;
     }
     for manifold in manifolds {
-        let mut a_from_b = pair.pos12;
-        if let Some(pose2) = manifold.subshape_pos2() {
-            a_from_b *= *pose2;
-        }
-        if let Some(pose1) = manifold.subshape_pos1() {
-            a_from_b = pose1.inv_mul(&a_from_b);
-        }
-        manifold.local_n2 = a_from_b.rotation.inverse() * -manifold.local_n1;
-        manifold.update_separations(&a_from_b);
+        manifold.local_n2 = pair.pos12.rotation.inverse() * -manifold.local_n1;
+        manifold.update_separations(&pair.pos12);
     }
     true
 }
@@ -79,34 +73,55 @@ pub(crate) fn fill(
     std::mem::swap(manifolds, previous);
     // `manifolds` now holds those of two steps ago, of use for their memory only.
     let mut filled = 0;
+    let (mut match_distance, mut scatter) = (pair.prediction, 0.0);
     for part_pair in parts {
         let first = filled;
-        let match_distance = match &part_pair.comparison {
+        match &part_pair.comparison {
             Some(comparison) => {
                 for patch in &results[comparison.query].patches {
                     if !patch.points.is_empty() {
-                        write_patch(patch, part_pair, emptied(manifolds, filled));
+                        let manifold = emptied(manifolds, filled);
+                        write_patch(patch, part_pair, comparison.scatter, manifold);
                         filled += 1;
                     }
                 }
-                comparison.match_distance()
+                match_distance = f32::max(match_distance, comparison.match_distance());
+                scatter = f32::max(scatter, comparison.scatter);
             }
             None => {
                 manifolds.truncate(filled);
                 append_exact(pair, part_pair, manifolds);
                 filled = manifolds.len();
-                pair.prediction
             }
-        };
+        }
         for manifold in &mut manifolds[first..filled] {
-            manifold.subshape1 = part_pair.parts[0];
-            manifold.subshape2 = part_pair.parts[1];
-            manifold.set_subshape_pos1(part_pair.poses[0]);
-            manifold.set_subshape_pos2(part_pair.poses[1]);
-            inherit_impulses(manifold, previous, match_distance);
+            place(manifold, part_pair);
         }
     }
     manifolds.truncate(filled);
+    if parts.len() > 1 {
+        share_planes(pair, scatter, manifolds);
+    }
+    for manifold in manifolds {
+        inherit_impulses(manifold, previous, match_distance);
+    }
+}
+
+/// Moves a manifold from the frames of the parts to those of the colliders.
+fn place(manifold: &mut ContactManifold, parts: &PartPair) {
+    [manifold.subshape1, manifold.subshape2] = parts.parts;
+    if let Some(pose1) = parts.poses[0] {
+        manifold.local_n1 = pose1.rotation * manifold.local_n1;
+        for point in &mut manifold.points {
+            point.local_p1 = pose1 * point.local_p1;
+        }
+    }
+    if let Some(pose2) = parts.poses[1] {
+        manifold.local_n2 = pose2.rotation * manifold.local_n2;
+        for point in &mut manifold.points {
+            point.local_p2 = pose2 * point.local_p2;
+        }
+    }
 }
 
 /// The pair's workspace; a new one where it has none of ours.
@@ -139,17 +154,26 @@ fn emptied(manifolds: &mut Vec<ContactManifold>, index: usize) -> &mut ContactMa
     manifold
 }
 
-fn write_patch(patch: &ContactPatch, pair: &PartPair, manifold: &mut ContactManifold) {
+/// Writes the points of `patch`, both sides moved apart by what penetration is within `scatter`,
+/// metres.
+fn write_patch(
+    patch: &ContactPatch,
+    pair: &PartPair,
+    scatter: f32,
+    manifold: &mut ContactManifold,
+) {
     let b_from_a = pair.a_from_b.inverse();
     manifold.local_n1 = patch.normal;
     manifold.local_n2 = b_from_a.rotation * -patch.normal;
     manifold.points.extend(patch.points.iter().map(|point| {
+        let gap = point.gap.max((point.gap + scatter).min(0.0));
+        let apart = 0.5 * (gap - point.gap) * patch.normal;
         TrackedContact::new(
-            point.point_a,
-            b_from_a * point.point_b,
+            point.point_a - apart,
+            b_from_a * (point.point_b + apart),
             PackedFeatureId::UNKNOWN, // points of a cloud are no features
             PackedFeatureId::UNKNOWN,
-            point.gap,
+            gap,
         )
     }));
 }
@@ -182,16 +206,12 @@ fn inherit_impulses(
     match_distance: f32,
 ) {
     let normal = manifold.local_n1;
-    let subshapes = [manifold.subshape1, manifold.subshape2];
     let mut inherits_user_data = true;
     for point in &mut manifold.points {
         let mut nearest = None;
         let mut nearest_squared = match_distance * match_distance;
         for (m, old) in previous.iter().enumerate() {
-            if [old.subshape1, old.subshape2] != subshapes
-                || old.data.solver_contacts.is_empty()
-                || old.local_n1.dot(normal) < COS_SAME_NORMAL
-            {
+            if old.data.solver_contacts.is_empty() || old.local_n1.dot(normal) < COS_SAME_NORMAL {
                 continue;
             }
             for (p, old_point) in old.points.iter().enumerate() {

@@ -1,9 +1,9 @@
 //! Until when measured contacts hold.
 //!
-//! Every comparison samples the surfaces anew and its depths scatter by some hundredths of the
-//! coarser cloud's point radius. Fed to a solver in every step, this noise keeps bodies from coming to rest. So
-//! contacts are measured only once the pair has moved by as much as that; until then the points
-//! that were found ride on their bodies. Rapier does the same for its own shapes
+//! Every comparison samples the surfaces anew and its depths scatter by up to a tenth of the coarser
+//! cloud's point radius. Fed to a solver in every step, this noise keeps bodies from coming to
+//! rest. So contacts are measured only once the pair has moved by as much as that; until then the
+//! points that were found ride on their bodies. Rapier does the same for its own shapes
 //! (`contact_recycling`), with a distance that does not know how fine the cloud is.
 
 use crate::TldiConfig;
@@ -40,7 +40,7 @@ impl Measured {
             .chain(clouds_of(pair.shape2))
             .map(|cloud| cloud.mean_radius())
             .reduce(f32::max)?;
-        let max_drift = config.kept_drift * coarsest;
+        let max_drift = config.scatter * coarsest;
         let bounds = [pair.shape1, pair.shape2].map(|shape| shape.compute_local_aabb());
         let size = bounds.map(|bounds| bounds.extents().length_squared());
         let shape1_is_smaller = size[0] < size[1];

@@ -93,6 +93,8 @@ pub(crate) struct PartPair {
 pub(crate) struct Comparison {
     view: View,
     params: Params,
+    /// Penetration in metres up to which surfaces just touch: what its measurement scatters by.
+    pub(crate) scatter: f32,
     /// Place in the batch.
     pub(crate) query: usize,
 }
@@ -149,6 +151,7 @@ pub(crate) fn append_part_pairs<'a>(
                         last_axis,
                     },
                     params: config.params(radius, prediction),
+                    scatter: config.scatter * radius,
                     query,
                 }
             });

@@ -11,7 +11,7 @@ pub struct StepReport {
     /// Pairs of colliders that were compared in one batch before the step.
     pub pairs_batched: usize,
     /// Pairs that were not compared because the contacts of an earlier step still hold
-    /// ([`TldiConfig::kept_drift`](crate::TldiConfig::kept_drift)).
+    /// ([`TldiConfig::scatter`](crate::TldiConfig::scatter)).
     pub pairs_kept: usize,
     /// Pairs that rapier asked for and the batch did not hold (their poses or shapes changed after
     /// it, or rapier split the step): compared on the spot, one by one.
@@ -72,8 +72,6 @@ pub(crate) fn contacts_of<'a>(
         .map(|(collider1, collider2)| (*collider1.position(), *collider2.position()));
     poses.into_iter().flat_map(move |(pose1, pose2)| {
         pair.manifolds().iter().flat_map(move |manifold| {
-            let pose1 = manifold.subshape_pos1().map_or(pose1, |part| pose1 * *part);
-            let pose2 = manifold.subshape_pos2().map_or(pose2, |part| pose2 * *part);
             manifold.points.iter().map(move |point| Contact {
                 collider1: pair.collider1,
                 collider2: pair.collider2,

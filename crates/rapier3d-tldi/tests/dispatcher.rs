@@ -13,9 +13,18 @@ use rapier3d_tldi::prelude::*;
 
 const PREDICTION: f32 = 0.02;
 
+/// A dispatcher that passes on what was measured.
 fn dispatcher() -> TldiDispatcher {
-    TldiPipeline::new(TldiConfig::default())
-        .expect("default settings")
+    dispatcher_with_scatter(0.0)
+}
+
+fn dispatcher_with_scatter(scatter: f32) -> TldiDispatcher {
+    let config = TldiConfig {
+        scatter,
+        ..TldiConfig::default()
+    };
+    TldiPipeline::new(config)
+        .expect("valid settings")
         .dispatcher()
 }
 
@@ -83,6 +92,31 @@ fn both_orders_mirror_each_other() {
         assert!((gap + 0.02).abs() < 0.15 * SPACING, "{label}: {gap}");
         let aside = (point - Vector::new(0.07, 0.0, -0.05)).with_y(0.0);
         assert!(aside.length() < 1.5 * SPACING, "{label}: {point:?}");
+    }
+}
+
+/// A penetration within the scatter of measurements touches, a deeper one counts by what it is
+/// deeper, and gaps stay.
+#[test]
+fn penetrations_count_beyond_the_scatter() {
+    let (floor, body) = (shape(&square(0.6)), shape(&cube(0.1)));
+    let scatter = 0.1 * floor.cloud().mean_radius();
+    for depth in [-0.005, 0.5 * scatter, 2.0 * scatter, 0.02] {
+        let pose = Pose::from_translation(Vector::Y * (0.1 - depth));
+        let gaps = |scatter| {
+            contacts(&dispatcher_with_scatter(scatter), &pose, &floor, &body)
+                .expect("answered")
+                .into_iter()
+                .map(|(middle, _, gap)| (middle, gap))
+        };
+        let mut count = 0;
+        for ((middle, measured), (same_middle, gap)) in gaps(0.0).zip(gaps(0.1)) {
+            let expected = measured.max((measured + scatter).min(0.0));
+            assert!((gap - expected).abs() < 1e-6, "{measured}: {gap}");
+            assert!(middle.distance(same_middle) < 1e-6);
+            count += 1;
+        }
+        assert!(count >= 4, "{count} contacts at depth {depth}");
     }
 }
 

@@ -103,7 +103,7 @@ fn ordeal(
         rng: fastrand::Rng::with_seed(seed),
     };
     let config = TldiConfig {
-        kept_drift: if kept { 0.05 } else { 0.0 },
+        scatter: if kept { 0.05 } else { 0.0 },
         ..TldiConfig::default()
     };
     let mut tldi = TldiPipeline::with_backend(config, Box::new(backend))?;
@@ -179,7 +179,7 @@ fn manifolds_survive_everything() -> Result<(), Box<dyn Error>> {
 /// A pipeline that measures in every step.
 fn measuring_pipeline() -> TldiPipeline {
     TldiPipeline::new(TldiConfig {
-        kept_drift: 0.0,
+        scatter: 0.0,
         ..TldiConfig::default()
     })
     .expect("valid settings")

@@ -76,8 +76,8 @@ fn detached_world_is_refused() -> TestResult {
 
 #[test]
 fn bad_settings_are_refused() {
-    let with_drift = |kept_drift| TldiConfig {
-        kept_drift,
+    let with_drift = |scatter| TldiConfig {
+        scatter,
         ..TldiConfig::default()
     };
     let with_scale = |pixel_scale| TldiConfig {
@@ -89,7 +89,7 @@ fn bad_settings_are_refused() {
         _ => None,
     };
     for bad in [-1.0, f32::NAN, f32::INFINITY] {
-        assert_eq!(refused(with_drift(bad)), Some("kept_drift"), "{bad}");
+        assert_eq!(refused(with_drift(bad)), Some("scatter"), "{bad}");
         assert_eq!(refused(with_scale(bad)), Some("pixel_scale"), "{bad}");
     }
     assert_eq!(refused(with_drift(0.0)), None);

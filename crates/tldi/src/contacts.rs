@@ -45,6 +45,13 @@ pub struct ContactPoint {
     pub gap: f32,
 }
 
+impl ContactPoint {
+    /// Midway between the surfaces, metres.
+    pub fn middle(&self) -> Vec3 {
+        0.5 * (self.point_a + self.point_b)
+    }
+}
+
 /// Most points in one patch: what a solver manifold takes.
 pub const PATCH_POINTS: usize = 4;
 

@@ -12,6 +12,7 @@ mod cloud;
 mod contacts;
 mod cpu;
 mod error;
+mod gap_fit;
 mod gather;
 mod knn;
 mod links;
@@ -21,6 +22,7 @@ pub mod paper;
 mod params;
 mod patches;
 mod radii;
+mod supports;
 mod surface;
 #[allow(clippy::module_inception, reason = "the image is the crate's namesake")]
 mod tldi;
@@ -38,6 +40,7 @@ pub use glamx;
 pub use knn::{KdTree, Neighbor};
 pub use params::{Params, Variant};
 pub use patches::{MAX_PATCHES, PatchScratch};
+pub use supports::{Supports, supports};
 pub use surface::{RayHit, RaySurface, Surface};
 
 /// A view axis is kept from frame to frame while the zone's normals agree with it within this

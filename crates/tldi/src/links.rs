@@ -23,6 +23,9 @@ pub(crate) struct Links {
     map: Vec<u32>,
     /// Links of each contact pixel; then its new index, or [`NONE`].
     counts: Vec<u32>,
+    /// Where the neighbours of each contact pixel start in `neighbors`, and their end.
+    starts: Vec<u32>,
+    neighbors: Vec<u32>,
 }
 
 impl Links {
@@ -110,5 +113,37 @@ impl Links {
             (*k, *l) = (new_index[*k as usize], new_index[*l as usize]);
             *k != NONE && *l != NONE
         });
+        self.index(result.contacts.len());
+    }
+
+    /// Contact pixels linked with `k`.
+    pub(crate) fn neighbors(&self, k: u32) -> &[u32] {
+        let k = k as usize;
+        &self.neighbors[self.starts[k] as usize..self.starts[k + 1] as usize]
+    }
+
+    /// Fills what [`neighbors`](Self::neighbors) returns, for `contacts` contact pixels.
+    fn index(&mut self, contacts: usize) {
+        self.starts.clear();
+        self.starts.resize(contacts + 1, 0);
+        for &(k, l) in &self.pairs {
+            self.starts[k as usize] += 1;
+            self.starts[l as usize] += 1;
+        }
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
+        }
+        // Filled from the end, so that each start ends up where it belongs.
+        self.neighbors.clear();
+        self.neighbors.resize(end as usize, 0);
+        for &(k, l) in &self.pairs {
+            for (of, neighbor) in [(k, l), (l, k)] {
+                let slot = &mut self.starts[of as usize];
+                *slot -= 1;
+                self.neighbors[*slot as usize] = neighbor;
+            }
+        }
     }
 }

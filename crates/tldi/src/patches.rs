@@ -4,7 +4,9 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
+use crate::gap_fit::fitted_gap;
 use crate::links::Links;
+use crate::supports::{Supports, supports};
 use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, PairResult, Params};
 use glamx::{Vec2, Vec3};
 use std::ops::Range;
@@ -32,7 +34,7 @@ const SAME_PLANE: f32 = 0.985;
 /// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal.
 const NORMAL_BAND: f32 = 2.0;
 
-/// Band whose pixels can be support points.
+/// Band whose pixels can be support points and decide where a part is split.
 const SUPPORT_BAND: f32 = 1.0;
 
 /// The gaps of a patch are taken to be at least this rough, in pixels: below, extent alone chooses
@@ -42,6 +44,10 @@ const LEAST_ROUGHNESS: f32 = 0.05;
 /// Band above the smallest gap, in pixels, over which the deepest point is a mean.
 const DEEPEST_BAND: f32 = 0.1;
 
+/// By how much that point must be deeper than the support points to count, in roughnesses: on flat
+/// faces it is noise, and four corners bear more than three.
+const DEEPER: f32 = 0.4;
+
 /// Variance (1 − mean length) that a surface's normals are taken to have at least: keeps the
 /// weights of two perfectly flat surfaces finite.
 const LEAST_VARIANCE: f32 = 0.01;
@@ -49,7 +55,6 @@ const LEAST_VARIANCE: f32 = 0.01;
 /// A contact pixel after averaging over its linked neighbours.
 #[derive(Clone, Copy, Debug)]
 struct Smooth {
-    count: f32,
     gap: f32,
     normal_a: Vec3,
     normal_b: Vec3,
@@ -67,8 +72,9 @@ pub struct PatchScratch {
     members: Vec<u32>,
     stack: Vec<(usize, usize, u32)>,
     parts: Vec<Part>,
-    /// Members of the parts of one patch.
+    /// Members of the parts of one patch, and those that can be support points.
     patch: Vec<u32>,
+    points: Vec<ContactPoint>,
 }
 
 /// Some of the members, and what decides which patch they belong to.
@@ -98,7 +104,8 @@ impl PatchScratch {
         self.members.clear();
         self.members.extend(0..contacts.len() as u32);
         let group = &self.group;
-        self.members.sort_by_key(|&m| (group[m as usize], m));
+        self.members
+            .sort_unstable_by_key(|&m| (group[m as usize], m));
         self.stack.clear();
         let mut start = 0;
         for part in self
@@ -127,8 +134,6 @@ impl PatchScratch {
             });
         }
         self.emit_planes(contacts, params, out);
-        let least = |p: &ContactPatch| p.points.iter().fold(f32::INFINITY, |m, c| m.min(c.gap));
-        out.sort_by(|p, q| least(p).total_cmp(&least(q)));
         out.truncate(MAX_PATCHES);
     }
 
@@ -139,8 +144,9 @@ impl PatchScratch {
         params: &Params,
         out: &mut Vec<ContactPatch>,
     ) {
-        self.parts
-            .sort_by(|p, q| p.least_gap.total_cmp(&q.least_gap));
+        self.parts.sort_unstable_by(|p, q| {
+            (p.least_gap.total_cmp(&q.least_gap)).then(p.members.start.cmp(&q.members.start))
+        });
         while let Some(deepest) = self.parts.first() {
             let plane = deepest.normal;
             self.patch.clear();
@@ -153,35 +159,35 @@ impl PatchScratch {
                 !in_plane
             });
             let shape = Shape::of(&self.patch, contacts, &self.smooth, params);
-            out.push(shape.patch(&self.patch, contacts, &self.smooth, params));
+            out.push(shape.patch(
+                &self.patch,
+                contacts,
+                &self.smooth,
+                &mut self.points,
+                params,
+            ));
         }
     }
 
-    /// Averages gaps and normals over linked neighbours: what is left of a sensor's noise is a
-    /// third or less.
+    /// Averages normals over linked neighbours and fits the gaps to them: what is left of a sensor's
+    /// noise is a third.
     fn smooth(&mut self, contacts: &[ContactPixel]) {
         self.smooth.clear();
-        self.smooth.extend(contacts.iter().map(|c| Smooth {
-            count: 1.0,
-            gap: c.gap,
-            normal_a: c.normal_a,
-            normal_b: c.normal_b,
-            normal: Vec3::ZERO,
-        }));
-        for &(k, l) in &self.links.pairs {
-            for (to, from) in [(k, l), (l, k)] {
-                let (to, from) = (&mut self.smooth[to as usize], &contacts[from as usize]);
-                to.count += 1.0;
-                to.gap += from.gap;
-                to.normal_a += from.normal_a;
-                to.normal_b += from.normal_b;
+        for (k, contact) in contacts.iter().enumerate() {
+            let (mut normal_a, mut normal_b) = (contact.normal_a, contact.normal_b);
+            let neighbors = self.links.neighbors(k as u32);
+            for neighbor in neighbors.iter().map(|&l| &contacts[l as usize]) {
+                normal_a += neighbor.normal_a;
+                normal_b += neighbor.normal_b;
             }
-        }
-        for (s, c) in self.smooth.iter_mut().zip(contacts) {
-            s.gap /= s.count;
-            s.normal_a /= s.count;
-            s.normal_b /= s.count;
-            s.normal = common_normal(s.normal_a, s.normal_b).unwrap_or_else(|| c.normal());
+            let count = 1.0 + neighbors.len() as f32;
+            let (normal_a, normal_b) = (normal_a / count, normal_b / count);
+            self.smooth.push(Smooth {
+                gap: fitted_gap(k as u32, contacts, &self.links),
+                normal_a,
+                normal_b,
+                normal: common_normal(normal_a, normal_b).unwrap_or_else(|| contact.normal()),
+            });
         }
     }
 
@@ -236,22 +242,15 @@ fn least_gap(members: &[u32], smooth: &[Smooth]) -> f32 {
         .fold(f32::INFINITY, |g, &m| g.min(smooth[m as usize].gap))
 }
 
-/// Normal and main directions of a patch.
+/// Normal and main direction of a part.
 struct Shape {
     normal: Vec3,
     /// Length of the mean of the contact pixels' unit normals: 1 where they agree.
     normal_length: f32,
     least_gap: f32,
     centre: Vec3,
-    /// Across the normal: the direction of largest extent, and the one across it.
-    axes: [Vec3; 2],
-    /// Standard deviations along the axes, metres.
-    sigma: [f32; 2],
-    /// Mean gap of the support band, metres, and its slope per sigma along the axes.
-    mean_gap: f32,
-    slope: [f32; 2],
-    /// Standard deviation of the gaps about that plane, metres.
-    roughness: f32,
+    /// Across the normal: the direction of largest extent.
+    longest: Vec3,
 }
 
 impl Shape {
@@ -270,170 +269,82 @@ impl Shape {
             .or_else(|| mean.try_normalize())
             .unwrap_or(smooth[members[0] as usize].normal);
         let band = SUPPORT_BAND * params.pixel_size;
-        let support = || {
+        let in_band = || {
             members
                 .iter()
                 .filter(move |&&m| smooth[m as usize].gap - least_gap <= band)
                 .map(|&m| contacts[m as usize].middle())
         };
-        let count = support().count() as f32;
-        let centre = support().sum::<Vec3>() / count;
+        let centre = in_band().sum::<Vec3>() / in_band().count() as f32;
         let (u, v) = normal.any_orthonormal_pair();
         let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
-        for p in support() {
+        for p in in_band() {
             let d = Vec2::new((p - centre).dot(u), (p - centre).dot(v));
             uu += d.x * d.x;
             uv += d.x * d.y;
             vv += d.y * d.y;
         }
-        let angle = 0.5 * (2.0 * uv).atan2(uu - vv);
-        let (sin, cos) = angle.sin_cos();
-        let axes = [cos * u + sin * v, cos * v - sin * u];
-        // A pixel has an extent of its own.
-        let least = 0.25 * params.pixel_size;
-        let sigma = axes.map(|axis| {
-            let variance = support()
-                .map(|p| (p - centre).dot(axis).powi(2))
-                .sum::<f32>()
-                / count;
-            variance.sqrt().max(least)
-        });
-        let mut shape = Self {
+        let (sin, cos) = (0.5 * (2.0 * uv).atan2(uu - vv)).sin_cos();
+        Self {
             normal,
             normal_length: mean.length() / total,
             least_gap,
             centre,
-            axes,
-            sigma,
-            mean_gap: 0.0,
-            slope: [0.0; 2],
-            roughness: 0.0,
-        };
-        shape.fit_gaps(members, contacts, smooth, params);
-        shape
-    }
-
-    fn in_band<'a>(
-        &self,
-        members: &'a [u32],
-        smooth: &'a [Smooth],
-        params: &Params,
-    ) -> impl Iterator<Item = usize> + use<'a> {
-        let limit = self.least_gap + SUPPORT_BAND * params.pixel_size;
-        let members = members.iter().map(|&m| m as usize);
-        members.filter(move |&m| smooth[m].gap <= limit)
-    }
-
-    /// Place of a contact pixel along the axes, in sigmas.
-    fn place(&self, contact: &ContactPixel) -> [f32; 2] {
-        let d = contact.middle() - self.centre;
-        [0, 1].map(|k| d.dot(self.axes[k]) / self.sigma[k])
-    }
-
-    /// Fits a plane to the gaps of the support band: along the main axes the slopes are separate.
-    fn fit_gaps(
-        &mut self,
-        members: &[u32],
-        contacts: &[ContactPixel],
-        smooth: &[Smooth],
-        params: &Params,
-    ) {
-        let (mut count, mut sum, mut along) = (0.0, 0.0, [0.0; 2]);
-        for m in self.in_band(members, smooth, params) {
-            let above = smooth[m].gap - self.least_gap;
-            let place = self.place(&contacts[m]);
-            count += 1.0;
-            sum += above;
-            for k in 0..2 {
-                along[k] += above * place[k];
-            }
+            longest: cos * u + sin * v,
         }
-        self.mean_gap = self.least_gap + sum / count;
-        self.slope = along.map(|a| a / count);
-        let residuals = self
-            .in_band(members, smooth, params)
-            .map(|m| self.residual(&contacts[m], smooth[m].gap).powi(2));
-        let least = LEAST_ROUGHNESS * params.pixel_size;
-        self.roughness = (residuals.sum::<f32>() / count).sqrt().max(least);
     }
 
-    /// How far a gap is above the fitted plane, metres.
-    fn residual(&self, contact: &ContactPixel, gap: f32) -> f32 {
-        let [u, v] = self.place(contact);
-        gap - self.mean_gap - self.slope[0] * u - self.slope[1] * v
-    }
-
-    /// Parts `members` by the plane through the centre across the longest axis; returns how many
-    /// are in the first part.
+    /// Parts `members` by the plane through the centre across the longest direction; returns how
+    /// many are in the first part.
     fn split(&self, members: &mut [u32], contacts: &[ContactPixel]) -> usize {
-        let longest = usize::from(self.sigma[1] > self.sigma[0]);
         let behind =
-            |m: u32| (contacts[m as usize].middle() - self.centre).dot(self.axes[longest]) >= 0.0;
-        // Stable, so that members stay in the order of their pixels.
-        members.sort_by_key(|&m| behind(m));
+            |m: u32| (contacts[m as usize].middle() - self.centre).dot(self.longest) >= 0.0;
+        // Members stay in the order of their pixels.
+        members.sort_unstable_by_key(|&m| (behind(m), m));
         members.partition_point(|&m| !behind(m))
     }
 
-    /// The patch's support points and, in place of the least of these, its deepest point where
-    /// that is deeper by more than the roughness (a ball's).
-    ///
-    /// Support points are what the body would rest on: in each quadrant the pixel that is farthest
-    /// out and lowest, a sigma of extent against a sigma of roughness. They do not depend on how
-    /// far the body is tilted, so that a lifted edge stays in the manifold.
+    /// The patch's support points and, in place of the highest of these, its deepest point where
+    /// that is clearly deeper (a ball's).
     fn patch(
         &self,
         members: &[u32],
         contacts: &[ContactPixel],
         smooth: &[Smooth],
+        points: &mut Vec<ContactPoint>,
         params: &Params,
     ) -> ContactPatch {
-        let mut corners = [members[0] as usize; PATCH_POINTS];
-        let mut best = [f32::NEG_INFINITY; PATCH_POINTS];
-        for m in self.in_band(members, smooth, params) {
-            let [u, v] = self.place(&contacts[m]);
-            let low = -self.residual(&contacts[m], smooth[m].gap) / self.roughness;
-            for (k, out) in [u + v, v - u, u - v, -u - v].into_iter().enumerate() {
-                if out + low > best[k] {
-                    best[k] = out + low;
-                    corners[k] = m;
-                }
-            }
-        }
+        let limit = self.least_gap + SUPPORT_BAND * params.pixel_size;
+        points.clear();
+        points.extend(
+            members
+                .iter()
+                .map(|&m| m as usize)
+                .filter(|&m| smooth[m].gap <= limit)
+                .map(|m| self.point(contacts[m].middle(), smooth[m].gap)),
+        );
+        let Supports { indices, roughness } =
+            supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
         let mut patch = ContactPatch {
             normal: self.normal,
-            ..Default::default()
+            points: indices.into_iter().map(|k| points[k]).collect(),
         };
-        for (k, &m) in corners.iter().enumerate() {
-            if !corners[..k].contains(&m) {
-                let point = self.point(contacts[m].middle(), smooth[m].gap);
-                patch.points.push(point);
-            }
-        }
-        let deepest = self.deepest(members, contacts, smooth, params);
         patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
-        if deepest.gap < patch.points[0].gap - 0.5 * self.roughness {
+        let deepest = self.deepest(points, params);
+        if deepest.gap < patch.points[0].gap - DEEPER * roughness {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
         }
         patch
     }
 
-    /// Mean of the pixels with the smallest gaps.
-    fn deepest(
-        &self,
-        members: &[u32],
-        contacts: &[ContactPixel],
-        smooth: &[Smooth],
-        params: &Params,
-    ) -> ContactPoint {
+    /// Mean of the points with the smallest gaps.
+    fn deepest(&self, points: &[ContactPoint], params: &Params) -> ContactPoint {
         let (mut middle, mut gap, mut total) = (Vec3::ZERO, 0.0, 0.0);
-        for m in self.in_band(members, smooth, params) {
-            let w = falloff(
-                smooth[m].gap - self.least_gap,
-                DEEPEST_BAND * params.pixel_size,
-            );
-            middle += w * contacts[m].middle();
-            gap += w * smooth[m].gap;
+        for point in points {
+            let w = falloff(point.gap - self.least_gap, DEEPEST_BAND * params.pixel_size);
+            middle += w * point.middle();
+            gap += w * point.gap;
             total += w;
         }
         self.point(middle / total, gap / total)

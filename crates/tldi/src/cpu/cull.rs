@@ -5,9 +5,9 @@
 //! floor of the whole pipeline is this stage's reading of the coordinates. Of a cloud much finer
 //! than the pixels only every n-th point is taken ([`stride`]): more would not be seen.
 
+use super::lanes::multiversioned;
 use crate::{Aabb, BLOCK, PointCloud, Radii};
 use glamx::{Mat3, Pose3, Vec3};
-use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Points that passed the cull, as structure of arrays, in the frame of the query.
@@ -16,12 +16,10 @@ pub(crate) struct Survivors {
     pub(crate) x: Vec<f32>,
     pub(crate) y: Vec<f32>,
     pub(crate) z: Vec<f32>,
-    /// Radii in metres.
-    pub(crate) radius: Vec<f32>,
     /// Indices into the cloud.
     pub(crate) index: Vec<u32>,
-    /// Unit normals in the frame of the query; empty until the stage `normals` has run.
-    pub(crate) normal: Vec<Vec3>,
+    /// Every how many points of the cloud were taken.
+    stride: usize,
 }
 
 impl Survivors {
@@ -29,9 +27,7 @@ impl Survivors {
         self.x.clear();
         self.y.clear();
         self.z.clear();
-        self.radius.clear();
         self.index.clear();
-        self.normal.clear();
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -50,9 +46,47 @@ impl Survivors {
         self.x.extend_from_slice(&other.x);
         self.y.extend_from_slice(&other.y);
         self.z.extend_from_slice(&other.z);
-        self.radius.extend_from_slice(&other.radius);
         self.index.extend_from_slice(&other.index);
     }
+
+    /// Appends the points of a block that are inside the region, after moving them to its front.
+    fn extend(&mut self, moved: &mut Moved, first: usize, stride: usize) {
+        let Moved { x, y, z, inside } = moved;
+        let mut index = [0; BLOCK];
+        let mut kept = 0;
+        let (words, _) = inside.as_chunks::<64>();
+        for (word, flags) in words.iter().enumerate() {
+            let mut mask = bits(flags);
+            while mask != 0 {
+                let i = 64 * word + mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                (x[kept], y[kept], z[kept]) = (x[i], y[i], z[i]);
+                index[kept] = (first + i * stride) as u32;
+                kept += 1;
+            }
+        }
+        self.x.extend_from_slice(&x[..kept]);
+        self.y.extend_from_slice(&y[..kept]);
+        self.z.extend_from_slice(&z[..kept]);
+        self.index.extend_from_slice(&index[..kept]);
+    }
+
+    fn reserve(&mut self, additional: usize) {
+        self.x.reserve(additional);
+        self.y.reserve(additional);
+        self.z.reserve(additional);
+        self.index.reserve(additional);
+    }
+}
+
+/// One bit for each of 64 flags that are 0 or 1.
+fn bits(flags: &[u8; 64]) -> u64 {
+    let (bytes, _) = flags.as_chunks::<8>();
+    bytes.iter().enumerate().fold(0, |mask, (k, flags)| {
+        // The product's highest byte collects the flags, the first as its lowest bit.
+        let byte = u64::from_le_bytes(*flags).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+        mask | byte << (8 * k)
+    })
 }
 
 /// Points that are kept per pixel of a surface seen face on: enough for the mean of a layer.
@@ -65,6 +99,50 @@ const POINTS_PER_PIXEL: f32 = 8.0;
 pub(crate) fn stride(cloud: &PointCloud, pixel_size: f32) -> usize {
     let per_pixel = 0.94 * (pixel_size / cloud.mean_radius()).powi(2);
     ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
+}
+
+/// Radii in metres of the culled points, scaled so that they cover the surface even where only
+/// every n-th point is left.
+#[derive(Clone, Copy)]
+pub(crate) struct PointRadii<'a> {
+    radii: &'a Radii<'a>,
+    index: &'a [u32],
+    scale: f32,
+}
+
+impl<'a> PointRadii<'a> {
+    pub(crate) fn new(cloud: &'a PointCloud, points: &'a Survivors) -> Self {
+        Self {
+            radii: cloud.radii(),
+            index: &points.index,
+            scale: (points.stride as f32).sqrt(),
+        }
+    }
+
+    /// Mean over the culled points.
+    pub(crate) fn mean(&self) -> f32 {
+        match self.radii {
+            Radii::Global(r) => self.scale * r,
+            Radii::PerPoint(r) => {
+                let sum: f32 = self.index.iter().map(|&i| r[i as usize]).sum();
+                self.scale * sum / self.index.len().max(1) as f32
+            }
+        }
+    }
+
+    /// At least the largest.
+    pub(crate) fn limit(&self, cloud: &PointCloud) -> f32 {
+        self.scale * cloud.max_radius()
+    }
+
+    /// Of the i-th culled point.
+    #[inline(always)]
+    pub(crate) fn of(&self, i: usize) -> f32 {
+        match self.radii {
+            Radii::Global(r) => self.scale * r,
+            Radii::PerPoint(r) => self.scale * r[self.index[i] as usize],
+        }
+    }
 }
 
 /// Points whose culling is one parallel task.
@@ -86,8 +164,7 @@ pub(crate) struct Region {
     pub(crate) other_bounds: Aabb,
 }
 
-/// Fills `out` with every `stride`-th point of `cloud` inside `region`, in the order of the cloud;
-/// their radii are scaled so that they still cover the surface.
+/// Fills `out` with every `stride`-th point of `cloud` inside `region`, in the order of the cloud.
 ///
 /// Cost: linear in the points of the blocks that meet the region; parallel over blocks where there
 /// are many. The result does not depend on the number of threads.
@@ -100,6 +177,7 @@ pub(crate) fn cull(
     out: &mut Survivors,
 ) {
     out.clear();
+    out.stride = stride;
     if region.overlap.is_empty() {
         return;
     }
@@ -117,6 +195,8 @@ pub(crate) fn cull(
         .enumerate()
         .for_each(|(task, part)| {
             part.clear();
+            // At once for all that may come: which task has how many changes from pose to pose.
+            part.reserve(TASK_BLOCKS * BLOCK.div_ceil(stride));
             let first = task * TASK_BLOCKS;
             let range = first..(first + TASK_BLOCKS).min(blocks);
             cull_blocks(cloud, frame_from_cloud, region, stride, range, part);
@@ -161,22 +241,7 @@ fn cull_blocks(
             let [x, y, z] = &thinned;
             classify(&kernel, &x[..n], &y[..n], &z[..n], &mut moved);
         }
-        for i in 0..range.len().div_ceil(stride) {
-            if moved.inside[i] != 0 {
-                out.x.push(moved.x[i]);
-                out.y.push(moved.y[i]);
-                out.z.push(moved.z[i]);
-                out.index.push((range.start + i * stride) as u32);
-            }
-        }
-    }
-    let grown = (stride as f32).sqrt();
-    match cloud.radii() {
-        Radii::Global(r) => out.radius.resize(out.x.len(), grown * r),
-        Radii::PerPoint(r) => {
-            let radii = out.index.iter().map(|&i| grown * r[i as usize]);
-            out.radius.extend(radii);
-        }
+        out.extend(&mut moved, range.start, stride);
     }
 }
 
@@ -185,7 +250,8 @@ struct Moved {
     x: [f32; BLOCK],
     y: [f32; BLOCK],
     z: [f32; BLOCK],
-    inside: [u32; BLOCK],
+    /// 1 or 0; 0 beyond the points of the block.
+    inside: [u8; BLOCK],
 }
 
 impl Default for Moved {
@@ -226,15 +292,12 @@ impl Kernel {
     }
 }
 
-#[multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
-    "x86_64+avx2+fma",
-    "aarch64+neon"
-))]
+multiversioned! {
 fn classify(k: &Kernel, x: &[f32], y: &[f32], z: &[f32], moved: &mut Moved) {
     let n = x.len().min(y.len()).min(z.len()).min(BLOCK);
     let (x, y, z) = (&x[..n], &y[..n], &z[..n]);
     let (mx, my, mz) = (&mut moved.x[..n], &mut moved.y[..n], &mut moved.z[..n]);
+    moved.inside[n..].fill(0);
     let inside = &mut moved.inside[..n];
     let (r, t, o, ot) = (&k.r, k.t, &k.other_r, k.other_t);
     for i in 0..n {
@@ -259,6 +322,22 @@ fn classify(k: &Kernel, x: &[f32], y: &[f32], z: &[f32], moved: &mut Moved) {
         mx[i] = px;
         my[i] = py;
         mz[i] = pz;
-        inside[i] = u32::from(within);
+        inside[i] = u8::from(within);
+    }
+}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_are_in_the_order_of_the_flags() {
+        let mut rng = fastrand::Rng::with_seed(1);
+        for _ in 0..1000 {
+            let mask = rng.u64(..);
+            let flags = std::array::from_fn(|i| (mask >> i & 1) as u8);
+            assert_eq!(bits(&flags), mask);
+        }
     }
 }

@@ -1,14 +1,19 @@
 //! The CPU backend: the reference that every other backend is compared with.
 //!
-//! One file a stage: `cull`, `zone`, `normals`, `aim`, `splat` (with `mark` and `alloc`), `cast`,
-//! `sweep`, `compare`; then the reduction to contact patches, which all backends share.
+//! One file a stage: `cull`, `zone`, `aim`, `columns`, `normals`, `splat` (with `mark` and
+//! `alloc`), `cast`, `sweep`, `compare`; then the reduction to contact patches, which all backends
+//! share. `pair` runs them, `side` those of one cloud; `lanes` is what
+//! makes their inner loops SIMD.
 
 mod aim;
 mod cast;
+mod columns;
 mod compare;
 mod cull;
+mod lanes;
 mod normals;
 mod pair;
+mod side;
 mod splat;
 mod sweep;
 mod zone;
@@ -19,9 +24,9 @@ use crate::{
 };
 use cull::Region;
 use glamx::{Pose3, Vec3};
-use pair::{Scratch, Side};
+use pair::Scratch;
 use rayon::prelude::*;
-use splat::DepthScale;
+use side::{CloudView, Side};
 use std::sync::Mutex;
 
 /// Compares pairs on the CPU, in parallel over pairs and over the points of large clouds.
@@ -126,11 +131,47 @@ fn supported(query: &PairQuery) -> Result<(), &'static str> {
     {
         return Err("exact surfaces need an orthographic camera");
     }
+    if let View::Fixed(camera) = query.view
+        && camera.size.is_none()
+        && matches!(camera.projection, Projection::Perspective { .. })
+    {
+        return Err("a perspective camera needs an image of fixed size");
+    }
     let p = &query.params;
     if !(p.pixel_size > 0.0 && p.merge_gap > 0.0 && p.prediction >= 0.0) {
         return Err("pixel_size and merge_gap must be positive, prediction not negative");
     }
+    if p.variant() == Variant::Paper && most_pixels(query) > paper::MAX_PIXELS as f64 {
+        return Err(
+            "the paper's image may have more than 2^28 pixels: use a larger pixel_size, \
+             a smaller image or smaller clouds",
+        );
+    }
     Ok(())
+}
+
+/// At least the number of pixels that the paper's image of either cloud has.
+fn most_pixels(query: &PairQuery) -> f64 {
+    let fixed = match query.view {
+        View::Fixed(camera) => camera.size,
+        View::Aim { .. } => None,
+    };
+    if let Some([width, height]) = fixed {
+        return f64::from(width) * f64::from(height);
+    }
+    let pixel_size = match query.view {
+        View::Fixed(camera) => camera.pixel_size_at(0.0),
+        View::Aim { .. } => query.params.pixel_size,
+    };
+    let pixels = |surface: &Surface| match surface {
+        // As seen from any side, and two pixels for rounding outward.
+        Surface::Cloud(cloud) => {
+            let size = cloud.bounds().extents().length() + 2.0 * cloud.max_radius();
+            (f64::from(size) / f64::from(pixel_size) + 2.0).powi(2)
+        }
+        Surface::Exact(_) => 0.0,
+    };
+    pixels(&query.a).max(pixels(&query.b))
 }
 
 /// The image of one cloud, all layers, with either variant.
@@ -184,10 +225,14 @@ pub fn build(
         &mut side.cull,
         &mut side.points,
     );
-    normals::normals(cloud, frame_from_cloud, &mut side.normals, &mut side.points);
-    if let Some(seen) = side.fragments.project(&side.points, camera) {
-        let scale = DepthScale::new(seen.near, params);
-        side.image(cloud, camera, params, &seen.rect, &scale);
+    let view = CloudView {
+        cloud,
+        frame_from_cloud,
+        camera,
+        params,
+    };
+    if let Some(seen) = side.project(&view) {
+        side.whole_image(&view, &seen);
     }
     side.image
 }

@@ -1,84 +1,466 @@
-//! Stage `normals`: a unit normal for each culled point.
+//! Stage `normals`: a unit normal for each point that is modelled.
 //!
 //! Normals of the cloud are rotated; where it has none (all-new points), they are the directions
-//! of least covariance of the culled neighbours within [`SUPPORT`] radii. Only what survived the
-//! cull is computed.
+//! of least covariance of the neighbours within [`SUPPORT`] radii. Points are sorted into a grid
+//! with cells as large as that; all points of a cell share the candidates of its 27 cells, whose
+//! moments are summed in lanes.
 
-use super::cull::Survivors;
-use crate::PointCloud;
-use crate::normals::{covariance, least_variance_axis};
-use glamx::{Pose3, Vec3};
+use super::lanes::multiversioned;
+use crate::normals::least_variance_axis;
+use glamx::{DMat3, DVec3, Vec3};
 
-/// Radius of the neighbourhood whose covariance gives the normal, in mean radii of
-/// the culled points. With 0.65 × the 7th neighbour's distance it holds about 25 neighbours on a surface.
+/// Radius of the neighbourhood whose covariance gives the normal, in mean radii of the points.
+/// With 0.65 × the 7th neighbour's distance it holds about 25 neighbours on a surface.
 pub(super) const SUPPORT: f32 = 3.0;
+
+/// Most cells per point: on a surface of 4 million points there are as many. Sparser ones get
+/// larger cells, which only makes for more candidates.
+const CELLS_PER_POINT: usize = 16;
+
+/// Most candidates whose distances are looked at, for all points of a cell: five times what a
+/// surface has. Of more, an even selection represents them.
+const MAX_CANDIDATES: usize = 512;
+
+/// Candidates that are summed side by side.
+const LANES: usize = 8;
+
+/// Normals that are solved for side by side.
+const BATCH: usize = 64;
+
+/// Share of the squared variance that the two larger axes of a neighbourhood must have for a
+/// normal in single precision: below it the points are on a line or coincide.
+const LEAST_PLANAR: f32 = 1e-4;
 
 /// Memory of the stage, kept from call to call.
 #[derive(Default)]
 pub(crate) struct NormalScratch {
-    /// Grid cell and index of each culled point, sorted.
-    cells: Vec<(u64, u32)>,
+    cells: Vec<u32>,
+    /// First point of each cell; one entry more than cells.
+    offsets: Vec<u32>,
+    sorted: Vec<Entry>,
+    candidates: Candidates,
+    batch: Batch,
 }
 
-/// Fills `points.normal`.
-pub(crate) fn normals(
-    cloud: &PointCloud,
-    frame_from_cloud: &Pose3,
+/// Coordinates of the points around a cell, in whole lanes.
+struct Candidates {
+    x: [f32; MAX_CANDIDATES],
+    y: [f32; MAX_CANDIDATES],
+    z: [f32; MAX_CANDIDATES],
+    count: usize,
+}
+
+impl Default for Candidates {
+    fn default() -> Self {
+        Self {
+            x: [0.0; MAX_CANDIDATES],
+            y: [0.0; MAX_CANDIDATES],
+            z: [0.0; MAX_CANDIDATES],
+            count: 0,
+        }
+    }
+}
+
+/// A point in the order of the cells.
+#[derive(Clone, Copy, Default)]
+struct Entry {
+    position: Vec3,
+    id: u32,
+    cell: u32,
+    wanted: bool,
+}
+
+/// Cells of the neighbourhood's size; a rim of empty cells spares bounds checks.
+struct Grid {
+    min: Vec3,
+    inv_cell: f32,
+    dims: [usize; 3],
+}
+
+impl Grid {
+    fn new(min: Vec3, max: Vec3, support: f32, points: usize) -> Self {
+        let limit = (CELLS_PER_POINT * points + 4096) as f32;
+        let extents = max - min;
+        let dims = |cell: f32| (extents / cell).floor() + Vec3::splat(3.0);
+        let mut cell = support;
+        while dims(cell).element_product() > limit {
+            cell *= 1.26; // a third of an octave: twice fewer cells
+        }
+        let d = dims(cell);
+        Self {
+            min,
+            inv_cell: 1.0 / cell,
+            dims: [d.x as usize, d.y as usize, d.z as usize],
+        }
+    }
+
+    fn cell(&self, p: Vec3) -> u32 {
+        let c = ((p - self.min) * self.inv_cell).to_array();
+        let [x, y, z] = [0, 1, 2].map(|k| (c[k] as u32 + 1).min(self.dims[k] as u32 - 2));
+        (z * self.dims[1] as u32 + y) * self.dims[0] as u32 + x
+    }
+
+    fn cells(&self) -> usize {
+        self.dims.iter().product()
+    }
+}
+
+/// Estimates normals at some of the points of `support`. `targets` gets their ids, and `normals`
+/// their normals, in the order of the grid.
+///
+/// `support` are ids of points, `position` tells where the one of an id is, `wanted` whether the
+/// normal at the k-th point of `support` is; `radius` is that of the neighbourhood, in metres.
+/// Cost: linear in points but where they lie more densely than on a surface.
+pub(crate) fn estimate(
+    support: &[u32],
+    position: impl Fn(u32) -> Vec3,
+    wanted: impl Fn(usize) -> bool,
+    radius: f32,
     scratch: &mut NormalScratch,
-    points: &mut Survivors,
+    targets: &mut Vec<u32>,
+    normals: &mut Vec<Vec3>,
 ) {
-    let Some(given) = cloud.normals() else {
-        let spacing = points.radius.iter().sum::<f32>() / points.len().max(1) as f32;
-        estimate(SUPPORT * spacing, scratch, points);
-        return;
-    };
-    points.normal.clear();
-    points.normal.extend(
-        points
-            .index
+    targets.clear();
+    normals.clear();
+    let (min, max) =
+        support
             .iter()
-            .map(|&i| frame_from_cloud.rotation * given[i as usize]),
-    );
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), &id| {
+                let p = position(id);
+                (min.min(p), max.max(p))
+            });
+    if support.is_empty() {
+        return;
+    }
+    let grid = Grid::new(min, max, radius, support.len());
+    scratch.sort(support, position, wanted, &grid);
+    let NormalScratch {
+        offsets,
+        sorted,
+        candidates,
+        batch,
+        ..
+    } = scratch;
+    let mut cell = u32::MAX;
+    for entry in sorted.iter().filter(|e| e.wanted) {
+        if entry.cell != cell {
+            cell = entry.cell;
+            gather(&grid, cell as usize, offsets, sorted, candidates);
+        }
+        targets.push(entry.id);
+        batch.push(moments(entry.position, radius * radius, candidates));
+        if batch.count == BATCH {
+            batch.solve(normals);
+        }
+    }
+    batch.solve(normals);
 }
 
-/// Bits per axis of a cell's key.
-const KEY_BITS: u32 = 21;
-
-fn key(c: [u64; 3]) -> u64 {
-    c[2] << (2 * KEY_BITS) | c[1] << KEY_BITS | c[0]
+impl NormalScratch {
+    /// Counting sort of the points by cell.
+    fn sort(
+        &mut self,
+        support: &[u32],
+        position: impl Fn(u32) -> Vec3,
+        wanted: impl Fn(usize) -> bool,
+        grid: &Grid,
+    ) {
+        self.offsets.clear();
+        self.offsets.resize(grid.cells() + 1, 0);
+        self.cells.clear();
+        self.cells
+            .extend(support.iter().map(|&id| grid.cell(position(id))));
+        // Counts go one further, so that after the prefix sum an entry is its cell's cursor, and
+        // after the sort its end: the next cell's first point.
+        for &cell in &self.cells {
+            self.offsets[cell as usize + 1] += 1;
+        }
+        let mut sum = 0;
+        for offset in &mut self.offsets {
+            sum += *offset;
+            *offset = sum;
+        }
+        self.sorted.resize(support.len(), Entry::default());
+        for (k, (&id, &cell)) in support.iter().zip(&self.cells).enumerate().rev() {
+            let cursor = &mut self.offsets[cell as usize + 1];
+            *cursor -= 1;
+            self.sorted[*cursor as usize] = Entry {
+                position: position(id),
+                id,
+                cell,
+                wanted: wanted(k),
+            };
+        }
+        // Every entry has moved to its cell's first point, one index too far.
+        self.offsets.copy_within(1.., 0);
+        if let Some(end) = self.offsets.last_mut() {
+            *end = support.len() as u32;
+        }
+    }
 }
 
-fn estimate(support: f32, scratch: &mut NormalScratch, points: &mut Survivors) {
-    let n = points.len();
-    points.normal.clear();
-    let min = (0..n).fold(Vec3::INFINITY, |m, i| m.min(points.point(i)));
-    let limit = (1u64 << KEY_BITS) - 2;
-    let cell_of = |p: Vec3| {
-        let c = (p - min) / support;
-        // One empty cell below, so that neighbours of the first cell have keys too.
-        [c.x, c.y, c.z].map(|c| (c as u64 + 1).min(limit))
+/// Collects the points of a cell and its neighbours, filled up to whole lanes with points out of
+/// reach.
+fn gather(
+    grid: &Grid,
+    cell: usize,
+    offsets: &[u32],
+    sorted: &[Entry],
+    candidates: &mut Candidates,
+) {
+    let [row, slice] = [grid.dims[0], grid.dims[0] * grid.dims[1]];
+    // Three cells in a row along x are consecutive.
+    let rows: [&[Entry]; 9] = std::array::from_fn(|k| {
+        let first = cell + k / 3 * slice + k % 3 * row - slice - row - 1;
+        &sorted[offsets[first] as usize..offsets[first + 3] as usize]
+    });
+    let total: usize = rows.iter().map(|row| row.len()).sum();
+    let step = total.div_ceil(MAX_CANDIDATES);
+    let Candidates { x, y, z, count } = candidates;
+    let mut n = 0;
+    let mut put = |p: Vec3| {
+        (x[n], y[n], z[n]) = (p.x, p.y, p.z);
+        n += 1;
     };
-    scratch.cells.clear();
-    scratch
-        .cells
-        .extend((0..n).map(|i| (key(cell_of(points.point(i))), i as u32)));
-    scratch.cells.sort_unstable();
-    let cells = &scratch.cells;
-    for i in 0..n {
-        let p = points.point(i);
-        let [cx, cy, cz] = cell_of(p);
-        // Three cells in a row along x have consecutive keys.
-        let rows = (cz - 1..=cz + 1).flat_map(|z| (cy - 1..=cy + 1).map(move |y| (y, z)));
-        let offsets = rows.flat_map(|(y, z)| {
-            let (first, last) = (key([cx - 1, y, z]), key([cx + 1, y, z]));
-            let start = cells.partition_point(|c| c.0 < first);
-            cells[start..].iter().take_while(move |c| c.0 <= last)
-        });
-        let offsets = offsets
-            .map(|&(_, j)| points.point(j as usize) - p)
-            .filter(|d| d.length_squared() <= support * support)
-            .map(|d| d.as_dvec3());
-        let normal = least_variance_axis(covariance(offsets)).as_vec3();
-        points.normal.push(normal);
+    if step == 1 {
+        for row in rows {
+            row.iter().for_each(|e| put(e.position));
+        }
+    } else {
+        let all = rows.into_iter().flatten();
+        all.step_by(step).for_each(|e| put(e.position));
+    }
+    let used = total.div_ceil(step);
+    for _ in used..used.next_multiple_of(LANES) {
+        put(Vec3::INFINITY);
+    }
+    *count = n;
+}
+
+multiversioned! {
+/// Covariance (xx, xy, xz, yy, yz, zz; not divided by their number) of the candidates within the
+/// neighbourhood of `p`.
+fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> [f32; 6] {
+    let mut sums = [[0.0f32; LANES]; 10];
+    let [x, y, z] = [&candidates.x, &candidates.y, &candidates.z].map(|c| c.as_chunks::<LANES>().0);
+    let chunks = x.iter().zip(y).zip(z).take(candidates.count / LANES);
+    for ((x, y), z) in chunks {
+        for l in 0..LANES {
+            let (dx, dy, dz) = (x[l] - p.x, y[l] - p.y, z[l] - p.z);
+            let near = dx * dx + dy * dy + dz * dz <= radius_squared;
+            let keep = |d: f32| if near { d } else { 0.0 };
+            let (dx, dy, dz) = (keep(dx), keep(dy), keep(dz));
+            sums[0][l] += keep(1.0);
+            sums[1][l] += dx;
+            sums[2][l] += dy;
+            sums[3][l] += dz;
+            sums[4][l] += dx * dx;
+            sums[5][l] += dx * dy;
+            sums[6][l] += dx * dz;
+            sums[7][l] += dy * dy;
+            sums[8][l] += dy * dz;
+            sums[9][l] += dz * dz;
+        }
+    }
+    let mut half = [[0.0f32; LANES / 2]; 10];
+    for (half, sum) in half.iter_mut().zip(&sums) {
+        for l in 0..LANES / 2 {
+            half[l] = sum[l] + sum[l + LANES / 2];
+        }
+    }
+    let [count, sx, sy, sz, xx, xy, xz, yy, yz, zz] =
+        half.map(|s| (s[0] + s[2]) + (s[1] + s[3]));
+    let (mx, my, mz) = (sx / count, sy / count, sz / count);
+    [
+        xx - sx * mx,
+        xy - sx * my,
+        xz - sx * mz,
+        yy - sy * my,
+        yz - sy * mz,
+        zz - sz * mz,
+    ]
+}
+}
+
+/// Covariances whose normals are solved for together, as structure of arrays.
+struct Batch {
+    covariance: [[f32; BATCH]; 6],
+    normal: [[f32; BATCH]; 3],
+    /// Whether the neighbourhood is one that `solve_planar` can tell the normal of.
+    planar: [bool; BATCH],
+    count: usize,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self {
+            covariance: [[0.0; BATCH]; 6],
+            normal: [[0.0; BATCH]; 3],
+            planar: [false; BATCH],
+            count: 0,
+        }
+    }
+}
+
+impl Batch {
+    fn push(&mut self, covariance: [f32; 6]) {
+        for (to, from) in self.covariance.iter_mut().zip(covariance) {
+            to[self.count] = from;
+        }
+        self.count += 1;
+    }
+
+    /// Appends the normals of what was pushed.
+    fn solve(&mut self, normals: &mut Vec<Vec3>) {
+        solve_planar(self);
+        for k in 0..self.count {
+            let [x, y, z] = self.normal.map(|c| c[k]);
+            normals.push(match self.planar[k] {
+                true => Vec3::new(x, y, z),
+                false => {
+                    let [xx, xy, xz, yy, yz, zz] = self.covariance.map(|c| f64::from(c[k]));
+                    least_variance_axis(DMat3::from_cols(
+                        DVec3::new(xx, xy, xz),
+                        DVec3::new(xy, yy, yz),
+                        DVec3::new(xz, yz, zz),
+                    ))
+                    .as_vec3()
+                }
+            });
+        }
+        self.count = 0;
+    }
+}
+
+multiversioned! {
+/// Power iteration by squaring on the adjugate of the covariance: its eigenvectors are the same,
+/// and its eigenvalues are the products of the other two, so that the least variance becomes the
+/// greatest.
+fn solve_planar(batch: &mut Batch) {
+    let [cxx, cxy, cxz, cyy, cyz, czz] = &batch.covariance;
+    for k in 0..BATCH {
+        let trace = cxx[k] + cyy[k] + czz[k];
+        let inv = 1.0 / trace;
+        let (xx, xy, xz) = (cxx[k] * inv, cxy[k] * inv, cxz[k] * inv);
+        let (yy, yz, zz) = (cyy[k] * inv, cyz[k] * inv, czz[k] * inv);
+        let mut a = [
+            yy * zz - yz * yz,
+            xz * yz - xy * zz,
+            xy * yz - xz * yy,
+            xx * zz - xz * xz,
+            xy * xz - xx * yz,
+            xx * yy - xy * xy,
+        ];
+        batch.planar[k] = a[0] + a[3] + a[5] >= LEAST_PLANAR;
+        // The fourth square is the 16th power: eigenvalues that differ by half are 10⁻⁵ apart.
+        for _ in 0..4 {
+            let inv = 1.0 / (a[0] + a[3] + a[5]);
+            let [xx, xy, xz, yy, yz, zz] = a.map(|c| c * inv);
+            a = [
+                xx * xx + xy * xy + xz * xz,
+                xx * xy + xy * yy + xz * yz,
+                xx * xz + xy * yz + xz * zz,
+                xy * xy + yy * yy + yz * yz,
+                xy * xz + yy * yz + yz * zz,
+                xz * xz + yz * yz + zz * zz,
+            ];
+        }
+        // The longest column.
+        let [xx, xy, xz, yy, yz, zz] = a;
+        let x_longest = (xx >= yy) & (xx >= zz);
+        let y_longest = yy >= zz;
+        let pick = |x: f32, y: f32, z: f32| {
+            let other = if y_longest { y } else { z };
+            if x_longest { x } else { other }
+        };
+        let (x, y, z) = (pick(xx, xy, xz), pick(xy, yy, yz), pick(xz, yz, zz));
+        let inv = 1.0 / (x * x + y * y + z * z).sqrt();
+        batch.normal[0][k] = x * inv;
+        batch.normal[1][k] = y * inv;
+        batch.normal[2][k] = z * inv;
+    }
+}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::normals::covariance;
+
+    /// Normals equal those of all neighbours by brute force in f64, and only those that are wanted
+    /// are there.
+    #[test]
+    fn equal_brute_force() {
+        let mut compared = 0;
+        for seed in 0..40 {
+            let mut rng = fastrand::Rng::with_seed(seed);
+            let offset = 10.0 * Vec3::new(rng.f32(), rng.f32(), rng.f32());
+            // Sheets that are flat, wavy or thick, and lines, whose normals are not unique.
+            let thickness = if seed % 4 == 2 { 0.2 } else { 0.0 };
+            let points: Vec<Vec3> = (0..300)
+                .map(|_| {
+                    let (x, y) = (rng.f32(), if seed % 4 == 0 { 0.0 } else { rng.f32() });
+                    let wave = 0.1 * (5.0 * x).sin() * (seed % 2) as f32;
+                    offset + Vec3::new(x, y, wave + thickness * rng.f32())
+                })
+                .collect();
+            let radius = 0.1 + 0.1 * rng.f32();
+            let support: Vec<u32> = (0..300).collect();
+            let (mut targets, mut normals) = (vec![], vec![]);
+            estimate(
+                &support,
+                |i| points[i as usize],
+                |k| k % 3 == 1,
+                radius,
+                &mut NormalScratch::default(),
+                &mut targets,
+                &mut normals,
+            );
+            let mut sorted = targets.clone();
+            sorted.sort_unstable();
+            assert!(sorted.into_iter().eq((0..300).filter(|i| i % 3 == 1)));
+            for (&i, normal) in targets.iter().zip(&normals) {
+                let p = points[i as usize];
+                let near = points.iter().filter(|q| (**q - p).length() <= radius);
+                let covariance = covariance(near.map(|q| (*q - p).as_dvec3()));
+                assert!(normal.is_normalized(), "seed {seed}: {normal}");
+                // No other direction varies less, but for what rounding makes of f32 coordinates
+                // 10 from the origin, a millionth each. Where all directions vary nearly alike the
+                // iteration ends before it has told them apart: it leaves 0.01 of the trace.
+                let variance = |n: DVec3| n.dot(covariance * n);
+                let least = variance(least_variance_axis(covariance));
+                let tolerance = if thickness > 0.0 { 0.01 } else { 1e-4 };
+                let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
+                assert!(
+                    variance(normal.as_dvec3()) <= least + tolerance * trace,
+                    "seed {seed}: {normal}"
+                );
+                compared += 1;
+            }
+        }
+        assert_eq!(compared, 4000);
+    }
+
+    /// Where points crowd, an even selection of them gives the normal.
+    #[test]
+    fn crowds_have_normals() {
+        let mut rng = fastrand::Rng::with_seed(1);
+        let points: Vec<Vec3> = (0..20_000)
+            .map(|_| Vec3::new(rng.f32(), rng.f32(), 1e-3 * rng.f32()))
+            .collect();
+        let support: Vec<u32> = (0..20_000).collect();
+        let (mut targets, mut normals) = (vec![], vec![]);
+        estimate(
+            &support,
+            |i| points[i as usize],
+            |k| k % 100 == 0,
+            0.3,
+            &mut NormalScratch::default(),
+            &mut targets,
+            &mut normals,
+        );
+        assert_eq!(normals.len(), 200);
+        // 1 mm of thickness over 0.3 m of radius with some hundred points.
+        assert!(normals.iter().all(|n| n.z.abs() > 0.9999), "{normals:?}");
     }
 }

@@ -1,64 +1,23 @@
 //! The stages of one pair, in order.
 
-use super::aim::{self, Hint, ZoneNormals};
+use super::aim::{self, Hint, MAX_VIEWS, ZoneNormals};
+use super::columns::{Tiles, Touching};
 use super::compare::{self, Middles};
-use super::cull::{self, CullScratch, Region, Survivors};
-use super::normals::{self, NormalScratch};
-use super::splat::{DepthScale, Fragments, Rect};
+use super::cull::{self, Region};
+use super::normals;
+use super::side::{CloudView, Side};
+use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneScratch};
-use super::{cast, sweep};
 use crate::patches::PatchScratch;
-use crate::{
-    Aabb, PairQuery, PairResult, Params, PointCloud, RayHit, RaySurface, Surface, Tldi, Variant,
-    View, VirtualCamera, paper,
-};
+use crate::{Aabb, PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper};
+use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
 
-/// Most near points of a cloud that are projected onto an exact surface to aim the camera; more do
-/// not sharpen the mean of their normals.
-const AIM_SAMPLES: usize = 512;
-
-/// One side of a pair: its culled points and its image.
-#[derive(Default)]
-pub(super) struct Side {
-    pub(super) points: Survivors,
-    pub(super) cull: CullScratch,
-    pub(super) normals: NormalScratch,
-    pub(super) fragments: Fragments,
-    /// Indices of the near points, and their normals.
-    near: Vec<u32>,
-    near_normals: Vec<Vec3>,
-    /// Greatest depth of a sampled point inside an exact surface, metres.
-    deepest: f32,
-    pub(super) image: Tldi,
-}
-
-impl Side {
-    /// `mark` to `sweep` for points that were projected.
-    pub(super) fn image(
-        &mut self,
-        cloud: &PointCloud,
-        camera: &VirtualCamera,
-        params: &Params,
-        rect: &Rect,
-        scale: &DepthScale,
-    ) {
-        let oriented = cloud.normals().is_some() && cloud.normals_oriented();
-        self.fragments
-            .splat(&self.points, oriented, camera, params, rect, scale);
-        sweep::sweep(
-            &mut self.fragments,
-            &self.points.index,
-            cloud.colors(),
-            oriented,
-            camera,
-            params,
-            rect,
-            scale,
-            &mut self.image,
-        );
-    }
-}
+/// Columns in which the surfaces are farther apart along the view than this many merge gaps, or
+/// prediction distances, are not modelled. A contact at the prediction distance is as far along
+/// the view where its normal is 60° off (beyond, depths along the view tell no distance); surfaces
+/// that cross between neighbouring pixels are at most two merge gaps apart in both.
+const REACH: f32 = 2.0;
 
 /// Everything one pair needs while it is compared.
 #[derive(Default)]
@@ -66,6 +25,7 @@ pub(super) struct Scratch {
     a: Side,
     b: Side,
     zone: ZoneScratch,
+    touching: Touching,
     hits: Vec<RayHit>,
     paper: [paper::Scratch; 2],
     patches: PatchScratch,
@@ -232,19 +192,24 @@ impl Scratch {
                 if self.a.near.is_empty() || self.b.near.is_empty() {
                     return false;
                 }
-                self.a.estimate_normals(a, &Pose3::IDENTITY);
-                self.b.estimate_normals(b, &query.a_from_b);
+                let (side_a, side_b) = (&mut self.a, &mut self.b);
+                rayon::join(
+                    || side_a.sample_normals(a, &Pose3::IDENTITY),
+                    || side_b.sample_normals(b, &query.a_from_b),
+                );
                 true
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
-                self.a.estimate_normals_of_all(cloud, &Pose3::IDENTITY);
+                let frame = Pose3::IDENTITY;
+                let near = &mut self.b.near_normals;
                 self.a
-                    .near_exact(surface, &query.a_from_b, reach, &mut self.b)
+                    .near_exact(cloud, &frame, surface, &query.a_from_b, reach, near)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
-                self.b.estimate_normals_of_all(cloud, &query.a_from_b);
+                let frame = Pose3::IDENTITY;
+                let near = &mut self.a.near_normals;
                 self.b
-                    .near_exact(surface, &Pose3::IDENTITY, reach, &mut self.a)
+                    .near_exact(cloud, &query.a_from_b, surface, &frame, reach, near)
             }
             (Surface::Exact(_), Surface::Exact(_)) => false,
         }
@@ -277,60 +242,86 @@ impl Scratch {
         view: usize,
         result: &mut PairResult,
     ) {
-        let (a, b) = (&mut self.a, &mut self.b);
-        match (query.a, query.b) {
-            (Surface::Cloud(cloud_a), Surface::Cloud(cloud_b)) => {
-                let (seen_a, seen_b) = rayon::join(
-                    || a.fragments.project(&a.points, camera),
-                    || b.fragments.project(&b.points, camera),
-                );
-                let (Some(seen_a), Some(seen_b)) = (seen_a, seen_b) else {
-                    return;
-                };
-                let Some(rect) = seen_a.rect.intersection(&seen_b.rect) else {
-                    return;
-                };
-                let scale = DepthScale::new(seen_a.near.min(seen_b.near), &query.params);
-                rayon::join(
-                    || a.image(cloud_a, camera, &query.params, &rect, &scale),
-                    || b.image(cloud_b, camera, &query.params, &rect, &scale),
-                );
+        let params = &query.params;
+        let view_of = |cloud, frame_from_cloud| CloudView {
+            cloud,
+            frame_from_cloud,
+            camera,
+            params,
+        };
+        let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
+        let hits = &mut self.hits;
+        let looked = match (query.a, query.b) {
+            (Surface::Cloud(a), Surface::Cloud(b)) => {
+                self.look_at_clouds(&view_of(a, a_from_a), &view_of(b, a_from_b))
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
-                let hits = &mut self.hits;
-                a.look_with(
-                    cloud,
-                    surface,
-                    &query.a_from_b,
-                    camera,
-                    query,
-                    hits,
-                    &mut b.image,
-                );
+                let (cloud, image) = (view_of(cloud, a_from_a), &mut self.b.image);
+                self.a.look_with(&cloud, surface, a_from_b, hits, image)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
-                let hits = &mut self.hits;
-                b.look_with(
-                    cloud,
-                    surface,
-                    &Pose3::IDENTITY,
-                    camera,
-                    query,
-                    hits,
-                    &mut a.image,
-                );
+                let (cloud, image) = (view_of(cloud, a_from_b), &mut self.a.image);
+                self.b.look_with(&cloud, surface, a_from_a, hits, image)
             }
-            (Surface::Exact(_), Surface::Exact(_)) => return,
+            (Surface::Exact(_), Surface::Exact(_)) => false,
+        };
+        if !looked {
+            return;
         }
+        let axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
         compare::compare(
             &self.a.image,
             &self.b.image,
-            &result.axes.clone(),
+            &axes,
             view,
             &middles(query, camera),
             &query.params,
             result,
         );
+    }
+
+    /// Builds the images of two clouds where they can meet; `false` if that is nowhere.
+    fn look_at_clouds(&mut self, a: &CloudView, b: &CloudView) -> bool {
+        let (camera, params) = (a.camera, a.params);
+        let (side_a, side_b) = (&mut self.a, &mut self.b);
+        let (seen_a, seen_b) = rayon::join(|| side_a.project(a), || side_b.project(b));
+        let (Some(seen_a), Some(seen_b)) = (seen_a, seen_b) else {
+            return false;
+        };
+        let Some(rect) = seen_a.rect.intersection(&seen_b.rect) else {
+            return false;
+        };
+        let tiles = Tiles::new(&rect, seen_a.reach.max(seen_b.reach));
+        let sort = |side: &mut Side, sign: f32, radius: f32| {
+            side.columns.sort(&tiles, camera);
+            let margin = params.slope_damping * radius;
+            side.columns.reduce(&tiles, sign, margin);
+        };
+        rayon::join(
+            || sort(side_a, 1.0, seen_a.radius),
+            || sort(side_b, -1.0, seen_b.radius),
+        );
+        let reach = REACH * params.merge_gap.max(params.prediction);
+        let support = side_a.support(a).max(side_b.support(b));
+        let support_px = support / seen_a.pixel_size.min(seen_b.pixel_size);
+        let touching = &mut self.touching;
+        let (columns_a, columns_b) = (&side_a.columns, &side_b.columns);
+        let Some(rect) = touching.mark(columns_a, columns_b, &tiles, &rect, reach, support_px)
+        else {
+            return false;
+        };
+        let imaging = Imaging {
+            camera,
+            params,
+            rect,
+            tiles,
+            scale: DepthScale::new(seen_a.near.min(seen_b.near), params),
+        };
+        rayon::join(
+            || side_a.image(a, &imaging, Some(touching)),
+            || side_b.image(b, &imaging, Some(touching)),
+        );
+        true
     }
 }
 
@@ -350,88 +341,5 @@ fn middles(query: &PairQuery, camera: &VirtualCamera) -> Middles {
         } else {
             None
         },
-    }
-}
-
-impl Side {
-    fn estimate_normals(&mut self, cloud: &PointCloud, frame_from_cloud: &Pose3) {
-        normals::normals(cloud, frame_from_cloud, &mut self.normals, &mut self.points);
-        self.near_normals.clear();
-        self.near_normals
-            .extend(self.near.iter().map(|&i| self.points.normal[i as usize]));
-    }
-
-    fn estimate_normals_of_all(&mut self, cloud: &PointCloud, frame_from_cloud: &Pose3) {
-        normals::normals(cloud, frame_from_cloud, &mut self.normals, &mut self.points);
-    }
-
-    /// Near points of this cloud by their distance to an exact surface, whose normals at the
-    /// nearest points go to `other`; `false` where none is near.
-    fn near_exact(
-        &mut self,
-        surface: &dyn RaySurface,
-        frame_from_surface: &Pose3,
-        reach: f32,
-        other: &mut Side,
-    ) -> bool {
-        self.near_normals.clear();
-        other.near_normals.clear();
-        self.deepest = 0.0;
-        let stride = self.points.len().div_ceil(AIM_SAMPLES).max(1);
-        for i in (0..self.points.len()).step_by(stride) {
-            let point = frame_from_surface.inverse_transform_point(self.points.point(i));
-            let (distance, normal) = surface.project(point);
-            self.deepest = self.deepest.max(-distance);
-            if distance <= reach {
-                self.near_normals.push(self.points.normal[i]);
-                other
-                    .near_normals
-                    .push(frame_from_surface.rotation * normal);
-            }
-        }
-        !self.near_normals.is_empty()
-    }
-
-    /// Image of this cloud, and of an exact surface into `image` over the same pixels.
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "one side of each kind, and where both are"
-    )]
-    fn look_with(
-        &mut self,
-        cloud: &PointCloud,
-        surface: &dyn RaySurface,
-        frame_from_surface: &Pose3,
-        camera: &VirtualCamera,
-        query: &PairQuery,
-        hits: &mut Vec<RayHit>,
-        image: &mut Tldi,
-    ) {
-        let Some(seen) = self.fragments.project(&self.points, camera) else {
-            self.image = Tldi::default();
-            *image = Tldi::default();
-            return;
-        };
-        let scale = DepthScale::new(seen.near, &query.params);
-        self.image(cloud, camera, &query.params, &seen.rect, &scale);
-        // Rays must pass through all of the surface, or what is deepest would be missed; through
-        // as much of an unbounded one as the cloud is deep in it.
-        let extent = surface.bounds().extents().length();
-        let beyond = if extent.is_finite() {
-            extent
-        } else {
-            2.0 * self.deepest
-        };
-        let margin = query.params.prediction + (seen.far - seen.near) + beyond;
-        let range = (seen.near - margin, seen.far + margin);
-        cast::cast(
-            surface,
-            frame_from_surface,
-            camera,
-            &self.image,
-            range,
-            hits,
-            image,
-        );
     }
 }

@@ -3,11 +3,14 @@
 //! A splat is the tangent disc of a point. It covers the pixels whose centre lies within its
 //! radius, and always the pixel it projects into; its depth at a pixel is that of the tangent
 //! plane along the pixel's ray. `mark` counts fragments per pixel, `alloc` turns counts into
-//! offsets, `splat` writes the fragments: a counting sort, linear in fragments and pixels.
+//! offsets, `splat` writes the fragments: a counting sort, linear in fragments and pixels. It goes
+//! by bands of rows, whose fragments stay in a core's cache.
 
-use super::cull::Survivors;
+use super::columns::{Columns, Tiles};
+use super::cull::PointRadii;
+use super::lanes::{multiversioned, truncated};
 use crate::{Params, Projection, VirtualCamera};
-use glamx::{Mat3, Vec3};
+use glamx::Vec3;
 
 /// Least radius of a splat in pixels: a disc must reach its neighbours' centres (half a pixel's
 /// diagonal and a bit), or a cloud finer than the image would leave pixels to single points.
@@ -20,20 +23,43 @@ pub(crate) const EDGE_ON: f32 = 0.2;
 /// order of the points.
 const DEPTH_STEPS: f32 = 4096.0;
 
+/// Steps of a normal's component in the integer sums.
+const NORMAL_STEPS: f32 = 16384.0;
+
 /// Largest weight of a fragment.
 const MAX_WEIGHT: f32 = 255.0;
+
+/// Rows of a band. A band of a thousand columns with eight fragments a pixel takes a megabyte:
+/// what a core's second cache holds.
+const BAND_ROWS: u32 = 16;
+
+/// Bits of a fragment's key that hold the depth; the class is above them.
+const DEPTH_BITS: u32 = 30;
+
+/// Largest depth in steps: 2 to that power less what an `f32` is precise to there.
+const MAX_DEPTH: f32 = ((1 << DEPTH_BITS) - 64) as f32;
 
 /// One splat in one pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Fragment {
-    /// Depth at the pixel's centre, in [`DepthScale::step`]s from [`DepthScale::zero`].
-    pub(crate) depth: i32,
-    /// Index of the culled point.
-    pub(crate) point: u32,
+    /// Class, then depth at the pixel's centre in [`DepthScale::step`]s from [`DepthScale::zero`].
+    pub(crate) key: u32,
+    /// Index of the splat.
+    pub(crate) splat: u32,
     /// 1 to 255: falls off with the distance from the centre and with the slope.
-    pub(crate) weight: u16,
-    /// Sort key before depth: 0 entry, 1 exit (or not oriented), 2 edge-on.
-    pub(crate) class: u16,
+    pub(crate) weight: u32,
+}
+
+impl Fragment {
+    /// 0 entry, 1 exit (or not oriented), 2 edge-on.
+    pub(crate) fn class(&self) -> u32 {
+        self.key >> DEPTH_BITS
+    }
+
+    /// In steps.
+    pub(crate) fn depth(&self) -> u32 {
+        self.key & ((1 << DEPTH_BITS) - 1)
+    }
 }
 
 /// Fixed-point depths.
@@ -43,33 +69,22 @@ pub(crate) struct DepthScale {
     pub(crate) zero: f32,
     /// Metres per step.
     pub(crate) step: f32,
+    inv_step: f32,
 }
 
 impl DepthScale {
     pub(crate) fn new(zero: f32, params: &Params) -> Self {
+        let step = params.merge_gap / DEPTH_STEPS;
         Self {
             zero,
-            step: params.merge_gap / DEPTH_STEPS,
+            step,
+            inv_step: 1.0 / step,
         }
     }
 
     pub(crate) fn metres(&self, steps: f32) -> f32 {
         self.zero + steps * self.step
     }
-}
-
-/// Fragments of one image and their offsets by pixel.
-#[derive(Default)]
-pub(crate) struct Fragments {
-    /// First fragment of each pixel; one entry more than pixels.
-    pub(crate) offsets: Vec<u32>,
-    pub(crate) fragments: Vec<Fragment>,
-    cursors: Vec<u32>,
-    /// Fragments with their pixels, in the order of the points.
-    unsorted: Vec<(u32, Fragment)>,
-    /// Normal of each culled point in the view frame.
-    pub(crate) view_normals: Vec<Vec3>,
-    view_points: Vec<Vec3>,
 }
 
 /// A rectangle of pixels.
@@ -111,120 +126,217 @@ pub(crate) struct Footprint {
     pub(crate) rect: Rect,
     pub(crate) near: f32,
     pub(crate) far: f32,
+    /// Largest radius of a splat in metres, and in pixels.
+    pub(crate) radius: f32,
+    pub(crate) reach: f32,
+    /// Edge of a pixel in metres where the points are nearest.
+    pub(crate) pixel_size: f32,
 }
 
-fn splat_radius(radius: f32, pixel_size: f32) -> f32 {
+/// Radius of a point's splat in metres.
+pub(crate) fn splat_radius(radius: f32, pixel_size: f32) -> f32 {
     radius.max(LEAST_RADIUS_PX * pixel_size)
 }
 
+/// The points that become fragments: a view's selection of the culled points.
+#[derive(Clone, Copy)]
+pub(crate) struct SplatPoints<'a> {
+    pub(crate) columns: &'a Columns,
+    /// Indices into `columns`.
+    pub(crate) kept: &'a [u32],
+    /// Unit normal of each kept point in the view frame.
+    pub(crate) normals: &'a [Vec3],
+    /// Whether normals point outward.
+    pub(crate) oriented: bool,
+    pub(crate) radii: PointRadii<'a>,
+}
+
+/// How an image is taken.
+#[derive(Clone, Copy)]
+pub(crate) struct Imaging<'a> {
+    pub(crate) camera: &'a VirtualCamera,
+    pub(crate) params: &'a Params,
+    pub(crate) rect: Rect,
+    /// Those that the points were sorted into.
+    pub(crate) tiles: Tiles,
+    pub(crate) scale: DepthScale,
+}
+
+/// One oriented disc. Lengths are in pixels, at the depth of the point. A cache line.
+#[derive(Clone, Copy, Default)]
+#[repr(align(64))]
+pub(crate) struct Splat {
+    /// Pixel coordinates of the point.
+    centre: [f32; 2],
+    radius: f32,
+    /// Rise of the depth per pixel along columns and rows.
+    slope: [f32; 2],
+    /// Depth of the point, in depth steps.
+    depth: f32,
+    /// Depth steps per pixel of (damped) rise.
+    steps: f32,
+    /// |n·v|: the share of the disc's area that the view sees.
+    facing: f32,
+    /// First and last column and row that may be covered, within the image.
+    first: [i32; 2],
+    last: [i32; 2],
+    /// The class where a fragment's key has it.
+    class: u32,
+    /// Which of the kept points this is.
+    pub(crate) kept: u32,
+    /// Unit normal in [`NORMAL_STEPS`]; towards the camera if not oriented.
+    pub(crate) normal: [i16; 3],
+}
+
+/// The splats of one image and the fragments of one of its bands, kept from call to call.
+#[derive(Default)]
+pub(crate) struct Fragments {
+    /// First splat of each tile; one entry more than tiles.
+    tiles: Vec<u32>,
+    /// In the order of their tiles.
+    splats: Vec<Splat>,
+    /// First fragment of each pixel of the current band; one entry more than pixels.
+    offsets: Vec<u32>,
+    /// End of the fragments of each pixel.
+    ends: Vec<u32>,
+    /// At least as many as the current band has.
+    fragments: Vec<Fragment>,
+}
+
 impl Fragments {
-    /// Moves the culled points into the view frame and returns what they cover, or `None` where
-    /// nothing is in view.
-    pub(crate) fn project(
-        &mut self,
-        points: &Survivors,
-        camera: &VirtualCamera,
-    ) -> Option<Footprint> {
-        let rotation = Mat3::from_quat(camera.view_from_frame.rotation);
-        let translation = camera.view_from_frame.translation;
-        self.view_points.clear();
-        self.view_points
-            .extend((0..points.len()).map(|i| rotation * points.point(i) + translation));
-        self.view_normals.clear();
-        self.view_normals
-            .extend(points.normal.iter().map(|&n| rotation * n));
-        let (mut lo, mut hi) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        let (mut near, mut far) = (f32::INFINITY, f32::NEG_INFINITY);
-        for (view, &radius) in self.view_points.iter().zip(&points.radius) {
-            if !in_view(view.z, camera) {
-                continue;
-            }
-            let pixel_size = camera.pixel_size_at(view.z);
-            let radius = splat_radius(radius, pixel_size);
-            let reach = radius / pixel_size;
-            let centre = camera.pixel_from_view(*view);
-            for k in 0..2 {
-                lo[k] = lo[k].min(centre[k] - reach);
-                hi[k] = hi[k].max(centre[k] + reach);
-            }
-            near = near.min(view.z - radius);
-            far = far.max(view.z + radius);
+    /// Makes the splats of an image, in the order of their tiles; returns the number of bands.
+    pub(crate) fn begin(&mut self, points: &SplatPoints, imaging: &Imaging) -> u32 {
+        self.tiles.clear();
+        self.tiles.resize(imaging.tiles.count() + 1, 0);
+        for &i in points.kept {
+            self.tiles[points.columns.tile[i as usize] as usize] += 1;
         }
-        let mut rect =
-            Rect::from_corners(lo.map(|c| c.floor() as i32), hi.map(|c| c.floor() as i32))
-                .filter(|_| near <= far)?;
-        if let Some(size) = camera.size {
-            rect = rect.intersection(&Rect {
-                origin: [0, 0],
-                size,
-            })?;
+        let mut sum = 0;
+        for tile in &mut self.tiles {
+            sum += *tile;
+            *tile = sum;
         }
-        Some(Footprint { rect, near, far })
+        self.splats.resize(points.kept.len(), Splat::default());
+        make_splats(points, imaging, &mut self.tiles, &mut self.splats);
+        imaging.rect.size[1].div_ceil(BAND_ROWS)
     }
 
-    /// `mark`, `alloc`, `splat` over the pixels of `rect`, for the points of the last `project`.
-    pub(crate) fn splat(
-        &mut self,
-        points: &Survivors,
-        oriented: bool,
-        camera: &VirtualCamera,
-        params: &Params,
-        rect: &Rect,
-        scale: &DepthScale,
-    ) {
-        // mark
+    /// `mark`, `alloc`, `splat` over the rows of one band.
+    pub(crate) fn splat_band(&mut self, band: u32, points: &SplatPoints, imaging: &Imaging) {
+        let Rect { origin, size } = imaging.rect;
+        let top = band * BAND_ROWS;
+        let rows = Rect {
+            origin: [origin[0], origin[1] + top as i32],
+            size: [size[0], BAND_ROWS.min(size[1] - top)],
+        };
+        let pixels = rows.pixels();
+        let members = imaging.tiles.around_rows(&rows);
+        let members = self.tiles[members.start] as usize..self.tiles[members.end] as usize;
+        let splats = &self.splats[members.clone()];
+        // mark: as many as the splats' boxes have pixels
         self.offsets.clear();
-        self.offsets.resize(rect.pixels() + 1, 0);
-        self.unsorted.clear();
-        for (i, view) in self.view_points.iter().enumerate() {
-            if in_view(view.z, camera) {
-                let normal = self.view_normals[i];
-                let splat = Splat::new(*view, normal, points.radius[i], oriented, camera);
-                splat.cover(i as u32, camera, params, rect, scale, |pixel, fragment| {
-                    self.offsets[pixel + 1] += 1;
-                    self.unsorted.push((pixel as u32, fragment));
-                });
+        self.offsets.resize(pixels + 1, 0);
+        for splat in splats {
+            for j in splat.rows(&rows) {
+                for count in &mut self.offsets[splat.columns(j, &rows)] {
+                    *count += 1;
+                }
             }
         }
         // alloc
-        for k in 1..self.offsets.len() {
-            self.offsets[k] += self.offsets[k - 1];
+        let mut sum = 0;
+        for offset in &mut self.offsets {
+            let count = *offset;
+            *offset = sum;
+            sum += count;
         }
+        if self.fragments.len() < sum as usize {
+            self.fragments.resize(sum as usize, Fragment::default());
+        }
+        self.ends.clear();
+        self.ends.extend_from_slice(&self.offsets[..pixels]);
         // splat
-        self.cursors.clear();
-        self.cursors.extend_from_slice(&self.offsets);
-        self.fragments.clear();
-        self.fragments
-            .resize(self.unsorted.len(), Fragment::default());
-        for (pixel, fragment) in &self.unsorted {
-            let cursor = &mut self.cursors[*pixel as usize];
-            self.fragments[*cursor as usize] = *fragment;
-            *cursor += 1;
+        let out = Out {
+            ends: &mut self.ends,
+            fragments: &mut self.fragments,
+            first_splat: members.start as u32,
+        };
+        match imaging.camera.projection {
+            Projection::Orthographic { .. } => {
+                fill_orthographic(splats, &rows, out);
+            }
+            Projection::Perspective { .. } => {
+                fill(splats, &rows, out, |splat, [u, v], _| {
+                    let k = splat.kept as usize;
+                    let (view, n) = (points.view(k), points.normals[k]);
+                    let ray = imaging.camera.view_at(u, v, 1.0);
+                    let rise = n.dot(view) / n.dot(ray) - view.z;
+                    rise / imaging.camera.pixel_size_at(view.z)
+                });
+            }
+        }
+    }
+
+    /// Number of pixels of the current band.
+    pub(crate) fn pixels(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// The fragments of a pixel of the current band, and what their `splat` is an index into.
+    pub(crate) fn of_pixel(&mut self, pixel: usize) -> (&mut [Fragment], &[Splat]) {
+        let range = self.offsets[pixel] as usize..self.ends[pixel] as usize;
+        (&mut self.fragments[range], &self.splats)
+    }
+}
+
+impl SplatPoints<'_> {
+    /// The k-th kept point, in the view frame.
+    fn view(&self, k: usize) -> Vec3 {
+        self.columns.view(self.kept[k] as usize)
+    }
+}
+
+/// Splats that are made before they go to their places: so many lines on their way to memory that
+/// is far from the core are waited for together.
+const CHUNK: usize = 64;
+
+multiversioned! {
+/// Writes the splats; each of `tiles` goes from its end to its first splat.
+fn make_splats(
+    points: &SplatPoints,
+    imaging: &Imaging,
+    tiles: &mut [u32],
+    splats: &mut [Splat],
+) {
+    let mut chunk = [Splat::default(); CHUNK];
+    for first in (0..points.kept.len()).step_by(CHUNK).rev() {
+        let kept = &points.kept[first..points.kept.len().min(first + CHUNK)];
+        let normals = &points.normals[first..first + kept.len()];
+        for (k, (splat, (&i, &normal))) in chunk.iter_mut().zip(kept.iter().zip(normals)).enumerate() {
+            let radius = points.radii.of(i as usize);
+            let view = points.columns.view(i as usize);
+            *splat = Splat::new(view, normal, radius, points.oriented, imaging);
+            splat.kept = (first + k) as u32;
+        }
+        for (splat, &i) in chunk.iter().zip(kept).rev() {
+            let cursor = &mut tiles[points.columns.tile[i as usize] as usize];
+            *cursor -= 1;
+            splats[*cursor as usize] = *splat;
         }
     }
 }
-
-fn in_view(depth: f32, camera: &VirtualCamera) -> bool {
-    match camera.projection {
-        Projection::Orthographic { .. } => true,
-        Projection::Perspective { near, far, .. } => depth >= near && depth <= far,
-    }
-}
-
-/// One oriented disc in the view frame.
-struct Splat {
-    view: Vec3,
-    normal: Vec3,
-    centre_px: [f32; 2],
-    radius: f32,
-    pixel_size: f32,
-    class: u16,
-    /// |n·v|: the share of the disc's area that the view sees.
-    facing: f32,
 }
 
 impl Splat {
-    fn new(view: Vec3, normal: Vec3, radius: f32, oriented: bool, camera: &VirtualCamera) -> Self {
+    #[inline(always)]
+    fn new(view: Vec3, normal: Vec3, radius: f32, oriented: bool, imaging: &Imaging) -> Self {
+        let Imaging {
+            camera,
+            params,
+            rect,
+            scale,
+            ..
+        } = imaging;
         let pixel_size = camera.pixel_size_at(view.z);
         let direction = match camera.projection {
             Projection::Orthographic { .. } => Vec3::Z,
@@ -234,78 +346,143 @@ impl Splat {
         let class = if along.abs() < EDGE_ON {
             2
         } else {
-            u16::from(!oriented || along > 0.0)
+            u32::from(!oriented || along > 0.0)
+        };
+        let inv_z = -1.0 / normal.z;
+        let slope = [normal.x * inv_z, normal.y * inv_z];
+        let centre = camera.pixel_from_view(view);
+        let radius = splat_radius(radius, pixel_size) / pixel_size;
+        // Centres at i + 0.5 within reach, and the pixel that holds the point.
+        let covered = [0, 1].map(|k| {
+            let own = centre[k].floor();
+            let lo = (centre[k] - radius - 0.5).ceil().min(own);
+            let hi = (centre[k] + radius - 0.5).floor().max(own);
+            let (origin, size) = (rect.origin[k] as f32, rect.size[k] as f32);
+            // Both within the image but for an empty range: beyond its end, or before its start.
+            let first = truncated(lo - origin, size) as i32;
+            let end = truncated(hi - origin + 1.0, size) as i32;
+            [rect.origin[k] + first, rect.origin[k] + end - 1]
+        });
+        let first = covered.map(|[first, _]| first);
+        let mut last = covered.map(|[_, last]| last);
+        if last[0] < first[0] {
+            // Beside the image: no rows either.
+            last[1] = first[1] - 1;
+        }
+        // Unoriented normals are taken as facing the camera.
+        let sign = if !oriented && normal.z > 0.0 {
+            -1.0
+        } else {
+            1.0
         };
         Self {
-            view,
-            normal,
-            centre_px: camera.pixel_from_view(view),
-            radius: splat_radius(radius, pixel_size),
-            pixel_size,
-            class,
+            centre,
+            radius,
+            slope: match slope[0].is_finite() && slope[1].is_finite() {
+                true => slope,
+                false => [0.0; 2],
+            },
+            depth: (view.z - scale.zero) * scale.inv_step,
+            steps: params.slope_damping * pixel_size * scale.inv_step,
             facing: along.abs(),
+            class: class << DEPTH_BITS,
+            normal: normal.to_array().map(|c| (sign * c * NORMAL_STEPS) as i16),
+            first,
+            last,
+            kept: 0,
         }
     }
 
-    /// Visits every pixel of `rect` that the splat covers.
-    fn cover(
-        &self,
-        point: u32,
-        camera: &VirtualCamera,
-        params: &Params,
-        rect: &Rect,
-        scale: &DepthScale,
-        mut visit: impl FnMut(usize, Fragment),
-    ) {
-        let reach = self.radius / self.pixel_size;
-        let own = self.centre_px.map(|c| c.floor() as i32);
-        let last = rect.last();
-        let range = |k: usize| {
-            // Centres at i + 0.5 within reach, and the pixel that holds the point.
-            let lo = ((self.centre_px[k] - reach - 0.5).ceil() as i32).min(own[k]);
-            let hi = ((self.centre_px[k] + reach - 0.5).floor() as i32).max(own[k]);
-            lo.max(rect.origin[k])..=hi.min(last[k])
-        };
-        let inv_radius_squared = 1.0 / (self.radius * self.radius);
-        for j in range(1) {
-            for i in range(0) {
-                let dx = (i as f32 + 0.5 - self.centre_px[0]) * self.pixel_size;
-                let dy = (j as f32 + 0.5 - self.centre_px[1]) * self.pixel_size;
-                let rise = self.rise(i, j, dx, dy, camera);
-                let share = 1.0 - (dx * dx + dy * dy + rise * rise) * inv_radius_squared;
-                if share <= 0.0 && [i, j] != own {
-                    continue;
-                }
-                let depth = self.view.z + params.slope_damping * rise;
-                let weight = 1.0 + (MAX_WEIGHT - 1.0) * share.max(0.0) * self.facing;
-                let pixel = (j - rect.origin[1]) as usize * rect.size[0] as usize
-                    + (i - rect.origin[0]) as usize;
-                let fragment = Fragment {
-                    depth: ((depth - scale.zero) / scale.step) as i32,
-                    point,
-                    weight: weight as u16,
-                    class: self.class,
-                };
-                visit(pixel, fragment);
-            }
-        }
-    }
-
-    /// Depth of the tangent plane at the pixel's centre over the depth of the point, in metres,
-    /// at most a radius.
-    fn rise(&self, i: i32, j: i32, dx: f32, dy: f32, camera: &VirtualCamera) -> f32 {
-        let n = self.normal;
-        let rise = match camera.projection {
-            Projection::Orthographic { .. } => -(n.x * dx + n.y * dy) / n.z,
-            Projection::Perspective { .. } => {
-                let ray = camera.view_at(i as f32 + 0.5, j as f32 + 0.5, 1.0);
-                n.dot(self.view) / n.dot(ray) - self.view.z
-            }
-        };
+    /// A rise in depth within the splat, at most its radius.
+    #[inline(always)]
+    fn limited(&self, rise: f32) -> f32 {
         if rise.is_finite() {
-            rise.clamp(-self.radius, self.radius)
+            rise.max(-self.radius).min(self.radius)
         } else {
             0.0
+        }
+    }
+
+    /// Rows of the image within `rows` that may be covered.
+    #[inline(always)]
+    fn rows(&self, rows: &Rect) -> std::ops::RangeInclusive<i32> {
+        let last = rows.origin[1] + rows.size[1] as i32 - 1;
+        self.first[1].max(rows.origin[1])..=self.last[1].min(last)
+    }
+
+    /// The pixels of row `j` that may be covered, as indices into `rows`.
+    #[inline(always)]
+    fn columns(&self, j: i32, rows: &Rect) -> std::ops::Range<usize> {
+        let start = (j - rows.origin[1]) as usize * rows.size[0] as usize;
+        start + (self.first[0] - rows.origin[0]) as usize
+            ..start + (self.last[0] - rows.origin[0]) as usize + 1
+    }
+}
+
+/// Where fragments go.
+struct Out<'a> {
+    ends: &'a mut [u32],
+    fragments: &'a mut [Fragment],
+    /// Index of the first of the splats.
+    first_splat: u32,
+}
+
+/// Pixels whose fragments are computed side by side: columns, and rows.
+const LANE_COLUMNS: usize = 4;
+const LANES: usize = 2 * LANE_COLUMNS;
+
+multiversioned! {
+fn fill_orthographic(splats: &[Splat], rows: &Rect, out: Out) {
+    fill(splats, rows, out, |splat, _, [dx, dy]| splat.slope[0] * dx + splat.slope[1] * dy);
+}
+}
+
+/// Writes the fragments of `splats`. `rise(splat, [u, v], [dx, dy])` tells how many pixels a
+/// splat's tangent plane rises from its centre to the pixel coordinates (u, v), (dx, dy) from it.
+#[inline(always)]
+fn fill(splats: &[Splat], rows: &Rect, out: Out, rise: impl Fn(&Splat, [f32; 2], [f32; 2]) -> f32) {
+    let width = rows.size[0] as usize;
+    let own = |d: f32| (d > -0.5) & (d <= 0.5);
+    for (splat, k) in splats.iter().zip(out.first_splat..) {
+        let inv_radius_squared = 1.0 / (splat.radius * splat.radius);
+        let range = splat.rows(rows);
+        let last_row = *range.end();
+        for j in range.step_by(LANES / LANE_COLUMNS) {
+            for i in (splat.first[0]..=splat.last[0]).step_by(LANE_COLUMNS) {
+                let (mut keys, mut weights) = ([0; LANES], [0; LANES]);
+                let mut covered = [0; LANES];
+                for l in 0..LANES {
+                    let (i, j) = (i + (l % LANE_COLUMNS) as i32, j + (l / LANE_COLUMNS) as i32);
+                    let [u, v] = [i as f32 + 0.5, j as f32 + 0.5];
+                    let (dx, dy) = (u - splat.centre[0], v - splat.centre[1]);
+                    let rise = splat.limited(rise(splat, [u, v], [dx, dy]));
+                    let share = 1.0 - (dx * dx + dy * dy + rise * rise) * inv_radius_squared;
+                    let depth = truncated(splat.depth + splat.steps * rise, MAX_DEPTH);
+                    keys[l] = splat.class | depth;
+                    let share_seen = if share > 0.0 {
+                        share * splat.facing
+                    } else {
+                        0.0
+                    };
+                    weights[l] = truncated(1.0 + (MAX_WEIGHT - 1.0) * share_seen, MAX_WEIGHT);
+                    let inside = (i <= splat.last[0]) & (j <= last_row);
+                    let hit = inside & ((share > 0.0) | (own(dx) & own(dy)));
+                    covered[l] = u32::from(hit) << l;
+                }
+                let mut covered = covered.into_iter().fold(0, |all, bit| all | bit);
+                let start = (j - rows.origin[1]) as usize * width + (i - rows.origin[0]) as usize;
+                while covered != 0 {
+                    let l = covered.trailing_zeros() as usize % LANES;
+                    covered &= covered - 1;
+                    let end = &mut out.ends[start + l / LANE_COLUMNS * width + l % LANE_COLUMNS];
+                    out.fragments[*end as usize] = Fragment {
+                        key: keys[l],
+                        splat: k,
+                        weight: weights[l],
+                    };
+                    *end += 1;
+                }
+            }
         }
     }
 }

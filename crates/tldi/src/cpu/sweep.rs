@@ -4,53 +4,40 @@
 //! depths follow each other within the merge gap is one layer. Sums are integers: a layer does not
 //! depend on the order of the points.
 
-use super::splat::{DepthScale, EDGE_ON, Fragment, Fragments, Rect};
-use crate::{Facing, Layer, Params, Tldi, VirtualCamera};
+use super::splat::{DepthScale, EDGE_ON, Fragment, Fragments, Imaging, Splat};
+use crate::{Facing, Layer, Tldi};
 use glamx::Vec3;
 
-/// Steps of a normal's component in the integer sums.
-const NORMAL_STEPS: f32 = 16384.0;
-
-/// Builds `out` from the fragments of a splat stage. `colors` are looked up by `index` (culled
-/// point to cloud point).
-#[allow(
-    clippy::too_many_arguments,
-    reason = "a stage: its inputs are separate buffers, as they will be on the GPU"
-)]
+/// Appends the layers of the band that was splatted last. `color` tells the colour of a kept
+/// point, where the cloud has colours.
 pub(crate) fn sweep(
     fragments: &mut Fragments,
-    index: &[u32],
-    colors: Option<&[[u8; 4]]>,
     oriented: bool,
-    camera: &VirtualCamera,
-    params: &Params,
-    rect: &Rect,
-    scale: &DepthScale,
+    color: Option<&dyn Fn(u32) -> [u8; 4]>,
+    imaging: &Imaging,
     out: &mut Tldi,
 ) {
-    out.begin(camera, rect.origin, rect.size);
-    let gap_steps = (params.merge_gap / scale.step) as i32;
-    for pixel in 0..rect.pixels() {
-        let range = fragments.offsets[pixel] as usize..fragments.offsets[pixel + 1] as usize;
-        let in_pixel = &mut fragments.fragments[range];
-        in_pixel.sort_unstable_by_key(|f| (f.class, f.depth, f.point));
+    let scale = &imaging.scale;
+    let gap_steps = (imaging.params.merge_gap / scale.step) as u32;
+    let same_layer =
+        |f: &Fragment, g: &Fragment| f.class() == g.class() && g.depth() - f.depth() <= gap_steps;
+    for pixel in 0..fragments.pixels() {
+        let (in_pixel, splats) = fragments.of_pixel(pixel);
+        in_pixel.sort_unstable_by_key(|f| f.key);
         let first_layer = out.layers.len();
-        let same_layer = |f: &Fragment, g: &Fragment| {
-            f.class == g.class && g.depth.saturating_sub(f.depth) <= gap_steps
-        };
         for run in in_pixel.chunk_by(same_layer) {
             let mut sum = Sum::default();
             for f in run {
-                sum.add(f, fragments.view_normals[f.point as usize], oriented);
-                if let Some(colors) = colors {
-                    sum.add_color(f, colors[index[f.point as usize] as usize]);
+                sum.add(f, &splats[f.splat as usize]);
+                if let Some(color) = color {
+                    sum.add_color(f, color(splats[f.splat as usize].kept));
                 }
             }
             out.layers
-                .push(sum.layer(run, oriented, colors.is_some(), scale));
+                .push(sum.layer(run, oriented, color.is_some(), scale));
         }
         out.layers[first_layer..]
-            .sort_by(|a, b| (a.depth.total_cmp(&b.depth)).then(a.facing.cmp(&b.facing)));
+            .sort_unstable_by(|a, b| (a.depth.total_cmp(&b.depth)).then(a.facing.cmp(&b.facing)));
         out.offsets.push(out.layers.len() as u32);
     }
 }
@@ -64,18 +51,12 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, f: &Fragment, normal: Vec3, oriented: bool) {
+    fn add(&mut self, f: &Fragment, splat: &Splat) {
         let w = i64::from(f.weight);
         self.weight += w;
-        self.depth += w * i64::from(f.depth);
-        // Unoriented normals are taken as facing the camera.
-        let sign = if !oriented && normal.z > 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
-        for (sum, c) in self.normal.iter_mut().zip(normal.to_array()) {
-            *sum += w * (sign * c * NORMAL_STEPS) as i64;
+        self.depth += w * i64::from(f.depth());
+        for (sum, c) in self.normal.iter_mut().zip(splat.normal) {
+            *sum += w * i64::from(c);
         }
     }
 
@@ -87,7 +68,7 @@ impl Sum {
 
     fn layer(&self, run: &[Fragment], oriented: bool, colored: bool, scale: &DepthScale) -> Layer {
         let normal = Vec3::from_array(self.normal.map(|n| n as f32)).normalize_or(-Vec3::Z);
-        let facing = match run[0].class {
+        let facing = match run[0].class() {
             0 => Facing::Entry,
             1 if oriented => Facing::Exit,
             _ => Facing::Unknown,
@@ -99,8 +80,8 @@ impl Sum {
             [0; 4]
         };
         Layer {
-            near: scale.metres(run[0].depth as f32),
-            far: scale.metres(run[run.len() - 1].depth as f32),
+            near: scale.metres(run[0].depth() as f32),
+            far: scale.metres(run[run.len() - 1].depth() as f32),
             depth: scale.metres((self.depth as f64 / self.weight as f64) as f32),
             normal,
             facing,

@@ -5,6 +5,7 @@
 //! found the pair is rejected before any image is built.
 
 use super::cull::Survivors;
+use super::lanes::{multiversioned, truncated};
 use crate::Aabb;
 use glamx::Vec3;
 
@@ -17,6 +18,8 @@ const MAX_CELLS: f32 = (1 << 22) as f32;
 pub(crate) struct ZoneScratch {
     bits: Vec<u64>,
     dilated: Vec<u64>,
+    cells_a: Vec<u32>,
+    cells_b: Vec<u32>,
 }
 
 struct Grid {
@@ -52,25 +55,11 @@ impl Grid {
         self.row_words * self.dims[1] * self.dims[2]
     }
 
-    /// Word and bit of a point; points outside count to the nearest cell.
-    fn locate(&self, p: Vec3) -> (usize, u32) {
-        let c = (p - self.min) * self.inv_cell;
-        let clamp = |c: f32, n: usize| (c.max(0.0) as usize).min(n - 1);
-        let [x, y, z] = [
-            clamp(c.x, self.dims[0]),
-            clamp(c.y, self.dims[1]),
-            clamp(c.z, self.dims[2]),
-        ];
-        let row = (z * self.dims[1] + y) * self.row_words;
-        (row + x / 64, (x % 64) as u32)
-    }
-
-    fn mark(&self, points: &Survivors, bits: &mut Vec<u64>) {
+    fn mark(&self, cells: &[u32], bits: &mut Vec<u64>) {
         bits.clear();
         bits.resize(self.words(), 0);
-        for i in 0..points.len() {
-            let (word, bit) = self.locate(points.point(i));
-            bits[word] |= 1 << bit;
+        for cell in cells {
+            bits[*cell as usize / 64] |= 1 << (cell % 64);
         }
     }
 
@@ -107,14 +96,39 @@ impl Grid {
         }
         bits.copy_from_slice(spare);
     }
+}
 
-    fn select(&self, points: &Survivors, bits: &[u64], near: &mut Vec<u32>) {
-        near.clear();
-        near.extend((0..points.len() as u32).filter(|&i| {
-            let (word, bit) = self.locate(points.point(i as usize));
-            bits[word] >> bit & 1 == 1
-        }));
+/// Fills `near` with the indices of the points whose cells are marked.
+fn select(cells: &[u32], bits: &[u64], near: &mut Vec<u32>) {
+    near.resize(cells.len(), 0);
+    let mut count = 0;
+    for (i, cell) in cells.iter().enumerate() {
+        near[count] = i as u32;
+        count += (bits[*cell as usize / 64] >> (cell % 64) & 1) as usize;
     }
+    near.truncate(count);
+}
+
+fn locate(points: &Survivors, grid: &Grid, cells: &mut Vec<u32>) {
+    cells.resize(points.len(), 0);
+    locate_cells(grid, &points.x, &points.y, &points.z, cells);
+}
+
+multiversioned! {
+/// Bit of the cell of each point; points outside the grid count to the nearest cell.
+fn locate_cells(grid: &Grid, x: &[f32], y: &[f32], z: &[f32], cells: &mut [u32]) {
+    let n = x.len().min(y.len()).min(z.len()).min(cells.len());
+    let (x, y, z, cells) = (&x[..n], &y[..n], &z[..n], &mut cells[..n]);
+    let [lx, ly, lz] = grid.dims.map(|n| (n - 1) as f32);
+    let (row_bits, rows) = (64 * grid.row_words as u32, grid.dims[1] as u32);
+    let (min, inv) = (grid.min, grid.inv_cell);
+    for i in 0..n {
+        let cx = truncated((x[i] - min.x) * inv, lx);
+        let cy = truncated((y[i] - min.y) * inv, ly);
+        let cz = truncated((z[i] - min.z) * inv, lz);
+        cells[i] = (cz * rows + cy) * row_bits + cx;
+    }
+}
 }
 
 /// Fills `near_a` and `near_b` with the indices of the culled points that have a point of the
@@ -130,16 +144,24 @@ pub(crate) fn zone(
     near_b: &mut Vec<u32>,
 ) {
     let grid = Grid::new(bounds, reach);
-    grid.mark(a, &mut scratch.bits);
-    grid.dilate(&mut scratch.bits, &mut scratch.dilated);
-    grid.select(b, &scratch.bits, near_b);
+    let ZoneScratch {
+        bits,
+        dilated,
+        cells_a,
+        cells_b,
+    } = scratch;
+    locate(a, &grid, cells_a);
+    locate(b, &grid, cells_b);
+    grid.mark(cells_a, bits);
+    grid.dilate(bits, dilated);
+    select(cells_b, bits, near_b);
     if near_b.is_empty() {
         near_a.clear();
         return;
     }
-    grid.mark(b, &mut scratch.bits);
-    grid.dilate(&mut scratch.bits, &mut scratch.dilated);
-    grid.select(a, &scratch.bits, near_a);
+    grid.mark(cells_b, bits);
+    grid.dilate(bits, dilated);
+    select(cells_a, bits, near_a);
 }
 
 #[cfg(test)]

@@ -68,7 +68,7 @@ use visibility::visibility;
 const BAND_ROWS: u32 = 8;
 
 /// Most pixels of an image: 1 GiB of offsets.
-const MAX_PIXELS: u64 = 1 << 28;
+pub(crate) const MAX_PIXELS: u64 = 1 << 28;
 
 /// Memory that [`build`] keeps from call to call.
 #[derive(Default)]

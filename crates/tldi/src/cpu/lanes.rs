@@ -1,0 +1,60 @@
+//! What the stages need so that compilers turn their loops into SIMD instructions.
+
+/// Compiles functions for the instruction sets that matter, chosen when they are called. Results
+/// are the same: no fused multiply-add is made of what is written as two operations.
+macro_rules! multiversioned {
+    ($function:item) => {
+        #[multiversion::multiversion(targets(
+            "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
+            "x86_64+avx2+fma",
+            "aarch64+neon"
+        ))]
+        $function
+    };
+}
+pub(super) use multiversioned;
+
+/// Largest bound of [`truncated`], the largest `f32` below 2³¹.
+const MOST: f32 = 2_147_483_520.0;
+
+/// The integer part of `value` within 0 to `most` (itself at least 0); 0 for what is not a number.
+///
+/// `as` does the same, but handles each number for itself: its conversions do not become SIMD
+/// instructions.
+#[inline(always)]
+pub(super) fn truncated(value: f32, most: f32) -> u32 {
+    let value = if value > 0.0 { value } else { 0.0 };
+    let most = if most < MOST { most } else { MOST };
+    let value = if value < most { value } else { most };
+    // SAFETY: `value` is neither NaN nor below 0 after the first line nor above 2³¹ after the
+    // third; `most` is not NaN after the second.
+    let truncated: i32 = unsafe { value.to_int_unchecked() };
+    truncated as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn truncates_as_casts_do() {
+        for value in [
+            f32::NAN,
+            f32::NEG_INFINITY,
+            f32::INFINITY,
+            -1e-30,
+            -0.0,
+            0.0,
+            0.999_999,
+            1.0,
+            16_777_217.3,
+            3e9,
+        ] {
+            for most in [0.0, 1.0, 1000.5, 1e9, f32::INFINITY, f32::NAN] {
+                let bound = if most.is_nan() { MOST } else { most.min(MOST) };
+                let expected = value.max(0.0).min(bound) as u32;
+                assert_eq!(truncated(value, most), expected, "{value} {most}");
+            }
+        }
+    }
+}
