@@ -72,19 +72,19 @@ pub fn body_from_surface(surface: SampledSurface) -> Result<PointCloud<'static>,
 
 /// The size in metres of a body whose file gives it `file_size`, in a scan with points of
 /// `scan_radius`: the file's own where that is plausible and not lost in the scan, else 0.2 m or
-/// 15 radii.
+/// the 10 radii that the scan resolves.
 ///
 /// ```
 /// use tldi_examples::load::default_size;
 /// assert_eq!(default_size(0.156, 0.008), 0.156); // a model in metres
 /// assert_eq!(default_size(150.9, 0.008), 0.2); // a model in units of its own
-/// assert_eq!(default_size(0.156, 0.07), 1.05); // too small for a coarse outdoor scan
+/// assert_eq!(default_size(0.156, 0.07), 0.7); // too small for a coarse outdoor scan
 /// ```
 pub fn default_size(file_size: f32, scan_radius: f32) -> f32 {
     if PLAUSIBLE_BODY_SIZES.contains(&file_size) && file_size >= LEAST_BODY_RADII * scan_radius {
         file_size
     } else {
-        f32::max(0.2, 1.5 * LEAST_BODY_RADII * scan_radius)
+        f32::max(0.2, LEAST_BODY_RADII * scan_radius)
     }
 }
 

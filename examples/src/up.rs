@@ -5,7 +5,6 @@
 //! decides, as rooms are wider than high. Which end of the axis is up shows in what stands on the
 //! level surfaces: furniture on a floor, hardly anything hangs from a ceiling or under a table.
 
-use std::collections::HashMap;
 use tldi::glamx::Vec3;
 
 /// Which way is up in a scan.
@@ -39,7 +38,7 @@ const MIN_PARALLEL_SHARE: f32 = 0.09;
 const EXTENT_WEIGHT: f32 = 0.3;
 /// Normals and points looked at, at most.
 const SAMPLES: usize = 20_000;
-const COLUMN_SAMPLES: usize = 100_000;
+const HEIGHT_SAMPLES: usize = 100_000;
 /// Evidence for the sign of the axis below which the convention of the file decides: a mean height
 /// that is 5 % of the scan's height off the middle, or as much of a difference of two mean heights.
 const MIN_SIGN_EVIDENCE: f32 = 0.1;
@@ -216,12 +215,12 @@ fn snapped_to_file_axis(sampled: &[(Vec3, Vec3)], axis: Vec3) -> Vec3 {
         .unwrap_or(axis)
 }
 
-/// Positive if `axis` points up, negative if down, 2 to 3 at most.
+/// Positive if `axis` points up, negative if down, 2 at most.
 ///
 /// Between level surfaces at both ends, floor and ceiling, things stand on the lower one. Else what
 /// is not level (walls, sides of furniture) is above the middle of what is, and stands on it.
 fn sign_evidence(points: &[Vec3], normals: &[Vec3], axis: Vec3) -> f32 {
-    let picked: Vec<usize> = every_nth(points.len(), COLUMN_SAMPLES)
+    let picked: Vec<usize> = every_nth(points.len(), HEIGHT_SAMPLES)
         .filter(|&i| points[i].is_finite() && normals[i].is_normalized())
         .collect();
     let mut heights: Vec<f32> = picked.iter().map(|&i| points[i].dot(axis)).collect();
@@ -258,58 +257,13 @@ fn sign_evidence(points: &[Vec3], normals: &[Vec3], axis: Vec3) -> f32 {
         return between.map_or(0.0, |mean| 1.0 - 2.0 * mean);
     }
     let (level, other) = (mean_of(&|_, level| level), mean_of(&|_, level| !level));
-    let rise = level.zip(other).map_or(0.0, |(level, other)| other - level);
-    let [above, below] = beside_level_points(points, normals, axis, &picked);
-    let all = above + below + level_points().count();
-    (above as f32 - below as f32) / all.max(1) as f32 + 2.0 * rise
+    level
+        .zip(other)
+        .map_or(0.0, |(level, other)| 2.0 * (other - level))
 }
 
 fn is_level(normal: Vec3, axis: Vec3) -> bool {
     normal.dot(axis).abs() >= PARALLEL
-}
-
-/// How many of the picked points are closely above and below level ones: pairs, in columns along
-/// the axis.
-fn beside_level_points(
-    points: &[Vec3],
-    normals: &[Vec3],
-    axis: Vec3,
-    picked: &[usize],
-) -> [usize; 2] {
-    let (right, forward) = axis.any_orthonormal_pair();
-    let (min, max) = picked
-        .iter()
-        .map(|&i| points[i])
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| {
-            (min.min(p), max.max(p))
-        });
-    let size = (max - min).max_element();
-    // Columns as wide as 1 % of the scan, looked at between 2 % and 20 % of it from each level
-    // point: wide of the level surface's own noise, near enough to be standing on it.
-    let column_of = |p: Vec3| {
-        let cell = |along: f32| (along / (0.01 * size)).floor() as i32;
-        (cell(p.dot(right)), cell(p.dot(forward)))
-    };
-    let (near, far) = (0.02 * size, 0.2 * size);
-    let mut columns: HashMap<(i32, i32), Vec<f32>> = HashMap::new();
-    for &i in picked {
-        columns
-            .entry(column_of(points[i]))
-            .or_default()
-            .push(points[i].dot(axis));
-    }
-    for heights in columns.values_mut() {
-        heights.sort_unstable_by(f32::total_cmp);
-    }
-    let (mut above, mut below) = (0, 0);
-    for &i in picked.iter().filter(|&&i| is_level(normals[i], axis)) {
-        let heights = &columns[&column_of(points[i])];
-        let height = points[i].dot(axis);
-        let count_to = |limit: f32| heights.partition_point(|h| *h < limit);
-        above += count_to(height + far) - count_to(height + near);
-        below += count_to(height - near) - count_to(height - far);
-    }
-    [above, below]
 }
 
 #[cfg(test)]

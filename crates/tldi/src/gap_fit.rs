@@ -21,7 +21,7 @@ const LEAST_BEND_WEIGHT: f32 = 2.0;
 pub(crate) fn fitted_gap(k: u32, contacts: &[ContactPixel], links: &Links) -> f32 {
     let mut ring = ArrayVec::<u32, MOST_NEIGHBORS>::new();
     ring.push(k);
-    let mut push_neighbors = |ring: &mut ArrayVec<u32, MOST_NEIGHBORS>, of: u32| {
+    let push_neighbors = |ring: &mut ArrayVec<u32, MOST_NEIGHBORS>, of: u32| {
         for &l in links.neighbors(of) {
             if !ring.is_full() && !ring.contains(&l) {
                 ring.push(l);
