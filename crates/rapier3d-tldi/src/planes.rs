@@ -7,10 +7,7 @@
 
 use crate::parts::ShapePair;
 use rapier3d::geometry::ContactManifold;
-use tldi::{ContactPoint, PATCH_POINTS, supports};
-
-/// Manifolds with normals within 10° share a plane; rapier merges those within 5.1°.
-const SAME_PLANE: f32 = 0.985;
+use tldi::{ContactPoint, PATCH_POINTS, SAME_PLANE, supports};
 
 /// Merges the manifolds of each plane into the first of them; their points are in the frames of
 /// the colliders. `scatter`, in metres, is what gaps scatter by.

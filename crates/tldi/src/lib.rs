@@ -39,7 +39,7 @@ pub use error::CloudError;
 pub use glamx;
 pub use knn::{KdTree, Neighbor};
 pub use params::{Params, Variant};
-pub use patches::{MAX_PATCHES, PatchScratch};
+pub use patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};
 pub use supports::{Supports, supports};
 pub use surface::{RayHit, RaySurface, Surface};
 

@@ -147,3 +147,68 @@ impl Links {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glamx::Vec3;
+
+    const PIXEL: f32 = 0.01;
+
+    /// Contact pixels of two level surfaces, `depth` metres deep.
+    fn contacts(pixels: &[[i32; 2]], depth: f32) -> Vec<ContactPixel> {
+        let at = |[i, j]: [i32; 2]| PIXEL * Vec3::new(i as f32, 0.0, j as f32);
+        pixels
+            .iter()
+            .map(|&pixel| ContactPixel {
+                pixel,
+                view: 0,
+                point_a: at(pixel),
+                point_b: at(pixel) - depth * Vec3::Y,
+                normal_a: Vec3::Y,
+                normal_b: -Vec3::Y,
+                gap: -depth,
+            })
+            .collect()
+    }
+
+    fn confirmed(pixels: &[[i32; 2]], depth: f32) -> PairResult {
+        let mut result = PairResult {
+            contacts: contacts(pixels, depth),
+            ..PairResult::default()
+        };
+        let params = Params::for_radius(PIXEL);
+        let mut links = Links::default();
+        links.find(&result.contacts, &params);
+        links.confirm(&mut result, &params);
+        let count = result.contacts.len();
+        for (k, l) in &links.pairs {
+            assert!(links.neighbors(*k).contains(l) && links.neighbors(*l).contains(k));
+            assert!((*k as usize) < count && (*l as usize) < count);
+        }
+        result
+    }
+
+    #[test]
+    fn a_deep_row_is_no_penetration_but_a_deep_block_is() {
+        let row: Vec<[i32; 2]> = (0..9).map(|i| [i, 0]).collect();
+        let result = confirmed(&row, 5.0 * PIXEL);
+        assert!(result.contacts.is_empty() && !result.collides && result.gap.is_none());
+        let block: Vec<[i32; 2]> = (0..25).map(|k| [k % 5, k / 5]).collect();
+        let result = confirmed(&block, 5.0 * PIXEL);
+        // Corners have three neighbours, the other pixels five and more.
+        assert_eq!(result.contacts.len(), 21);
+        assert!(result.collides);
+        assert_eq!(result.gap, Some(-5.0 * PIXEL));
+    }
+
+    #[test]
+    fn a_lone_pixel_touches() {
+        let lone = confirmed(&[[0, 0]], PIXEL);
+        assert_eq!(lone.contacts.len(), 1);
+        assert_eq!(lone.contacts[0].gap, 0.0);
+        // Two neighbours of five confirm two fifths of a merge gap of two pixels.
+        let middle = confirmed(&[[0, 0], [1, 0], [2, 0]], PIXEL).contacts[1];
+        assert!((middle.gap + 0.8 * PIXEL).abs() < 1e-6, "{}", middle.gap);
+    }
+}

@@ -6,9 +6,9 @@
 
 use crate::gap_fit::fitted_gap;
 use crate::links::Links;
-use crate::supports::{Supports, supports};
+use crate::supports::{Supports, longest_axis, supports};
 use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, PairResult, Params};
-use glamx::{Vec2, Vec3};
+use glamx::Vec3;
 use std::ops::Range;
 
 /// Most patches of one pair, the deepest: a solver gains nothing from more.
@@ -26,10 +26,11 @@ const LEAST_SPLIT: usize = 12;
 /// Splits in a row: at most eight parts a group.
 const MAX_SPLITS: u32 = 3;
 
-/// Parts with normals within 10° of each other share a patch, wherever they are: a solver needs the
-/// supports of one plane together to choose the few that it takes (rapier merges manifolds within
-/// 5.1° and keeps the deepest points, which need not be those that bear the load).
-const SAME_PLANE: f32 = 0.985;
+/// Cosine of the angle (10°) within which normals belong to one plane: such parts share a patch,
+/// wherever they are. A solver needs the supports of one plane together to choose the few that it
+/// takes (rapier merges manifolds within 5.1° and keeps the deepest points, which need not be those
+/// that bear the load).
+pub const SAME_PLANE: f32 = 0.985;
 
 /// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal.
 const NORMAL_BAND: f32 = 2.0;
@@ -276,21 +277,12 @@ impl Shape {
                 .map(|&m| contacts[m as usize].middle())
         };
         let centre = in_band().sum::<Vec3>() / in_band().count() as f32;
-        let (u, v) = normal.any_orthonormal_pair();
-        let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
-        for p in in_band() {
-            let d = Vec2::new((p - centre).dot(u), (p - centre).dot(v));
-            uu += d.x * d.x;
-            uv += d.x * d.y;
-            vv += d.y * d.y;
-        }
-        let (sin, cos) = (0.5 * (2.0 * uv).atan2(uu - vv)).sin_cos();
         Self {
             normal,
             normal_length: mean.length() / total,
             least_gap,
             centre,
-            longest: cos * u + sin * v,
+            longest: longest_axis(in_band(), centre, normal),
         }
     }
 

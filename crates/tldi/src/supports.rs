@@ -35,19 +35,9 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     let middles = || points.iter().map(ContactPoint::middle);
     let count = points.len() as f32;
     let centre = middles().sum::<Vec3>() / count;
-    let (u, v) = normal.any_orthonormal_pair();
-    let in_plane = |p: Vec3| Vec2::new((p - centre).dot(u), (p - centre).dot(v));
-    let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
-    for d in middles().map(in_plane) {
-        uu += d.x * d.x;
-        uv += d.x * d.y;
-        vv += d.y * d.y;
-    }
-    let main_axis = Vec2::from_angle(0.5 * (2.0 * uv).atan2(uu - vv));
-    let along_axes = |p: Vec3| {
-        let d = in_plane(p);
-        Vec2::new(d.dot(main_axis), d.dot(main_axis.perp()))
-    };
+    let longest = longest_axis(middles(), centre, normal);
+    let across = normal.cross(longest);
+    let along_axes = |p: Vec3| Vec2::new((p - centre).dot(longest), (p - centre).dot(across));
     let variance = middles().map(along_axes).map(|d| d * d).sum::<Vec2>() / count;
     // Points in a row, or a single one, have no extent across.
     let sigma = Vec2::new(variance.x.sqrt(), variance.y.sqrt()).max(Vec2::splat(f32::MIN_POSITIVE));
@@ -85,4 +75,74 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         }
     }
     Supports { indices, roughness }
+}
+
+/// Direction across `normal`, of unit length, in which points about `centre` extend the most.
+pub(crate) fn longest_axis(points: impl Iterator<Item = Vec3>, centre: Vec3, normal: Vec3) -> Vec3 {
+    let (u, v) = normal.any_orthonormal_pair();
+    let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
+    for p in points {
+        let d = Vec2::new((p - centre).dot(u), (p - centre).dot(v));
+        uu += d.x * d.x;
+        uv += d.x * d.y;
+        vv += d.y * d.y;
+    }
+    let (sin, cos) = (0.5 * (2.0 * uv).atan2(uu - vv)).sin_cos();
+    cos * u + sin * v
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fastrand::Rng;
+
+    /// Feet under a table of noisy height: always the same four, however it is tilted.
+    #[test]
+    fn tilting_changes_nothing() {
+        let mut rng = Rng::with_seed(3);
+        let mut feet: Vec<Vec3> = (0..60)
+            .map(|_| Vec3::new(rng.f32() - 0.5, 0.0, 0.6 * rng.f32() - 0.3))
+            .collect();
+        feet.extend(
+            [[-1.0, 0.5], [1.0, 0.5], [-1.0, -0.5], [1.0, -0.5]].map(|[x, z]| Vec3::new(x, 0.0, z)),
+        );
+        let noise: Vec<f32> = feet.iter().map(|_| 0.002 * rng.f32()).collect();
+        for tilt in [Vec2::ZERO, Vec2::new(0.1, 0.0), Vec2::new(-0.03, 0.08)] {
+            let points: Vec<ContactPoint> = feet
+                .iter()
+                .zip(&noise)
+                .map(|(&p, noise)| {
+                    let gap = noise + tilt.x * p.x + tilt.y * p.z;
+                    let apart = 0.5 * gap * Vec3::Y;
+                    ContactPoint {
+                        point_a: p - apart,
+                        point_b: p + apart,
+                        gap,
+                    }
+                })
+                .collect();
+            let found = supports(&points, Vec3::Y, 0.001);
+            let mut indices = found.indices;
+            indices.sort();
+            assert_eq!(indices[..], [60, 61, 62, 63], "{tilt}");
+            assert!(found.roughness < 0.002, "{}", found.roughness);
+        }
+    }
+
+    #[test]
+    fn rows_and_single_points_are_enough() {
+        let row: Vec<ContactPoint> = (0..5)
+            .map(|k| Vec3::new(k as f32, 0.0, 0.0))
+            .map(|p| ContactPoint {
+                point_a: p,
+                point_b: p,
+                gap: 0.0,
+            })
+            .collect();
+        let mut ends = supports(&row, Vec3::Y, 0.01).indices;
+        ends.sort();
+        assert_eq!((ends[0], ends[ends.len() - 1]), (0, 4));
+        assert_eq!(supports(&row[..1], Vec3::Y, 0.01).indices[..], [0]);
+        assert!(supports(&[], Vec3::Y, 0.01).indices.is_empty());
+    }
 }

@@ -231,3 +231,46 @@ fn facing_camera(normal: Vec3, sign: f32) -> Vec3 {
         normal
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layer(depth: f32, facing: Facing) -> Layer {
+        let normal = match facing {
+            Facing::Exit => Vec3::Z,
+            _ => -Vec3::Z,
+        };
+        Layer {
+            near: depth,
+            far: depth,
+            depth,
+            normal,
+            facing,
+            color: [0; 4],
+        }
+    }
+
+    /// Where a ray entered what it leaves last, and left what it enters first, for a merge gap of 2.
+    #[test]
+    fn rays_that_missed_a_layer_tell_nothing_of_the_inside() {
+        let params = Params::for_radius(1.0);
+        let entry = |depth| layer(depth, Facing::Entry);
+        let exit = |depth| layer(depth, Facing::Exit);
+        let unknown = |depth| layer(depth, Facing::Unknown);
+        let entered = |layers: &[Layer]| entered_at(layers, None, &params);
+        assert_eq!(entered(&[entry(1.0), exit(9.0)]), 1.0);
+        assert_eq!(entered(&[exit(9.0)]), f32::NEG_INFINITY);
+        // The entry belongs to the first exit.
+        assert_eq!(entered(&[entry(1.0), exit(3.0), exit(9.0)]), 7.0);
+        assert_eq!(entered(&[unknown(1.0), unknown(9.0)]), 1.0);
+        let left = |layers: &[Layer]| left_at(layers, None, &params);
+        assert_eq!(left(&[entry(1.0), exit(9.0)]), 9.0);
+        assert_eq!(left(&[entry(1.0)]), f32::INFINITY);
+        assert_eq!(left(&[entry(1.0), entry(5.0), exit(9.0)]), 3.0);
+        // What is seen edge-on is passed over.
+        let mut edge_on = exit(5.0);
+        edge_on.normal = Vec3::X;
+        assert_eq!(left(&[entry(1.0), edge_on, exit(9.0)]), 9.0);
+    }
+}
