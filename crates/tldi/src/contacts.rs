@@ -18,7 +18,8 @@ pub struct ContactPixel {
     pub normal_a: Vec3,
     /// Outward unit normal of the second surface (towards the first).
     pub normal_b: Vec3,
-    /// Signed distance between the surfaces along the normal, metres; negative: penetration.
+    /// Signed distance between the surfaces along the normal, metres; negative: penetration, cut to
+    /// what the neighbouring pixels confirm.
     pub gap: f32,
 }
 

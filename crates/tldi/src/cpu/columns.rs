@@ -392,7 +392,7 @@ mod tests {
             columns_b.sort(&tiles, &camera);
             columns_b.reduce(&tiles, -1.0, 0.0);
             let mut touching = Touching::default();
-            let _ = touching.mark(&columns_a, &columns_b, &tiles, &rect, REACH, 0.0);
+            touching.mark(&columns_a, &columns_b, &tiles, &rect, REACH, 0.0);
             let meet = |i: usize, j: usize, apart: f32| {
                 (a.x[i] - b.x[j]).abs() <= apart
                     && (a.y[i] - b.y[j]).abs() <= apart
