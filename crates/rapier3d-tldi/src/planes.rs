@@ -9,8 +9,8 @@ use crate::parts::ShapePair;
 use rapier3d::geometry::ContactManifold;
 use tldi::{ContactPoint, PATCH_POINTS, SAME_PLANE, supports};
 
-/// Merges the manifolds of each plane into the first of them; their points are in the frames of
-/// the colliders. `scatter`, in metres, is what gaps scatter by.
+/// Merges the manifolds of each plane into the first of them, which keeps the names of its parts;
+/// their points are in the frames of the colliders. `scatter`, in metres, is what gaps scatter by.
 pub(crate) fn share_planes(
     pair: &ShapePair<'_>,
     scatter: f32,

@@ -51,7 +51,9 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         / count;
     let residual = |p: &ContactPoint| p.gap - mean_gap - slope.dot(place(p));
     let squares = points.iter().map(|p| residual(p).powi(2)).sum::<f32>();
-    let roughness = (squares / count).sqrt().max(least_roughness);
+    // A perfectly flat patch has none, by which nothing can be divided.
+    let least = least_roughness.max(f32::MIN_POSITIVE);
+    let roughness = (squares / count).sqrt().max(least);
     let mut best = [(f32::NEG_INFINITY, 0); PATCH_POINTS];
     for (k, point) in points.iter().enumerate() {
         let (place, low) = (place(point), -residual(point) / roughness);
@@ -143,6 +145,10 @@ mod tests {
         ends.sort();
         assert_eq!((ends[0], ends[ends.len() - 1]), (0, 4));
         assert_eq!(supports(&row[..1], Vec3::Y, 0.01).indices[..], [0]);
+        // Exactly flat, and no roughness given.
+        let mut ends = supports(&row, Vec3::Y, 0.0).indices;
+        ends.sort();
+        assert_eq!((ends[0], ends[ends.len() - 1]), (0, 4));
         assert!(supports(&[], Vec3::Y, 0.01).indices.is_empty());
     }
 }
