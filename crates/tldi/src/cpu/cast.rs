@@ -4,28 +4,40 @@ use super::splat::Rect;
 use crate::{Facing, Layer, RayHit, RaySurface, Tldi, VirtualCamera};
 use glamx::Pose3;
 
-/// Builds `out` over the pixels of `cover`, an image of the other surface with an orthographic
-/// camera; pixels in which that has no layer stay empty, for nothing there can be compared.
-/// Rays run from depth `near` to depth `far`, in metres.
+/// The rays of an image.
+pub(crate) struct Rays<'a> {
+    /// Orthographic.
+    pub(crate) camera: &'a VirtualCamera,
+    pub(crate) rect: Rect,
+    /// They run from this depth, in metres, ...
+    pub(crate) near: f32,
+    /// ... to this one.
+    pub(crate) far: f32,
+    /// An image over the same pixels: those in which it has no layer stay empty.
+    pub(crate) cover: Option<&'a Tldi>,
+}
+
+/// Builds `out`.
 pub(crate) fn cast(
     surface: &dyn RaySurface,
     frame_from_surface: &Pose3,
-    camera: &VirtualCamera,
-    cover: &Tldi,
-    (near, far): (f32, f32),
+    rays: &Rays,
     hits: &mut Vec<RayHit>,
     out: &mut Tldi,
 ) {
-    let rect = Rect {
-        origin: cover.origin,
-        size: cover.size,
-    };
+    let Rays {
+        camera,
+        rect,
+        near,
+        far,
+        cover,
+    } = *rays;
     out.begin(camera, rect.origin, rect.size);
     let closed = surface.is_closed();
     let direction = frame_from_surface.rotation.inverse() * camera.axis();
     let view_from_surface = camera.view_from_frame.rotation * frame_from_surface.rotation;
     for pixel in 0..rect.pixels() {
-        if !cover.layers_of(pixel).is_empty() {
+        if cover.is_none_or(|cover| !cover.layers_of(pixel).is_empty()) {
             let i = rect.origin[0] + (pixel % rect.size[0] as usize) as i32;
             let j = rect.origin[1] + (pixel / rect.size[0] as usize) as i32;
             let start = camera.point_at(i as f32 + 0.5, j as f32 + 0.5, near);

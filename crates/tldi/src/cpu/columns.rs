@@ -271,7 +271,12 @@ impl Touching {
 }
 
 /// Replaces each value by what `op` makes of it and its eight neighbours. `spare` is overwritten.
-fn dilate<T: Copy>(values: &mut [T], spare: &mut Vec<T>, width: usize, op: impl Fn(T, T) -> T) {
+pub(crate) fn dilate<T: Copy>(
+    values: &mut [T],
+    spare: &mut Vec<T>,
+    width: usize,
+    op: impl Fn(T, T) -> T,
+) {
     spare.clear();
     spare.extend_from_slice(values);
     // Along rows into `spare`, then along columns back.

@@ -3,13 +3,14 @@
 //! One file a stage: `cull`, `zone`, `aim`, `columns`, `normals`, `splat` (with `mark` and
 //! `alloc`), `cast`, `sweep`, `compare`; then the reduction to contact patches, which all backends
 //! share. `pair` runs them, `side` those of one cloud; `lanes` is what
-//! makes their inner loops SIMD.
+//! makes their inner loops SIMD. `impact` compares the images of a motion.
 
 mod aim;
 mod cast;
 mod columns;
 mod compare;
 mod cull;
+mod impact;
 mod lanes;
 mod normals;
 mod pair;
@@ -19,8 +20,8 @@ mod sweep;
 mod zone;
 
 use crate::{
-    Aabb, Backend, BackendError, PairQuery, PairResult, Params, PointCloud, Projection, Surface,
-    Tldi, Variant, View, VirtualCamera, paper,
+    Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,
+    Projection, Surface, Tldi, Variant, View, VirtualCamera, paper,
 };
 use cull::Region;
 use glamx::{Pose3, Vec3};
@@ -70,6 +71,45 @@ impl CpuBackend {
         Self::default()
     }
 
+    /// Where a surface in straight motion first meets another, or `None` where it does not.
+    ///
+    /// The distance is within a depth error of the images where the surfaces meet face on (0.1 r̄ of
+    /// the coarser cloud), and within a pixel over the cosine between normal and motion where they
+    /// do not. Surfaces are met from behind as well, but for solids with oriented normals, which
+    /// what is inside may leave. Cost: reading both clouds and the layers in the way of the motion.
+    ///
+    /// # Errors
+    /// [`BackendError::Unsupported`] with pair 0: no side is a cloud, or bad parameters.
+    ///
+    /// ```
+    /// use tldi::{CpuBackend, ImpactQuery, Params, PointCloud, Surface};
+    /// use tldi::glamx::{Pose3, Vec3};
+    ///
+    /// let points: Vec<Vec3> = (0..441)
+    ///     .map(|i| Vec3::new((i % 21) as f32 * 0.05, 0.0, (i / 21) as f32 * 0.05))
+    ///     .collect();
+    /// let sheet = PointCloud::builder(&points).radius(0.05).build()?;
+    /// let impact = CpuBackend::new().impact(&ImpactQuery {
+    ///     a: Surface::Cloud(&sheet),
+    ///     b: Surface::Cloud(&sheet),
+    ///     a_from_b: Pose3::translation(0.0, 2.0, 0.0),
+    ///     motion: Vec3::new(0.0, -5.0, 0.0),
+    ///     least_distance: 0.0,
+    ///     core_only: false,
+    ///     params: Params::for_radius(0.05),
+    /// })?;
+    /// let impact = impact.expect("the sheets meet");
+    /// assert!((impact.distance - 2.0).abs() < 1e-3);
+    /// assert!(impact.normal.y > 0.999);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn impact(&self, query: &ImpactQuery) -> Result<Option<Impact>, BackendError> {
+        supported_surfaces(query.a, query.b)
+            .and_then(|()| supported_params(&query.params))
+            .map_err(|reason| BackendError::Unsupported { pair: 0, reason })?;
+        Ok(self.with_scratch(|scratch| scratch.impact(query)))
+    }
+
     fn with_scratch<R>(&self, run: impl FnOnce(&mut Scratch) -> R) -> R {
         // A panic while the lock is held leaves a list of scratch buffers, which is always valid.
         let pop = || {
@@ -115,18 +155,14 @@ impl Backend for CpuBackend {
 }
 
 fn supported(query: &PairQuery) -> Result<(), &'static str> {
-    let exact = [query.a, query.b]
-        .iter()
-        .filter(|s| matches!(s, Surface::Exact(_)))
-        .count();
-    if exact == 2 {
-        return Err("both surfaces are exact: leave this pair to the physics engine");
-    }
-    if exact == 1 && query.params.variant() == Variant::Paper {
+    supported_surfaces(query.a, query.b)?;
+    supported_params(&query.params)?;
+    let exact = has_exact(query.a, query.b);
+    if exact && query.params.variant() == Variant::Paper {
         return Err("the paper's variant compares clouds only: use Variant::Oriented");
     }
     if let View::Fixed(camera) = query.view
-        && exact == 1
+        && exact
         && matches!(camera.projection, Projection::Perspective { .. })
     {
         return Err("exact surfaces need an orthographic camera");
@@ -137,17 +173,34 @@ fn supported(query: &PairQuery) -> Result<(), &'static str> {
     {
         return Err("a perspective camera needs an image of fixed size");
     }
-    let p = &query.params;
-    if !(p.pixel_size > 0.0 && p.merge_gap > 0.0 && p.prediction >= 0.0) {
-        return Err("pixel_size and merge_gap must be positive, prediction not negative");
-    }
-    if p.variant() == Variant::Paper && most_pixels(query) > paper::MAX_PIXELS as f64 {
+    if query.params.variant() == Variant::Paper && most_pixels(query) > paper::MAX_PIXELS as f64 {
         return Err(
             "the paper's image may have more than 2^28 pixels: use a larger pixel_size, \
              a smaller image or smaller clouds",
         );
     }
     Ok(())
+}
+
+fn has_exact(a: Surface, b: Surface) -> bool {
+    matches!(a, Surface::Exact(_)) || matches!(b, Surface::Exact(_))
+}
+
+fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static str> {
+    match (a, b) {
+        (Surface::Exact(_), Surface::Exact(_)) => {
+            Err("both surfaces are exact: leave this pair to the physics engine")
+        }
+        _ => Ok(()),
+    }
+}
+
+fn supported_params(p: &Params) -> Result<(), &'static str> {
+    if p.pixel_size > 0.0 && p.merge_gap > 0.0 && p.prediction >= 0.0 {
+        Ok(())
+    } else {
+        Err("pixel_size and merge_gap must be positive, prediction not negative")
+    }
 }
 
 /// At least the number of pixels that the paper's image of either cloud has.

@@ -4,12 +4,15 @@ use super::aim::{self, Hint, MAX_VIEWS, ZoneNormals};
 use super::columns::{Tiles, Touching};
 use super::compare::{self, Middles};
 use super::cull::{self, Region};
+use super::impact::CoreScratch;
 use super::normals;
-use super::side::{CloudView, Side};
-use super::splat::{DepthScale, Imaging};
+use super::side::{CloudView, ExactView, Side};
+use super::splat::{DepthScale, Imaging, Rect};
 use super::zone::{self, ZoneScratch};
 use crate::patches::PatchScratch;
-use crate::{Aabb, PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper};
+use crate::{
+    Aabb, PairQuery, PairResult, Params, RayHit, Surface, Variant, View, VirtualCamera, paper,
+};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
 
@@ -22,11 +25,12 @@ const REACH: f32 = 2.0;
 /// Everything one pair needs while it is compared.
 #[derive(Default)]
 pub(super) struct Scratch {
-    a: Side,
-    b: Side,
+    pub(super) a: Side,
+    pub(super) b: Side,
+    pub(super) hits: Vec<RayHit>,
+    pub(super) core: CoreScratch,
     zone: ZoneScratch,
     touching: Touching,
-    hits: Vec<RayHit>,
     paper: [paper::Scratch; 2],
     patches: PatchScratch,
 }
@@ -118,15 +122,7 @@ impl Scratch {
     /// `None` where a cloud has no point in it.
     fn cull(&mut self, query: &PairQuery) -> Option<Aabb> {
         let (bounds_a, bounds_b) = (query.a.bounds(), query.b.bounds());
-        // Splats reach a radius beyond their points, on both sides; normals that are estimated
-        // here need their neighbours, or they would err at the rim.
-        let ring = |surface: &Surface| match surface {
-            Surface::Cloud(cloud) if cloud.normals().is_none() => {
-                let stride = cull::stride(cloud, query.params.pixel_size) as f32;
-                (2.0 + normals::SUPPORT * stride.sqrt()) * cloud.mean_radius()
-            }
-            surface => 2.0 * surface.mean_radius(),
-        };
+        let ring = |surface| ring(surface, &query.params);
         let margin = query.params.prediction + ring(&query.a).max(ring(&query.b));
         let overlap = bounds_a
             .loosened(margin)
@@ -216,18 +212,14 @@ impl Scratch {
     }
 
     fn aim(&mut self, query: &PairQuery, hint: &Hint, axes: &mut Vec<Vec3>) {
-        let oriented = |surface: &Surface| match surface {
-            Surface::Cloud(cloud) => cloud.normals().is_some() && cloud.normals_oriented(),
-            Surface::Exact(surface) => surface.is_closed(),
-        };
         aim::aim(
             &ZoneNormals {
                 normals: &self.a.near_normals,
-                oriented: oriented(&query.a),
+                oriented: is_oriented(&query.a),
             },
             &ZoneNormals {
                 normals: &self.b.near_normals,
-                oriented: oriented(&query.b),
+                oriented: is_oriented(&query.b),
             },
             hint,
             axes,
@@ -249,23 +241,33 @@ impl Scratch {
             camera,
             params,
         };
+        // An unbounded surface as far as the cloud is deep in it, twice for what was not sampled.
+        let exact_view = |surface, frame_from_surface, deepest: f32| ExactView {
+            surface,
+            frame_from_surface,
+            reach: 2.0 * deepest,
+            everywhere: false,
+        };
         let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
         let hits = &mut self.hits;
         let looked = match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
-                self.look_at_clouds(&view_of(a, a_from_a), &view_of(b, a_from_b))
+                let reach = REACH * params.merge_gap.max(params.prediction);
+                self.look_at_clouds(&view_of(a, a_from_a), &view_of(b, a_from_b), reach)
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
+                let exact = exact_view(surface, a_from_b, self.a.deepest);
                 let (cloud, image) = (view_of(cloud, a_from_a), &mut self.b.image);
-                self.a.look_with(&cloud, surface, a_from_b, hits, image)
+                self.a.look_with(&cloud, &exact, hits, image)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
+                let exact = exact_view(surface, a_from_a, self.b.deepest);
                 let (cloud, image) = (view_of(cloud, a_from_b), &mut self.a.image);
-                self.b.look_with(&cloud, surface, a_from_a, hits, image)
+                self.b.look_with(&cloud, &exact, hits, image)
             }
-            (Surface::Exact(_), Surface::Exact(_)) => false,
+            (Surface::Exact(_), Surface::Exact(_)) => None,
         };
-        if !looked {
+        if looked.is_none() {
             return;
         }
         let axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
@@ -280,17 +282,19 @@ impl Scratch {
         );
     }
 
-    /// Builds the images of two clouds where they can meet; `false` if that is nowhere.
-    fn look_at_clouds(&mut self, a: &CloudView, b: &CloudView) -> bool {
+    /// Builds the images of two clouds where `a` is less than `reach` metres behind `b`, and returns
+    /// where `b` is seen; `None` if that is nowhere.
+    pub(super) fn look_at_clouds(
+        &mut self,
+        a: &CloudView,
+        b: &CloudView,
+        reach: f32,
+    ) -> Option<Rect> {
         let (camera, params) = (a.camera, a.params);
         let (side_a, side_b) = (&mut self.a, &mut self.b);
         let (seen_a, seen_b) = rayon::join(|| side_a.project(a), || side_b.project(b));
-        let (Some(seen_a), Some(seen_b)) = (seen_a, seen_b) else {
-            return false;
-        };
-        let Some(rect) = seen_a.rect.intersection(&seen_b.rect) else {
-            return false;
-        };
+        let (seen_a, seen_b) = (seen_a?, seen_b?);
+        let rect = seen_a.rect.intersection(&seen_b.rect)?;
         let tiles = Tiles::new(&rect, seen_a.reach.max(seen_b.reach));
         let sort = |side: &mut Side, sign: f32, radius: f32| {
             side.columns.sort(&tiles, camera);
@@ -301,15 +305,11 @@ impl Scratch {
             || sort(side_a, 1.0, seen_a.radius),
             || sort(side_b, -1.0, seen_b.radius),
         );
-        let reach = REACH * params.merge_gap.max(params.prediction);
         let support = side_a.support(a).max(side_b.support(b));
         let support_px = support / seen_a.pixel_size.min(seen_b.pixel_size);
         let touching = &mut self.touching;
         let (columns_a, columns_b) = (&side_a.columns, &side_b.columns);
-        let Some(rect) = touching.mark(columns_a, columns_b, &tiles, &rect, reach, support_px)
-        else {
-            return false;
-        };
+        let rect = touching.mark(columns_a, columns_b, &tiles, &rect, reach, support_px)?;
         let imaging = Imaging {
             camera,
             params,
@@ -321,7 +321,28 @@ impl Scratch {
             || side_a.image(a, &imaging, Some(touching)),
             || side_b.image(b, &imaging, Some(touching)),
         );
-        true
+        Some(seen_b.rect)
+    }
+}
+
+/// Whether the surface's normals tell its outside.
+pub(super) fn is_oriented(surface: &Surface) -> bool {
+    match surface {
+        Surface::Cloud(cloud) => cloud.normals().is_some() && cloud.normals_oriented(),
+        Surface::Exact(surface) => surface.is_closed(),
+    }
+}
+
+/// By how much more than what can touch is culled, metres: splats reach a radius beyond their
+/// points, on both sides; normals that are estimated here need their neighbours, or they would err
+/// at the rim.
+pub(super) fn ring(surface: &Surface, params: &Params) -> f32 {
+    match surface {
+        Surface::Cloud(cloud) if cloud.normals().is_none() => {
+            let stride = cull::stride(cloud, params.pixel_size) as f32;
+            (2.0 + normals::SUPPORT * stride.sqrt()) * cloud.mean_radius()
+        }
+        surface => 2.0 * surface.mean_radius(),
     }
 }
 

@@ -1,10 +1,11 @@
 //! One cloud of a pair: its culled points, their normals and its image.
 
+use super::cast::{self, Rays};
 use super::columns::{Columns, Tiles, Touching};
 use super::cull::{CullScratch, PointRadii, Survivors};
 use super::normals::{self, NormalScratch};
-use super::splat::{DepthScale, Footprint, Fragments, Imaging, SplatPoints};
-use super::{cast, sweep};
+use super::splat::{DepthScale, Footprint, Fragments, Imaging, Rect, SplatPoints};
+use super::sweep;
 use crate::{Params, PointCloud, RayHit, RaySurface, Tldi, VirtualCamera};
 use glamx::{Mat3, Pose3, Vec3};
 
@@ -30,7 +31,7 @@ pub(super) struct Side {
     normals: NormalScratch,
     fragments: Fragments,
     /// Greatest depth of a sampled point inside an exact surface, metres.
-    deepest: f32,
+    pub(super) deepest: f32,
     pub(super) image: Tldi,
 }
 
@@ -41,6 +42,17 @@ pub(super) struct CloudView<'a> {
     pub(super) frame_from_cloud: &'a Pose3,
     pub(super) camera: &'a VirtualCamera,
     pub(super) params: &'a Params,
+}
+
+/// An exact surface that a camera looks at together with a cloud.
+#[derive(Clone, Copy)]
+pub(super) struct ExactView<'a> {
+    pub(super) surface: &'a dyn RaySurface,
+    pub(super) frame_from_surface: &'a Pose3,
+    /// How far beyond the cloud the surface is of interest, metres.
+    pub(super) reach: f32,
+    /// Whether it is looked at where the cloud is not.
+    pub(super) everywhere: bool,
 }
 
 impl CloudView<'_> {
@@ -212,39 +224,29 @@ impl Side {
         );
     }
 
-    /// Image of this cloud, and of an exact surface into `image` over the same pixels; `false`
-    /// where nothing is in view.
+    /// Image of this cloud, and of an exact surface into `image` over the same pixels, which are
+    /// returned; `None` where nothing is in view.
     pub(super) fn look_with(
         &mut self,
         view: &CloudView,
-        surface: &dyn RaySurface,
-        frame_from_surface: &Pose3,
+        exact: &ExactView,
         hits: &mut Vec<RayHit>,
         image: &mut Tldi,
-    ) -> bool {
-        let Some(seen) = self.project(view) else {
-            return false;
-        };
+    ) -> Option<Rect> {
+        let seen = self.project(view)?;
         self.whole_image(view, &seen);
-        // Rays must pass through all of the surface, or what is deepest would be missed; through
-        // as much of an unbounded one as the cloud is deep in it.
-        let extent = surface.bounds().extents().length();
-        let beyond = if extent.is_finite() {
-            extent
-        } else {
-            2.0 * self.deepest
+        // Rays must pass through all of the surface, or what is deepest would be missed.
+        let extent = exact.surface.bounds().extents().length();
+        let through = if extent.is_finite() { extent } else { 0.0 };
+        let margin = view.params.prediction + (seen.far - seen.near) + through + exact.reach;
+        let rays = Rays {
+            camera: view.camera,
+            rect: seen.rect,
+            near: seen.near - margin,
+            far: seen.far + margin,
+            cover: (!exact.everywhere).then_some(&self.image),
         };
-        let margin = view.params.prediction + (seen.far - seen.near) + beyond;
-        let range = (seen.near - margin, seen.far + margin);
-        cast::cast(
-            surface,
-            frame_from_surface,
-            view.camera,
-            &self.image,
-            range,
-            hits,
-            image,
-        );
-        true
+        cast::cast(exact.surface, exact.frame_from_surface, &rays, hits, image);
+        Some(seen.rect)
     }
 }

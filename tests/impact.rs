@@ -1,0 +1,268 @@
+//! Straight motions against analytic truth: where they end, and what does not stop them.
+
+use rapier3d::prelude::{Ball, Cuboid, HalfSpace, SharedShape, Vector};
+use rapier3d_tldi::ExactShape;
+use tldi::glamx::{Pose3, Quat, Vec3};
+use tldi::{CpuBackend, Impact, ImpactQuery, Params, PointCloud, Surface};
+use tldi_tests::{Samples, random_pose, random_unit, sampled_box, sampled_plane, sampled_sphere};
+
+/// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
+const R: f32 = 0.01;
+
+fn query<'a>(a: Surface<'a>, b: Surface<'a>, a_from_b: Pose3, motion: Vec3) -> ImpactQuery<'a> {
+    ImpactQuery {
+        a,
+        b,
+        a_from_b,
+        motion,
+        least_distance: 0.0,
+        core_only: false,
+        params: Params::for_radius(R),
+    }
+}
+
+fn impact(query: &ImpactQuery) -> Option<Impact> {
+    CpuBackend::new().impact(query).expect("it is supported")
+}
+
+/// How far a ball moves along `direction` until its middle, now at `from`, is `distance` metres
+/// from the origin.
+fn way_to_ball(from: Vec3, direction: Vec3, distance: f32) -> Option<f32> {
+    let along = -from.dot(direction);
+    let squared = distance * distance - (from + along * direction).length_squared();
+    (squared >= 0.0).then(|| along - squared.sqrt())
+}
+
+/// Balls, one of them a cloud or exact, hit off centre and missed, from all directions.
+#[test]
+fn balls() {
+    let (ra, rb) = (0.1, 0.07);
+    let (big, small) = (sampled_sphere(ra, R), sampled_sphere(rb, R));
+    let mut rng = fastrand::Rng::with_seed(1);
+    let (exact_a, exact_b) = (Ball::new(ra), Ball::new(rb));
+    let (exact_a, exact_b) = (ExactShape(&exact_a), ExactShape(&exact_b));
+    for cloud in [Samples::cloud, Samples::bare_cloud] {
+        let (a, b) = (cloud(&big, R), cloud(&small, R));
+        let pairs = [
+            (Surface::Cloud(&a), Surface::Cloud(&b)),
+            (Surface::Exact(&exact_a), Surface::Cloud(&b)),
+            (Surface::Cloud(&a), Surface::Exact(&exact_b)),
+        ];
+        for (a, b) in pairs {
+            for _ in 0..100 {
+                let direction = random_unit(&mut rng);
+                let aside = rng.f32() * 1.3 * (ra + rb);
+                let offset = aside * random_unit(&mut rng).reject_from(direction).normalize();
+                let mut pose = random_pose(&mut rng, 0.0);
+                pose.translation = offset - (0.3 + 5.0 * rng.f32()) * direction;
+                let found = impact(&query(a, b, pose, 8.0 * direction));
+                let truth = way_to_ball(pose.translation, direction, ra + rb);
+                match (found, truth) {
+                    (Some(found), Some(truth)) => {
+                        let normal = (pose.translation + truth * direction).normalize();
+                        // A ray stands for a pixel: aside by half its diagonal, the surface is
+                        // met so much later or earlier, times the slope of both.
+                        let cosine = -normal.dot(direction);
+                        let slope = (1.0 - cosine * cosine).sqrt() / cosine;
+                        let error = found.distance - truth;
+                        let limit = (0.2 + 0.8 * slope) * R;
+                        assert!(error.abs() < limit, "{error} at {aside} aside");
+                        let angle = found.normal.angle_between(normal).to_degrees();
+                        assert!(angle < 10.0 || cosine < 0.5, "{angle}° at {aside} aside");
+                        let off = found.point.length() - ra;
+                        assert!(
+                            off.abs() < 0.25 * R || cosine < 0.5,
+                            "{off} off the surface"
+                        );
+                    }
+                    // Splats reach half a pixel's diagonal beyond a silhouette.
+                    (Some(_), None) => assert!(aside < ra + rb + 2.0 * R, "hit at {aside} aside"),
+                    (None, Some(_)) => assert!(aside > ra + rb - R, "missed at {aside} aside"),
+                    (None, None) => {}
+                }
+            }
+        }
+    }
+}
+
+/// A sheet of one layer of points, with and without normals, stops a small box from either side,
+/// at any angle and any length of the motion.
+#[test]
+fn sheets_stop_what_comes_from_either_side() {
+    let mut rng = fastrand::Rng::with_seed(2);
+    let sheet = sampled_plane(1.0, R, &mut rng);
+    let boxed = sampled_box(Vec3::splat(0.02), R, &mut rng);
+    let corner = 0.02 * 3.0f32.sqrt();
+    for cloud in [Samples::cloud, Samples::bare_cloud] {
+        let (a, b) = (cloud(&sheet, R), cloud(&boxed, R));
+        for _ in 0..400 {
+            let side = if rng.bool() { 1.0 } else { -1.0 };
+            let yaw = Quat::from_rotation_y(rng.f32() * std::f32::consts::TAU);
+            // Down to 2° from grazing.
+            let incidence = rng.f32() * 88.0f32.to_radians();
+            let direction = yaw * Vec3::new(incidence.sin(), -side * incidence.cos(), 0.0);
+            let target = 0.2 * random_unit(&mut rng).with_y(0.0);
+            let before = 0.1 + 5.0 * rng.f32();
+            let mut pose = random_pose(&mut rng, 0.0);
+            pose.translation = target - before * direction;
+            let motion = (before + 0.4 + 50.0 * rng.f32()) * direction;
+            for core_only in [false, true] {
+                let found = impact(&ImpactQuery {
+                    core_only,
+                    ..query(Surface::Cloud(&a), Surface::Cloud(&b), pose, motion)
+                });
+                let height = pose.translation.y.abs();
+                let found = found.unwrap_or_else(|| {
+                    panic!("passes at {incidence} from {height} m, core {core_only}")
+                });
+                // Where the motion is over the sheet at all when the box meets it.
+                let left = side * (pose.translation + found.distance * direction).y;
+                let over_sheet = (pose.translation + found.distance * direction).abs();
+                if over_sheet.max_element() < 0.45 {
+                    assert!(left > -2.5 * R, "stops {left} m behind the sheet");
+                    assert!(left < corner + 2.0 * R, "stops {left} m before the sheet");
+                }
+            }
+        }
+    }
+}
+
+/// A box sliding on a rough floor passes where only its core counts, and stops at a wall.
+#[test]
+fn only_the_core_passes_over_roughness() {
+    let mut rng = fastrand::Rng::with_seed(3);
+    let mut floor = sampled_plane(2.0, R, &mut rng);
+    for point in &mut floor.points {
+        point.y += 0.5 * R * (rng.f32() - 0.5);
+    }
+    let boxed = sampled_box(Vec3::splat(0.1), R, &mut rng).cloud(R);
+    let wall = sampled_plane(0.5, R, &mut rng).moved(&Pose3::from_parts(
+        0.6 * Vec3::X,
+        Quat::from_rotation_z(std::f32::consts::FRAC_PI_2),
+    ));
+    let pose = Pose3::translation(0.0, 0.1, 0.0);
+    // As gravity bends the first step of a fall at 10 m/s.
+    let motion = Vec3::new(0.9, -0.003, 0.0);
+    let cast = |floor: &PointCloud, core_only| {
+        impact(&ImpactQuery {
+            core_only,
+            ..query(Surface::Cloud(floor), Surface::Cloud(&boxed), pose, motion)
+        })
+    };
+    let bare = floor.cloud(R);
+    assert_eq!(cast(&bare, true), None);
+    assert!(cast(&bare, false).is_some(), "the floor is not rough");
+    floor.points.extend(&wall.points);
+    floor.normals.extend(&wall.normals);
+    let met = cast(&floor.cloud(R), true).expect("the wall is met");
+    assert!((met.distance - 0.5).abs() < 0.2 * R, "{met:?}");
+    assert!(met.normal.x < -0.99, "{met:?}");
+}
+
+/// What touches at the beginning is passed, what is behind it is not.
+#[test]
+fn what_is_nearer_than_the_least_distance_is_passed() {
+    let mut rng = fastrand::Rng::with_seed(4);
+    let near = sampled_plane(0.6, R, &mut rng);
+    let mut sheets = near.moved(&Pose3::translation(0.0, -0.3, 0.0));
+    sheets.points.extend(&near.points);
+    sheets.normals.extend(&near.normals);
+    let sheets = sheets.bare_cloud(R);
+    let ball = sampled_sphere(0.05, R).cloud(R);
+    let start = Pose3::translation(0.0, 0.052, 0.0);
+    let cast = |least_distance| {
+        impact(&ImpactQuery {
+            least_distance,
+            ..query(
+                Surface::Cloud(&sheets),
+                Surface::Cloud(&ball),
+                start,
+                -Vec3::Y,
+            )
+        })
+        .map(|impact| impact.distance)
+    };
+    assert!((cast(0.0).expect("the first sheet") - 0.002).abs() < 0.1 * R);
+    // The rest of the ball still meets the first sheet, farther up its sides.
+    let later = cast(0.03).expect("its sides");
+    assert!((0.03..0.06).contains(&later), "{later}");
+    let second = cast(0.08).expect("the second sheet");
+    assert!((second - 0.302).abs() < 0.1 * R, "{second}");
+    assert_eq!(cast(0.5), None);
+}
+
+/// What is inside a solid may leave it, and meets what else there is.
+#[test]
+fn what_is_inside_leaves() {
+    let mut rng = fastrand::Rng::with_seed(5);
+    let solid = sampled_box(Vec3::splat(0.2), R, &mut rng);
+    let ball = sampled_sphere(0.05, R).cloud(R);
+    let pose = Pose3::translation(0.0, 0.18, 0.0);
+    let up = 2.0 * Vec3::Y;
+    let alone = solid.cloud(R);
+    let found = impact(&query(
+        Surface::Cloud(&alone),
+        Surface::Cloud(&ball),
+        pose,
+        up,
+    ));
+    assert_eq!(found, None);
+    let mut with_lid = solid.clone();
+    let lid = sampled_plane(0.6, R, &mut rng).moved(&Pose3::translation(0.0, 1.0, 0.0));
+    with_lid.points.extend(&lid.points);
+    with_lid.normals.extend(&lid.normals);
+    let with_lid = with_lid.cloud(R);
+    let found = impact(&query(
+        Surface::Cloud(&with_lid),
+        Surface::Cloud(&ball),
+        pose,
+        up,
+    ));
+    let met = found.expect("the lid is met from behind").distance;
+    assert!((met - 0.77).abs() < 0.2 * R, "{met}");
+}
+
+/// Unbounded and closed exact shapes, in both orders.
+#[test]
+fn exact_shapes() {
+    let mut rng = fastrand::Rng::with_seed(6);
+    let boxed = sampled_box(Vec3::splat(0.1), R, &mut rng).bare_cloud(R);
+    let ground = SharedShape::new(HalfSpace::new(Vector::Y));
+    let cuboid = Cuboid::new(Vec3::splat(0.1));
+    let plane = sampled_plane(1.0, R, &mut rng).bare_cloud(R);
+    let (ground, cuboid) = (ExactShape(&*ground), ExactShape(&cuboid));
+    let motion = Vec3::new(0.3, -3.0, 0.1);
+    let pose = Pose3::translation(-0.1, 1.3, 0.0);
+    // The plane moves as the box would stand still: both in the frame of what is at rest.
+    let pairs = [
+        (
+            Surface::Exact(&ground),
+            Surface::Cloud(&boxed),
+            pose,
+            motion,
+        ),
+        (
+            Surface::Cloud(&plane),
+            Surface::Exact(&cuboid),
+            pose,
+            motion,
+        ),
+        (
+            Surface::Exact(&cuboid),
+            Surface::Cloud(&plane),
+            pose.inverse(),
+            -motion,
+        ),
+    ];
+    for (a, b, pose, motion) in pairs {
+        for core_only in [false, true] {
+            let found = impact(&ImpactQuery {
+                core_only,
+                ..query(a, b, pose, motion)
+            });
+            let truth = 1.2 * motion.length() / 3.0;
+            let error = found.expect("they meet").distance - truth;
+            assert!(error.abs() < 0.2 * R, "{error}");
+        }
+    }
+}
