@@ -4,6 +4,7 @@ use crate::manifolds;
 use crate::measured::Measured;
 use crate::parts::{PartPair, ShapePair, has_cloud, part};
 use crate::prepared::{Batch, PROBE_ANSWER, PairKey, PreparedPair, Shared};
+use crate::queries;
 use rapier3d::geometry::{ContactData, ContactManifold, ContactManifoldData};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::details::{
@@ -30,7 +31,9 @@ use tldi::PairResult;
 /// |---|---|---|
 /// | contact manifolds | answered | declined |
 /// | intersection (sensors) | whether the surfaces cross | declined |
-/// | distance, contact, closest points, shape casts | declined | declined |
+/// | distance, closest points | between the surfaces; 0 where they intersect | declined |
+/// | contact | the deepest point of a comparison where they intersect, else the nearest points | declined |
+/// | shape casts | declined | declined |
 #[derive(Clone)]
 pub struct TldiDispatcher {
     shared: Arc<Shared>,
@@ -161,38 +164,59 @@ impl QueryDispatcher for TldiDispatcher {
         })
     }
 
-    /// Declined, but for the shape by which the pipeline finds out whether it is attached.
+    /// 0 where the shapes intersect. The pipeline finds out by a shape of its own whether it is
+    /// attached.
     fn distance(
         &self,
-        _pos12: &Pose,
+        pos12: &Pose,
         shape1: &dyn Shape,
-        _shape2: &dyn Shape,
+        shape2: &dyn Shape,
     ) -> Result<ShapeDistance, Unsupported> {
         if std::ptr::addr_eq(shape1, &raw const self.shared.probe) {
-            Ok(ShapeDistance::new(PROBE_ANSWER))
-        } else {
-            Err(Unsupported)
+            return Ok(ShapeDistance::new(PROBE_ANSWER));
         }
+        Self::accept(shape1, shape2)?;
+        let found = queries::closest(pos12, shape1, shape2, f32::MAX)?;
+        Ok(found.map_or(ShapeDistance::new(f32::MAX), |found| {
+            let [part1, part2] = found.parts;
+            ShapeDistance::new(found.distance).with_subshapes(part1, part2)
+        }))
     }
 
     fn contact(
         &self,
-        _pos12: &Pose,
-        _shape1: &dyn Shape,
-        _shape2: &dyn Shape,
-        _prediction: f32,
+        pos12: &Pose,
+        shape1: &dyn Shape,
+        shape2: &dyn Shape,
+        prediction: f32,
     ) -> Result<Option<Contact>, Unsupported> {
-        Err(Unsupported)
+        Self::accept(shape1, shape2)?;
+        let pair = ShapePair {
+            shape1,
+            shape2,
+            pos12: *pos12,
+            prediction,
+        };
+        queries::contact(&self.shared, pair)
     }
 
     fn closest_points(
         &self,
-        _pos12: &Pose,
-        _shape1: &dyn Shape,
-        _shape2: &dyn Shape,
-        _max_distance: f32,
+        pos12: &Pose,
+        shape1: &dyn Shape,
+        shape2: &dyn Shape,
+        max_distance: f32,
     ) -> Result<ClosestPoints, Unsupported> {
-        Err(Unsupported)
+        Self::accept(shape1, shape2)?;
+        let limit = max_distance.max(0.0).next_up();
+        Ok(match queries::closest(pos12, shape1, shape2, limit)? {
+            None => ClosestPoints::Disjoint,
+            Some(found) if found.distance <= 0.0 => ClosestPoints::Intersecting,
+            Some(found) => {
+                let [point1, point2] = found.points;
+                ClosestPoints::WithinMargin(point1, pos12.inverse() * point2)
+            }
+        })
     }
 
     fn cast_shapes(

@@ -45,9 +45,8 @@
 //! # What does not work yet
 //! - Continuous collision detection: fast bodies that are clouds, or that meet clouds, may tunnel.
 //!   Rapier's soft CCD (`RigidBodyBuilder::soft_ccd_prediction`) works.
-//! - Shape casts, distances and closest points with clouds are declined ([`TldiDispatcher`]); rays
-//!   and point projections work. Rapier's character controller asks its own dispatcher and passes
-//!   through clouds.
+//! - Shape casts with clouds are declined ([`TldiDispatcher`], which answers every other query).
+//!   Rapier's character controller asks its own dispatcher and passes through clouds.
 //! - A body wholly inside a cloud's volume, surfaces apart, is not in contact.
 //! - Rapier cannot serialise custom shapes, nor the state of pairs with clouds.
 
@@ -66,6 +65,7 @@ mod pipeline;
 mod planes;
 pub mod prelude;
 mod prepared;
+mod queries;
 mod report;
 mod shape;
 

@@ -25,7 +25,7 @@ pub(crate) fn has_cloud(shape: &dyn Shape) -> bool {
 }
 
 /// Number of parts: those of a compound, or one.
-fn part_count(shape: &dyn Shape) -> u32 {
+pub(crate) fn part_count(shape: &dyn Shape) -> u32 {
     shape
         .as_compound()
         .map_or(1, |compound| compound.shapes().len() as u32)

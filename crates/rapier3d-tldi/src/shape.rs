@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use tldi::{CloudError, NonFinite, PointCloud, Radii};
 
-/// Neighbours for normals that scaling made wrong.
+/// Neighbours for normals that are not given or that scaling made wrong.
 const PCA_NEIGHBORS: usize = 12;
 
 /// Source of [`PointCloudShape::revision`].
@@ -69,6 +69,7 @@ struct Content {
     revision: u64,
     unit_mass: OnceLock<MassProperties>,
     bvh: OnceLock<Bvh>,
+    fitted_normals: OnceLock<Vec<Vec3>>,
 }
 
 impl Content {
@@ -79,6 +80,7 @@ impl Content {
             revision: next_revision(),
             unit_mass: OnceLock::new(),
             bvh: OnceLock::new(),
+            fitted_normals: OnceLock::new(),
         }
     }
 }
@@ -142,6 +144,7 @@ impl PointCloudShape {
         if let Some(content) = Arc::get_mut(&mut self.content) {
             content.cloud.set_points(points, normals)?;
             content.bvh.take();
+            content.fitted_normals.take();
             content.revision = next_revision();
         } else {
             let mut cloud = self.cloud().clone();
@@ -163,7 +166,7 @@ impl PointCloudShape {
     }
 
     /// The tree over the points, one leaf box of the point's radius around each.
-    fn bvh(&self) -> &Bvh {
+    pub(crate) fn bvh(&self) -> &Bvh {
         self.content.bvh.get_or_init(|| {
             let cloud = self.cloud();
             let leaves: Vec<Aabb> = cloud
@@ -172,6 +175,24 @@ impl PointCloudShape {
                 .map(|(i, p)| Aabb::from_half_extents(p, Vec3::splat(cloud.radius(i))))
                 .collect();
             Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves)
+        })
+    }
+
+    /// The cloud's normals or, where it has none, those of planes through neighbours, which are not
+    /// oriented; computed once.
+    pub(crate) fn surface_normals(&self) -> &[Vec3] {
+        let cloud = self.cloud();
+        cloud.normals().unwrap_or_else(|| {
+            self.content.fitted_normals.get_or_init(|| {
+                let points: Vec<Vec3> = cloud.points().collect();
+                let with_normals = PointCloud::builder(points)
+                    .radius(cloud.max_radius())
+                    .pca_normals(PCA_NEIGHBORS)
+                    .build()
+                    .expect("the points of a valid cloud are valid");
+                let normals = with_normals.normals();
+                normals.expect("they were asked for").to_vec()
+            })
         })
     }
 

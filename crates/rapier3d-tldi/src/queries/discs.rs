@@ -1,0 +1,143 @@
+//! A cloud's surface as discs: one a sample, across its normal, of the sample's radius.
+
+use crate::PointCloudShape;
+use rapier3d::glamx::{Pose3, Vec3};
+use rapier3d::parry::bounding_volume::{Aabb, BoundingVolume};
+use rapier3d::parry::partitioning::{Bvh, BvhNode};
+use std::cell::RefCell;
+use std::collections::HashMap;
+
+/// Samples within this many radii say whether the surface is smooth around one of them.
+const NEIGHBORHOOD: f32 = 2.0;
+
+/// A sample whose neighbours lie within this many radii of its plane has a disc. A surface with a
+/// radius of curvature of 4 point radii is just so smooth.
+const LEAST_SMOOTH: f32 = 0.5;
+
+/// Square of the sine between planes that are taken to be parallel: their discs are then nearest at
+/// a centre.
+const PARALLEL: f32 = 1e-6;
+
+/// A sample and the surface that it stands for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Disc {
+    pub(super) center: Vec3,
+    /// Unit normal.
+    pub(super) normal: Vec3,
+    /// Radius in metres; 0 at an edge or a corner of the surface, where a disc would stand out.
+    pub(super) reach: f32,
+}
+
+impl Disc {
+    pub(super) fn moved(&self, pose: &Pose3) -> Self {
+        Self {
+            center: *pose * self.center,
+            normal: pose.rotation * self.normal,
+            reach: self.reach,
+        }
+    }
+
+    /// The point of the disc nearest to `point`.
+    pub(super) fn nearest_to(&self, point: Vec3) -> Vec3 {
+        let offset = point - self.center;
+        let along = offset - self.normal.dot(offset) * self.normal;
+        self.center + along.clamp_length_max(self.reach)
+    }
+
+    /// Whether `point` lies behind the disc, on the side that its normal points away from.
+    pub(super) fn has_behind(&self, point: Vec3) -> bool {
+        self.reach > 0.0 && self.normal.dot(point - self.center) < 0.0
+    }
+
+    /// A point that both discs contain.
+    pub(super) fn crossing(&self, other: &Self) -> Option<Vec3> {
+        if self.reach == 0.0 || other.reach == 0.0 {
+            return None;
+        }
+        // The line in which the planes meet, from a point of it.
+        let line = self.normal.cross(other.normal);
+        let squared = line.length_squared();
+        if squared < PARALLEL {
+            return None;
+        }
+        let height = other.normal.dot(other.center - self.center);
+        let start = self.center + height / squared * line.cross(self.normal);
+        let chord = |disc: &Self| {
+            let middle = line.dot(disc.center - start) / squared;
+            let aside = start + middle * line - disc.center;
+            let half = (disc.reach * disc.reach - aside.length_squared()) / squared;
+            (half >= 0.0).then(|| [middle - half.sqrt(), middle + half.sqrt()])
+        };
+        let ([low1, high1], [low2, high2]) = (chord(self)?, chord(other)?);
+        let (low, high) = (low1.max(low2), high1.min(high2));
+        (low <= high).then(|| start + 0.5 * (low + high) * line)
+    }
+
+    /// Points of this disc and of `other` that are nearest to each other if one of them is a
+    /// centre, or else one that both contain.
+    pub(super) fn nearest_points(&self, other: &Self) -> [Vec3; 2] {
+        if let Some(point) = self.crossing(other) {
+            return [point; 2];
+        }
+        let from_center = [self.center, other.nearest_to(self.center)];
+        let to_center = [self.nearest_to(other.center), other.center];
+        let squared = |[p, q]: [Vec3; 2]| p.distance_squared(q);
+        if squared(from_center) <= squared(to_center) {
+            from_center
+        } else {
+            to_center
+        }
+    }
+}
+
+/// The discs of a cloud, made as they are asked for.
+pub(super) struct DiscSurface<'a> {
+    pub(super) shape: &'a PointCloudShape,
+    normals: &'a [Vec3],
+    discs: RefCell<HashMap<u32, Disc>>,
+}
+
+impl<'a> DiscSurface<'a> {
+    pub(super) fn new(shape: &'a PointCloudShape) -> Self {
+        Self {
+            shape,
+            normals: shape.surface_normals(),
+            discs: RefCell::default(),
+        }
+    }
+
+    /// The tree over the samples; the box of a leaf holds the disc of its sample.
+    pub(super) fn bvh(&self) -> &'a Bvh {
+        self.shape.bvh()
+    }
+
+    pub(super) fn disc(&self, sample: u32) -> Disc {
+        *self
+            .discs
+            .borrow_mut()
+            .entry(sample)
+            .or_insert_with(|| self.make_disc(sample as usize))
+    }
+
+    fn make_disc(&self, sample: usize) -> Disc {
+        let cloud = self.shape.cloud();
+        let (center, normal) = (cloud.point(sample), self.normals[sample]);
+        let radius = cloud.radius(sample);
+        let distance = NEIGHBORHOOD * radius;
+        let around = Aabb::from_half_extents(center, Vec3::splat(distance));
+        let stands_out = |neighbor: u32| {
+            let offset = cloud.point(neighbor as usize) - center;
+            offset.length_squared() < distance * distance
+                && normal.dot(offset).abs() > LEAST_SMOOTH * radius
+        };
+        let is_smooth = !self
+            .bvh()
+            .leaves(|node: &BvhNode| node.aabb().intersects(&around))
+            .any(stands_out);
+        Disc {
+            center,
+            normal,
+            reach: if is_smooth { radius } else { 0.0 },
+        }
+    }
+}
