@@ -5,6 +5,7 @@ use crate::measured::Measured;
 use crate::parts::{PartPair, ShapePair, has_cloud, part};
 use crate::prepared::{Batch, PROBE_ANSWER, PairKey, PreparedPair, Shared};
 use crate::queries;
+use crate::shape_casts;
 use rapier3d::geometry::{ContactData, ContactManifold, ContactManifoldData};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::details::{
@@ -221,25 +222,39 @@ impl QueryDispatcher for TldiDispatcher {
 
     fn cast_shapes(
         &self,
-        _pos12: &Pose,
-        _local_velocity12: Vector,
-        _shape1: &dyn Shape,
-        _shape2: &dyn Shape,
-        _options: ShapeCastOptions,
+        pos12: &Pose,
+        local_velocity12: Vector,
+        shape1: &dyn Shape,
+        shape2: &dyn Shape,
+        options: ShapeCastOptions,
     ) -> Result<Option<ShapeCastHit>, Unsupported> {
-        Err(Unsupported)
+        Self::accept(shape1, shape2)?;
+        let pair = ShapePair {
+            shape1,
+            shape2,
+            pos12: *pos12,
+            prediction: 0.0,
+        };
+        shape_casts::cast_shapes(&self.shared, &pair, local_velocity12, options)
     }
 
     fn cast_shapes_nonlinear(
         &self,
-        _motion1: &NonlinearRigidMotion,
-        _shape1: &dyn Shape,
-        _motion2: &NonlinearRigidMotion,
-        _shape2: &dyn Shape,
-        _start_time: f32,
-        _end_time: f32,
-        _stop_at_penetration: bool,
+        motion1: &NonlinearRigidMotion,
+        shape1: &dyn Shape,
+        motion2: &NonlinearRigidMotion,
+        shape2: &dyn Shape,
+        start_time: f32,
+        end_time: f32,
+        stop_at_penetration: bool,
     ) -> Result<Option<ShapeCastHit>, Unsupported> {
-        Err(Unsupported)
+        Self::accept(shape1, shape2)?;
+        shape_casts::cast_shapes_nonlinear(
+            &self.shared,
+            [motion1, motion2],
+            [shape1, shape2],
+            (start_time, end_time),
+            stop_at_penetration,
+        )
     }
 }

@@ -68,6 +68,7 @@ mod prepared;
 mod queries;
 mod report;
 mod shape;
+mod shape_casts;
 
 pub use collider::cloud_collider;
 pub use config::TldiConfig;

@@ -186,7 +186,7 @@ pub(crate) fn append_queries<'s>(
     }
 }
 
-fn surface<'s>(side: &'s ExactShape<'_>) -> Surface<'s> {
+pub(crate) fn surface<'s>(side: &'s ExactShape<'_>) -> Surface<'s> {
     match cloud_of(side.0) {
         Some(shape) => Surface::Cloud(shape.cloud()),
         None => Surface::Exact(side),

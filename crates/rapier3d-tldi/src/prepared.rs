@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
-use tldi::{Backend, BackendError, CpuBackend, PairResult};
+use tldi::{Backend, BackendError, CpuBackend, Impact, ImpactQuery, PairResult};
 
 /// A distance that no other dispatcher gives.
 pub(crate) const PROBE_ANSWER: f32 = -1.0;
@@ -168,23 +168,31 @@ impl Shared {
             return Some(read(&[], &[]));
         }
         self.spot_pairs.fetch_add(1, Ordering::Relaxed);
+        self.on_the_spot(|spot| {
+            spot.compare(pair, &self.config)?;
+            let pixels = count_pixels(&spot.parts, &spot.results);
+            self.spot_pixels.fetch_add(pixels, Ordering::Relaxed);
+            Ok(read(&spot.parts, &spot.results))
+        })
+    }
+
+    /// The impact of a motion; `None` also if the comparison failed, which is kept for
+    /// [`take_failures`](Self::take_failures).
+    pub(crate) fn impact_on_the_spot(&self, query: &ImpactQuery) -> Option<Impact> {
+        self.on_the_spot(|spot| spot.backend.impact(query))
+            .flatten()
+    }
+
+    fn on_the_spot<R>(&self, run: impl FnOnce(&mut Spot) -> Result<R, BackendError>) -> Option<R> {
         let mut spot = locked(&self.spots).pop().unwrap_or_default();
-        let answer = match spot.compare(pair, &self.config) {
-            Ok(()) => {
-                let pixels = count_pixels(&spot.parts, &spot.results);
-                self.spot_pixels.fetch_add(pixels, Ordering::Relaxed);
-                Some(read(&spot.parts, &spot.results))
-            }
-            Err(error) => {
-                match &mut *locked(&self.failed) {
-                    Some((count, _)) => *count += 1,
-                    failed @ None => *failed = Some((1, error)),
-                }
-                None
-            }
-        };
+        let answer = run(&mut spot);
         locked(&self.spots).push(spot);
         answer
+            .map_err(|error| match &mut *locked(&self.failed) {
+                Some((count, _)) => *count += 1,
+                failed @ None => *failed = Some((1, error)),
+            })
+            .ok()
     }
 
     /// Comparisons on the spot since the last call.

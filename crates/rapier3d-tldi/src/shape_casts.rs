@@ -1,0 +1,326 @@
+//! Shape casts: straight ones, and those of bodies that turn while they move.
+//!
+//! A turning body is cast in pieces. In each the rotation is that of the piece's middle and the
+//! middle of the smaller shape moves straight; what this displaces by is added to what counts as
+//! met, so that an impact is found too early rather than too late.
+
+use crate::exact::ExactShape;
+use crate::parts::{ShapePair, cloud_of, has_cloud, part, part_count, surface};
+use crate::prepared::Shared;
+use crate::{TldiConfig, queries};
+use rapier3d::math::{Pose, Vector};
+use rapier3d::parry::query::details::ShapeCastOptions;
+use rapier3d::parry::query::{
+    DefaultQueryDispatcher, NonlinearRigidMotion, QueryDispatcher, ShapeCastHit, ShapeCastStatus,
+    Unsupported,
+};
+use rapier3d::parry::shape::Shape;
+use tldi::{Impact, ImpactQuery, Params};
+
+/// Most pieces of the motion of a body that turns.
+const MAX_PIECES: f32 = 64.0;
+
+/// By how much a piece may displace a point from where it truly is, in pixels. Less than the rim
+/// that casts of turning bodies spare.
+const MAX_DISPLACEMENT: f32 = 0.5;
+
+/// Longest straight cast in pixels: what the images resolve in depth.
+const MAX_PIXELS: f32 = 131_072.0;
+
+/// Least cosine between normal and motion by which a target distance is divided: beyond, the
+/// surface is seen edge-on.
+const LEAST_COSINE: f32 = 0.2;
+
+/// A pair of parts, the smaller one second: it is taken to move.
+struct Moving<'a> {
+    parts: [&'a dyn Shape; 2],
+    /// Whether the second part was the first one.
+    is_swapped: bool,
+}
+
+impl<'a> Moving<'a> {
+    fn new([part1, part2]: [&'a dyn Shape; 2]) -> Self {
+        let size = |shape: &dyn Shape| shape.compute_local_aabb().extents().length_squared();
+        let is_swapped = size(part1) < size(part2);
+        Self {
+            parts: if is_swapped {
+                [part2, part1]
+            } else {
+                [part1, part2]
+            },
+            is_swapped,
+        }
+    }
+
+    /// What belongs to the parts, in their order.
+    fn order<T>(&self, [of1, of2]: [T; 2]) -> [T; 2] {
+        if self.is_swapped {
+            [of2, of1]
+        } else {
+            [of1, of2]
+        }
+    }
+
+    /// A hit in the order in which the parts were given.
+    fn restore(&self, hit: ShapeCastHit) -> ShapeCastHit {
+        if self.is_swapped { hit.swapped() } else { hit }
+    }
+
+    fn params(&self, config: &TldiConfig) -> Option<Params> {
+        let radii = self.parts.iter().filter_map(|part| cloud_of(*part));
+        let coarsest = radii
+            .map(|shape| shape.cloud().mean_radius())
+            .reduce(f32::max);
+        coarsest.map(|radius| config.params(radius, 0.0))
+    }
+}
+
+/// See [`QueryDispatcher::cast_shapes`].
+pub(crate) fn cast_shapes(
+    shared: &Shared,
+    pair: &ShapePair<'_>,
+    velocity12: Vector,
+    options: ShapeCastOptions,
+) -> Result<Option<ShapeCastHit>, Unsupported> {
+    if options.stop_at_penetration {
+        let overlap = overlap(shared, pair, options.target_distance)?;
+        if overlap.is_some() {
+            return Ok(overlap);
+        }
+    }
+    first_of_parts(pair, |parts, [pose1, pose2]| {
+        let pos12 = pose1.inv_mul(&(pair.pos12 * pose2));
+        let velocity = pose1.rotation.inverse() * velocity12;
+        if has_cloud(parts[0]) || has_cloud(parts[1]) {
+            let moving = Moving::new(parts);
+            let (a_from_b, velocity) = if moving.is_swapped {
+                let inverse = pos12.inverse();
+                (inverse, inverse.rotation * -velocity)
+            } else {
+                (pos12, velocity)
+            };
+            let hit = straight_impact(shared, &moving, a_from_b, velocity, options);
+            return Ok(hit.map(|hit| moving.restore(hit)));
+        }
+        DefaultQueryDispatcher.cast_shapes(&pos12, velocity, parts[0], parts[1], options)
+    })
+}
+
+/// See [`QueryDispatcher::cast_shapes_nonlinear`].
+pub(crate) fn cast_shapes_nonlinear(
+    shared: &Shared,
+    motions: [&NonlinearRigidMotion; 2],
+    shapes: [&dyn Shape; 2],
+    (start, end): (f32, f32),
+    stop_at_penetration: bool,
+) -> Result<Option<ShapeCastHit>, Unsupported> {
+    let [at_start1, at_start2] = motions.map(|motion| motion.position_at_time(start));
+    let pair = ShapePair {
+        shape1: shapes[0],
+        shape2: shapes[1],
+        pos12: at_start1.inv_mul(&at_start2),
+        prediction: 0.0,
+    };
+    if stop_at_penetration && let Some(mut hit) = overlap(shared, &pair, 0.0)? {
+        hit.time_of_impact = start;
+        return Ok(Some(hit));
+    }
+    first_of_parts(&pair, |parts, [pose1, pose2]| {
+        let motions = [motions[0].prepend(pose1), motions[1].prepend(pose2)];
+        if has_cloud(parts[0]) || has_cloud(parts[1]) {
+            let moving = Moving::new(parts);
+            let motions = moving.order(motions);
+            let hit = turning_impact(shared, &moving, &motions, start, end);
+            return Ok(hit.map(|hit| moving.restore(hit)));
+        }
+        DefaultQueryDispatcher.cast_shapes_nonlinear(
+            &motions[0],
+            parts[0],
+            &motions[1],
+            parts[1],
+            start,
+            end,
+            stop_at_penetration,
+        )
+    })
+}
+
+/// The earliest hit over all pairs of parts, in the frames of the wholes; `cast` gets the shapes of
+/// two parts and their poses.
+fn first_of_parts(
+    pair: &ShapePair<'_>,
+    cast: impl Fn([&dyn Shape; 2], [Pose; 2]) -> Result<Option<ShapeCastHit>, Unsupported>,
+) -> Result<Option<ShapeCastHit>, Unsupported> {
+    let mut first: Option<ShapeCastHit> = None;
+    for i in 0..part_count(pair.shape1) {
+        for j in 0..part_count(pair.shape2) {
+            let ((pose1, part1), (pose2, part2)) = (part(pair.shape1, i), part(pair.shape2, j));
+            let [pose1, pose2] = [pose1, pose2].map(|p| p.copied().unwrap_or(Pose::IDENTITY));
+            let Some(hit) = cast([part1, part2], [pose1, pose2])? else {
+                continue;
+            };
+            if first.is_none_or(|first| hit.time_of_impact < first.time_of_impact) {
+                first = Some(ShapeCastHit {
+                    witness1: pose1 * hit.witness1,
+                    witness2: pose2 * hit.witness2,
+                    normal1: pose1.rotation * hit.normal1,
+                    normal2: pose2.rotation * hit.normal2,
+                    subshape1: i,
+                    subshape2: j,
+                    ..hit
+                });
+            }
+        }
+    }
+    Ok(first)
+}
+
+/// A hit at time 0 if the shapes are within `target_distance` metres.
+fn overlap(
+    shared: &Shared,
+    pair: &ShapePair<'_>,
+    target_distance: f32,
+) -> Result<Option<ShapeCastHit>, Unsupported> {
+    let pair = ShapePair {
+        prediction: target_distance,
+        ..*pair
+    };
+    let contact = queries::contact(shared, pair)?;
+    Ok(contact.map(|contact| ShapeCastHit {
+        time_of_impact: 0.0,
+        witness1: contact.point1,
+        witness2: contact.point2,
+        normal1: contact.normal1,
+        normal2: contact.normal2,
+        status: ShapeCastStatus::PenetratingOrWithinTargetDist,
+        subshape1: contact.subshape1,
+        subshape2: contact.subshape2,
+    }))
+}
+
+/// The impact of the second part, of this velocity in the frame of the first, in m/s.
+fn straight_impact(
+    shared: &Shared,
+    moving: &Moving<'_>,
+    a_from_b: Pose,
+    velocity: Vector,
+    options: ShapeCastOptions,
+) -> Option<ShapeCastHit> {
+    let speed = velocity.length();
+    let params = moving.params(&shared.config)?;
+    // No farther than the bounds reach, if they are bounded.
+    let [sphere_a, sphere_b] = moving
+        .parts
+        .map(|part| part.compute_local_bounding_sphere());
+    let apart = sphere_a.center.distance(a_from_b * sphere_b.center);
+    let reach = apart + sphere_a.radius + sphere_b.radius;
+    let longest = if reach.is_finite() { reach } else { f32::MAX };
+    let way = (speed * options.max_time_of_impact + options.target_distance)
+        .min(longest)
+        .min(MAX_PIXELS * params.pixel_size);
+    let [a, b] = moving.parts.map(ExactShape);
+    let impact = shared.impact_on_the_spot(&ImpactQuery {
+        a: surface(&a),
+        b: surface(&b),
+        a_from_b,
+        motion: way * velocity.try_normalize()?,
+        least_distance: 0.0,
+        core_only: false,
+        params,
+    })?;
+    let cosine = -impact.normal.dot(velocity) / speed;
+    let early = options.target_distance / cosine.max(LEAST_COSINE);
+    let time = (impact.distance - early).max(0.0) / speed;
+    let is_in_time = time <= options.max_time_of_impact;
+    let moved = Pose::from_translation(velocity * (impact.distance / speed)) * a_from_b;
+    is_in_time.then(|| hit_of(&impact, time, &moved))
+}
+
+/// The impact of two parts both of which may turn.
+fn turning_impact(
+    shared: &Shared,
+    moving: &Moving<'_>,
+    [motion_a, motion_b]: &[NonlinearRigidMotion; 2],
+    start: f32,
+    end: f32,
+) -> Option<ShapeCastHit> {
+    let params = moving.params(&shared.config)?;
+    let bounds = moving.parts[1].compute_local_aabb();
+    let middle = bounds.center();
+    // In the frame of the first part, as if the second had the rotation of another time.
+    let a_from_b = |time: f32, rotated_as: f32| {
+        let pose_at = |time: f32| {
+            let pose_a = motion_a.position_at_time(time);
+            pose_a.inv_mul(&motion_b.position_at_time(time))
+        };
+        let rotation = pose_at(rotated_as).rotation;
+        Pose::from_parts(pose_at(time) * middle - rotation * middle, rotation)
+    };
+    let duration = end - start;
+    let turn_a = motion_a.angvel.length() * duration;
+    let turn = turn_a + motion_b.angvel.length() * duration;
+    // The corners of the second part turn by so much, and its middle's way bends about the first.
+    let turned = 0.5 * turn * bounds.half_extents().length();
+    let [before, after] = [start, end].map(|time| a_from_b(time, time) * middle);
+    let lever = motion_a
+        .local_center
+        .distance(before)
+        .max(motion_a.local_center.distance(after));
+    let allowed = MAX_DISPLACEMENT * params.pixel_size;
+    let pieces = (turned / allowed)
+        .max(turn_a * (lever / (8.0 * allowed)).sqrt())
+        .ceil()
+        .clamp(1.0, MAX_PIECES);
+    let displacement = turned / pieces;
+
+    let [a, b] = moving.parts.map(ExactShape);
+    let touching = 2.0 * shared.config.scatter * params.pixel_size;
+    let time_at = |piece: u32| start + duration * piece as f32 / pieces;
+    for piece in 0..pieces as u32 {
+        let (from, to) = (time_at(piece), time_at(piece + 1));
+        let frozen = a_from_b(from, 0.5 * (from + to));
+        let way = a_from_b(to, 0.5 * (from + to)).translation - frozen.translation;
+        let Some(direction) = way.try_normalize() else {
+            continue;
+        };
+        // What would seem to touch already in the next piece is met in this one.
+        let is_last = piece + 1 == pieces as u32;
+        let beyond = if is_last {
+            0.0
+        } else {
+            touching + 2.0 * displacement
+        };
+        let impact = shared.impact_on_the_spot(&ImpactQuery {
+            a: surface(&a),
+            b: surface(&b),
+            a_from_b: frozen,
+            motion: way + beyond * direction,
+            least_distance: touching,
+            core_only: true,
+            params,
+        });
+        if let Some(impact) = impact {
+            // Not at the very start, which a solver takes for a contact that it has.
+            let distance = (impact.distance - displacement).max(0.5 * impact.distance);
+            let time = from + (to - from) * (distance / way.length()).min(1.0);
+            let moved = Pose::from_translation(impact.distance * direction) * frozen;
+            return Some(hit_of(&impact, time, &moved));
+        }
+    }
+    None
+}
+
+/// The hit of an impact; `a_from_b` maps from the second part's frame as it is then.
+fn hit_of(impact: &Impact, time_of_impact: f32, a_from_b: &Pose) -> ShapeCastHit {
+    let b_from_a = a_from_b.inverse();
+    ShapeCastHit {
+        time_of_impact,
+        witness1: impact.point,
+        witness2: b_from_a * impact.point,
+        normal1: impact.normal,
+        normal2: b_from_a.rotation * -impact.normal,
+        status: ShapeCastStatus::Converged,
+        subshape1: 0,
+        subshape2: 0,
+    }
+}
