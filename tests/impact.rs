@@ -15,7 +15,7 @@ fn query<'a>(a: Surface<'a>, b: Surface<'a>, a_from_b: Pose3, motion: Vec3) -> I
         b,
         a_from_b,
         motion,
-        least_distance: 0.0,
+        touching: 0.0,
         core_only: false,
         params: Params::for_radius(R),
     }
@@ -159,36 +159,38 @@ fn only_the_core_passes_over_roughness() {
     assert!(met.normal.x < -0.99, "{met:?}");
 }
 
-/// What touches at the beginning is passed, what is behind it is not.
+/// What touches at the beginning is passed by what only slides along it or goes, and met by what
+/// goes on towards it.
 #[test]
-fn what_is_nearer_than_the_least_distance_is_passed() {
+fn what_touches_is_met_only_head_on() {
     let mut rng = fastrand::Rng::with_seed(4);
-    let near = sampled_plane(0.6, R, &mut rng);
-    let mut sheets = near.moved(&Pose3::translation(0.0, -0.3, 0.0));
-    sheets.points.extend(&near.points);
-    sheets.normals.extend(&near.normals);
-    let sheets = sheets.bare_cloud(R);
+    let floor = sampled_plane(0.6, R, &mut rng).bare_cloud(R);
+    let wall = sampled_plane(0.6, R, &mut rng).moved(&Pose3::from_parts(
+        0.2 * Vec3::X,
+        Quat::from_rotation_z(std::f32::consts::FRAC_PI_2),
+    ));
+    let mut room = sampled_plane(0.6, R, &mut rng);
+    room.points.extend(&wall.points);
+    room.normals.extend(&wall.normals);
+    let room = room.bare_cloud(R);
     let ball = sampled_sphere(0.05, R).cloud(R);
-    let start = Pose3::translation(0.0, 0.052, 0.0);
-    let cast = |least_distance| {
+    let start = Pose3::translation(0.0, 0.051, 0.0);
+    let cast = |cloud, motion, touching| {
         impact(&ImpactQuery {
-            least_distance,
-            ..query(
-                Surface::Cloud(&sheets),
-                Surface::Cloud(&ball),
-                start,
-                -Vec3::Y,
-            )
+            touching,
+            core_only: true,
+            ..query(Surface::Cloud(cloud), Surface::Cloud(&ball), start, motion)
         })
         .map(|impact| impact.distance)
     };
-    assert!((cast(0.0).expect("the first sheet") - 0.002).abs() < 0.1 * R);
-    // The rest of the ball still meets the first sheet, farther up its sides.
-    let later = cast(0.03).expect("its sides");
-    assert!((0.03..0.06).contains(&later), "{later}");
-    let second = cast(0.08).expect("the second sheet");
-    assert!((second - 0.302).abs() < 0.1 * R, "{second}");
-    assert_eq!(cast(0.5), None);
+    let (down, along) = (-Vec3::Y, Vec3::new(1.0, -0.005, 0.0));
+    let met = cast(&floor, down, 0.2 * R).expect("it goes on downwards");
+    assert!(met < 0.2 * R, "{met}");
+    assert_eq!(cast(&floor, 0.002 * down, 0.2 * R), None);
+    assert_eq!(cast(&floor, along, 0.2 * R), None);
+    assert_eq!(cast(&floor, -down, 0.2 * R), None);
+    let met = cast(&room, along, 0.2 * R).expect("the wall");
+    assert!((met - 0.15).abs() < 0.2 * R, "{met}");
 }
 
 /// What is inside a solid may leave it, and meets what else there is.

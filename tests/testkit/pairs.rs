@@ -9,10 +9,7 @@ pub fn aimed<'a>(a: Surface<'a>, b: Surface<'a>, a_from_b: Pose3, params: Params
         a,
         b,
         a_from_b,
-        view: View::Aim {
-            toward_b: a_from_b.translation,
-            last_axis: None,
-        },
+        view: View::aimed(),
         params,
     }
 }

@@ -1,7 +1,7 @@
 //! The settings of a pipeline.
 
 use crate::TldiError;
-use tldi::{Params, Variant};
+use tldi::{CameraPolicy, Params, Variant};
 
 /// Settings of a [`TldiPipeline`](crate::TldiPipeline), the same for all its pairs.
 ///
@@ -15,6 +15,8 @@ use tldi::{Params, Variant};
 pub struct TldiConfig {
     /// Which construction and comparison of the layers to use.
     pub variant: Variant,
+    /// From where pairs are looked at.
+    pub camera_policy: CameraPolicy,
     /// Edge of a pixel in mean radii of the pair's coarser cloud, greater than 0. 1 resolves the
     /// most that the points tell; 2 averages noise as large as the radii.
     pub pixel_scale: f32,
@@ -30,6 +32,7 @@ impl Default for TldiConfig {
     fn default() -> Self {
         Self {
             variant: Variant::default(),
+            camera_policy: CameraPolicy::default(),
             pixel_scale: 1.0,
             scatter: 0.1,
         }

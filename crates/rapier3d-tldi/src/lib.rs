@@ -79,4 +79,4 @@ pub use mass::{MassModel, unit_mass_properties};
 pub use pipeline::TldiPipeline;
 pub use report::{Contact, StepReport};
 pub use shape::PointCloudShape;
-pub use tldi::{self, CloudError, NonFinite, PointCloud, RayHit, RaySurface};
+pub use tldi::{self, CameraPolicy, CloudError, NonFinite, PointCloud, RayHit, RaySurface};

@@ -141,13 +141,13 @@ pub(crate) fn append_part_pairs<'a>(
             let comparison = radius.map(|radius| {
                 let a = part1.compute_local_aabb().loosened(prediction);
                 let b = part2.compute_aabb(&a_from_b);
-                let middle = meeting_region(&a, &b).center();
-                let Hint { motion, last_axis } = hint([i, j], pose1, middle);
+                let Hint { motion, last_axis } = hint([i, j], pose1, middle_of_meeting(&a, &b));
                 let query = sides.len();
                 sides.push([ExactShape(part1), ExactShape(part2)]);
                 Comparison {
                     view: View::Aim {
-                        toward_b: toward_b(&a, &b, middle) - motion,
+                        policy: config.camera_policy,
+                        motion,
                         last_axis,
                     },
                     params: config.params(radius, prediction),
@@ -193,20 +193,8 @@ pub(crate) fn surface<'s>(side: &'s ExactShape<'_>) -> Surface<'s> {
     }
 }
 
-/// Where the bounds meet; if they do not quite, the region between them.
-fn meeting_region(a: &Aabb, b: &Aabb) -> Aabb {
-    let low = a.mins.max(b.mins);
-    let high = a.maxs.min(b.maxs);
-    Aabb::new(low.min(high), low.max(high))
-}
-
-/// Direction, as an offset in metres, in which the second of two bounds lies as seen from where
-/// they meet: the smaller one's centre tells (a small body on a large scan lies on the side of its
-/// own centre).
-fn toward_b(a: &Aabb, b: &Aabb, middle: Vector) -> Vector {
-    if b.extents().length_squared() <= a.extents().length_squared() {
-        b.center() - middle
-    } else {
-        middle - a.center()
-    }
+/// Middle of the region where the bounds meet or, if they do not quite, of that between them.
+fn middle_of_meeting(a: &Aabb, b: &Aabb) -> Vector {
+    let (low, high) = (a.mins.max(b.mins), a.maxs.min(b.maxs));
+    low.midpoint(high)
 }

@@ -4,4 +4,4 @@ pub use crate::{
     Contact as CloudContact, MassModel, PointCloudShape, StepReport, TldiConfig, TldiError,
     TldiPipeline, cloud_collider,
 };
-pub use tldi::{CloudError, NonFinite, PointCloud, Variant};
+pub use tldi::{CameraPolicy, CloudError, NonFinite, PointCloud, Variant};

@@ -24,6 +24,10 @@ const MAX_PIECES: f32 = 64.0;
 /// that casts of turning bodies spare.
 const MAX_DISPLACEMENT: f32 = 0.5;
 
+/// Distance in pixels up to which surfaces count as touching: what their measured gap scatters by
+/// (0.1), twice, since contacts are kept until a pair has moved by as much.
+const TOUCHING: f32 = 0.2;
+
 /// Longest straight cast in pixels: what the images resolve in depth.
 const MAX_PIXELS: f32 = 131_072.0;
 
@@ -224,8 +228,11 @@ fn straight_impact(
         b: surface(&b),
         a_from_b,
         motion: way * velocity.try_normalize()?,
-        least_distance: 0.0,
-        core_only: false,
+        touching: match options.stop_at_penetration {
+            true => 0.0,
+            false => TOUCHING * params.pixel_size,
+        },
+        core_only: !options.stop_at_penetration,
         params,
     })?;
     let cosine = -impact.normal.dot(velocity) / speed;
@@ -258,7 +265,7 @@ fn turning_impact(
     };
     let duration = end - start;
     let turn_a = motion_a.angvel.length() * duration;
-    let turn = turn_a + motion_b.angvel.length() * duration;
+    let turn = (motion_b.angvel - motion_a.angvel).length() * duration;
     // The corners of the second part turn by so much, and its middle's way bends about the first.
     let turned = 0.5 * turn * bounds.half_extents().length();
     let [before, after] = [start, end].map(|time| a_from_b(time, time) * middle);
@@ -274,7 +281,7 @@ fn turning_impact(
     let displacement = turned / pieces;
 
     let [a, b] = moving.parts.map(ExactShape);
-    let touching = 2.0 * shared.config.scatter * params.pixel_size;
+    let touching = TOUCHING * params.pixel_size;
     let time_at = |piece: u32| start + duration * piece as f32 / pieces;
     for piece in 0..pieces as u32 {
         let (from, to) = (time_at(piece), time_at(piece + 1));
@@ -295,14 +302,16 @@ fn turning_impact(
             b: surface(&b),
             a_from_b: frozen,
             motion: way + beyond * direction,
-            least_distance: touching,
+            touching,
             core_only: true,
             params,
         });
         if let Some(impact) = impact {
             // Not at the very start, which a solver takes for a contact that it has.
-            let distance = (impact.distance - displacement).max(0.5 * impact.distance);
-            let time = from + (to - from) * (distance / way.length()).min(1.0);
+            let distance = (impact.distance - displacement)
+                .max(0.5 * impact.distance)
+                .max(0.5 * touching);
+            let time = (from + (to - from) * distance / way.length()).min(end);
             let moved = Pose::from_translation(impact.distance * direction) * frozen;
             return Some(hit_of(&impact, time, &moved));
         }

@@ -193,14 +193,3 @@ fn surfaces_apart_do_not_intersect() {
         assert_eq!(answer.intersecting, expected, "at {height}");
     }
 }
-
-/// Casts and distances are declined, not answered wrongly.
-#[test]
-fn other_questions_are_declined() {
-    let (floor, ball) = (shape(&square(0.6)), Ball::new(0.1));
-    let ours = dispatcher();
-    let pose = Pose::from_translation(Vector::Y);
-    assert!(ours.distance(&pose, &floor, &ball).is_err());
-    assert!(ours.contact(&pose, &floor, &ball, 0.1).is_err());
-    assert!(ours.closest_points(&pose, &floor, &ball, 2.0).is_err());
-}

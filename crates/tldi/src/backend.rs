@@ -1,6 +1,6 @@
 //! The seam between callers and implementations: a batch of pairs in, a result per pair out.
 
-use crate::{ContactPatch, ContactPixel, Params, Surface, VirtualCamera};
+use crate::{CameraPolicy, ContactPatch, ContactPixel, Params, Surface, VirtualCamera};
 use glamx::{Pose3, Vec3};
 use thiserror::Error;
 
@@ -9,17 +9,29 @@ use thiserror::Error;
 pub enum View {
     /// This camera, in the frame of the first surface. One view.
     Fixed(VirtualCamera),
-    /// Aimed by the normals of the contact zone (up to three views where they point several ways,
-    /// as in a corner).
+    /// Aimed by a policy.
     Aim {
-        /// Direction in the frame of the first surface in which the second one lies, or should be
-        /// pushed, if the normals do not tell; need not be of unit length. Zero: from the bounds.
-        toward_b: Vec3,
-        /// Axis of the pair's main view in the frame before: kept while the zone's normals agree
-        /// with it within [`AXIS_HYSTERESIS`](crate::AXIS_HYSTERESIS), so that the pixel grid
-        /// does not flicker.
+        /// What decides the axes.
+        policy: CameraPolicy,
+        /// Motion of `b` relative to `a` over the step, gravity included, in the frame of `a`,
+        /// metres: tells from which side `b` comes, where the bounds and normals do not.
+        motion: Vec3,
+        /// Axis of the pair's main view in the frame before, in the frame of `a`: the side that `b`
+        /// was on is kept, and the axis while the zone's normals agree with it within
+        /// [`AXIS_HYSTERESIS`](crate::AXIS_HYSTERESIS), so that the pixel grid does not flicker.
         last_axis: Option<Vec3>,
     },
+}
+
+impl View {
+    /// Aimed by the default policy, without motion or memory.
+    pub fn aimed() -> Self {
+        Self::Aim {
+            policy: CameraPolicy::default(),
+            motion: Vec3::ZERO,
+            last_axis: None,
+        }
+    }
 }
 
 /// One pair to be compared.

@@ -15,9 +15,10 @@ pub struct ImpactQuery<'a> {
     /// The motion of `b`, in the frame of `a`, metres; it does not turn. Up to 2¹⁷ merge gaps
     /// (2.6 km for radii of 1 cm) are resolved.
     pub motion: Vec3,
-    /// What is nearer than this along the motion at its beginning, metres, is not met: it touches
-    /// already, or `b` has passed it.
-    pub least_distance: f32,
+    /// What is nearer than this along the motion at its beginning, metres, touches already: it is
+    /// met only if the motion goes on towards it by more than a pixel, and what is behind it may be
+    /// met instead.
+    pub touching: f32,
     /// Whether the rim of `b`, two pixels wide where `b` is wider than that, passes what it meets:
     /// a body that slides along a rough surface is not stopped by it.
     pub core_only: bool,

@@ -85,10 +85,7 @@ fn a_warm_backend_allocates_nothing() {
                         a,
                         b: Surface::Cloud(cloud),
                         a_from_b,
-                        view: View::Aim {
-                            toward_b: a_from_b.translation,
-                            last_axis: None,
-                        },
+                        view: View::aimed(),
                         params: Params::for_radius(r),
                     };
                     for query in [

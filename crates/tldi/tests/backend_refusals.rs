@@ -26,10 +26,7 @@ fn refusal(view: View, params: Params) -> Option<&'static str> {
 }
 
 fn aim() -> View {
-    View::Aim {
-        toward_b: Vec3::Y,
-        last_axis: None,
-    }
+    View::aimed()
 }
 
 /// Of an image of too many pixels not even the offsets would fit in memory.

@@ -5,8 +5,8 @@
 //! no closed surface. Contact pixels pair a layer through which rays leave the second body with
 //! one through which they enter the first.
 
-use super::aim::MAX_VIEWS;
 use super::sweep::is_edge_on;
+use crate::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
@@ -22,6 +22,14 @@ pub(crate) struct Middles {
     pub(crate) b: Option<f32>,
 }
 
+/// What is known of both surfaces beside their layers.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Seen {
+    pub(crate) middles: Middles,
+    /// Whether the outward normals of `a`, and of `b`, say that the view looks at it from behind.
+    pub(crate) from_behind: [bool; 2],
+}
+
 /// Adds what the view `view` (index into `axes`, unit vectors from `b` to `a`) sees to `result`.
 /// Both images have the same camera and rectangle.
 pub(crate) fn compare(
@@ -29,7 +37,7 @@ pub(crate) fn compare(
     b: &Tldi,
     axes: &[Vec3],
     view: usize,
-    middles: &Middles,
+    seen: &Seen,
     params: &Params,
     result: &mut PairResult,
 ) {
@@ -62,9 +70,13 @@ pub(crate) fn compare(
                 frame_from_view: &frame_from_view,
                 view,
                 others: &others,
-                middles,
+                middles: &seen.middles,
             };
-            contact_pixels(la, lb, &at, params, result);
+            let columns = [
+                Column::new(la, Facing::Entry, seen.from_behind[0]),
+                Column::new(lb, Facing::Exit, seen.from_behind[1]),
+            ];
+            contact_pixels(columns, &at, params, result);
         }
     }
 }
@@ -131,22 +143,53 @@ struct PixelView<'a> {
     middles: &'a Middles,
 }
 
-fn contact_pixels(
-    a: &[Layer],
-    b: &[Layer],
-    at: &PixelView,
-    params: &Params,
-    result: &mut PairResult,
-) {
-    for (kb, exit) in b.iter().enumerate() {
-        if exit.facing == Facing::Entry || is_edge_on(exit) {
+/// A surface's layers in one pixel.
+#[derive(Clone, Copy)]
+struct Column<'a> {
+    layers: &'a [Layer],
+    /// A sheet seen from behind: what its layers face says nothing.
+    is_turned: bool,
+}
+
+impl<'a> Column<'a> {
+    /// `met` is what the layers face that the other surface can meet.
+    fn new(layers: &'a [Layer], met: Facing, from_behind: bool) -> Self {
+        let is_turned = from_behind && layers.iter().all(|layer| layer.facing != met);
+        Self { layers, is_turned }
+    }
+
+    fn facing(&self, layer: &Layer) -> Facing {
+        match self.is_turned {
+            true => Facing::Unknown,
+            false => layer.facing,
+        }
+    }
+
+    fn up_to(&self, last: usize) -> Self {
+        Self {
+            layers: &self.layers[..=last],
+            ..*self
+        }
+    }
+
+    fn from(&self, first: usize) -> Self {
+        Self {
+            layers: &self.layers[first..],
+            ..*self
+        }
+    }
+}
+
+fn contact_pixels([a, b]: [Column; 2], at: &PixelView, params: &Params, result: &mut PairResult) {
+    for (kb, exit) in b.layers.iter().enumerate() {
+        if b.facing(exit) == Facing::Entry || is_edge_on(exit) {
             continue;
         }
-        let entered = entered_at(&b[..=kb], at.middles.b, params);
+        let entered = entered_at(&b.up_to(kb), at.middles.b, params);
         // What b has left behind altogether it does not touch.
-        let entry = (a.iter().enumerate())
-            .filter(|(_, la)| la.facing != Facing::Exit && !is_edge_on(la))
-            .filter(|(ka, _)| entered <= left_at(&a[*ka..], at.middles.a, params))
+        let entry = (a.layers.iter().enumerate())
+            .filter(|(_, la)| a.facing(la) != Facing::Exit && !is_edge_on(la))
+            .filter(|(ka, _)| entered <= left_at(&a.from(*ka), at.middles.a, params))
             .map(|(_, la)| la)
             .find(|la| exit.depth - la.depth <= params.merge_gap || opposed(la, exit));
         let Some(entry) = entry else { continue };
@@ -194,13 +237,13 @@ fn opposed(entry: &Layer, exit: &Layer) -> bool {
 /// Depth at which the ray entered the part of a body that it leaves through the last of `layers`:
 /// unbounded where its normal says that there is an inside but the entry was culled. A ray that
 /// leaves a body twice in a row has missed a layer and tells no more than that the surface is there.
-fn entered_at(layers: &[Layer], middle: Option<f32>, params: &Params) -> f32 {
-    let Some((exit, before)) = layers.split_last() else {
+fn entered_at(column: &Column, middle: Option<f32>, params: &Params) -> f32 {
+    let Some((exit, before)) = column.layers.split_last() else {
         return f32::INFINITY;
     };
     let thin = exit.depth - params.merge_gap;
     let before = before.iter().rfind(|l| !is_edge_on(l));
-    match (exit.facing, before) {
+    match (column.facing(exit), before) {
         (Facing::Exit, None) => f32::NEG_INFINITY,
         (Facing::Exit, Some(l)) if l.facing != Facing::Entry => thin,
         (_, Some(l)) => l.depth,
@@ -209,13 +252,13 @@ fn entered_at(layers: &[Layer], middle: Option<f32>, params: &Params) -> f32 {
 }
 
 /// Depth at which the ray leaves the part of a body that it enters through the first of `layers`.
-fn left_at(layers: &[Layer], middle: Option<f32>, params: &Params) -> f32 {
-    let Some((entry, behind)) = layers.split_first() else {
+fn left_at(column: &Column, middle: Option<f32>, params: &Params) -> f32 {
+    let Some((entry, behind)) = column.layers.split_first() else {
         return f32::NEG_INFINITY;
     };
     let thin = entry.depth + params.merge_gap;
     let behind = behind.iter().find(|l| !is_edge_on(l));
-    match (entry.facing, behind) {
+    match (column.facing(entry), behind) {
         (Facing::Entry, None) => f32::INFINITY,
         (Facing::Entry, Some(l)) if l.facing != Facing::Exit => thin,
         (_, Some(l)) => l.depth,
@@ -258,13 +301,19 @@ mod tests {
         let entry = |depth| layer(depth, Facing::Entry);
         let exit = |depth| layer(depth, Facing::Exit);
         let unknown = |depth| layer(depth, Facing::Unknown);
-        let entered = |layers: &[Layer]| entered_at(layers, None, &params);
+        fn column(layers: &[Layer]) -> Column<'_> {
+            Column {
+                layers,
+                is_turned: false,
+            }
+        }
+        let entered = |layers: &[Layer]| entered_at(&column(layers), None, &params);
         assert_eq!(entered(&[entry(1.0), exit(9.0)]), 1.0);
         assert_eq!(entered(&[exit(9.0)]), f32::NEG_INFINITY);
         // The entry belongs to the first exit.
         assert_eq!(entered(&[entry(1.0), exit(3.0), exit(9.0)]), 7.0);
         assert_eq!(entered(&[unknown(1.0), unknown(9.0)]), 1.0);
-        let left = |layers: &[Layer]| left_at(layers, None, &params);
+        let left = |layers: &[Layer]| left_at(&column(layers), None, &params);
         assert_eq!(left(&[entry(1.0), exit(9.0)]), 9.0);
         assert_eq!(left(&[entry(1.0)]), f32::INFINITY);
         assert_eq!(left(&[entry(1.0), entry(5.0), exit(9.0)]), 3.0);

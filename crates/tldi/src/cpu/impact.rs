@@ -11,7 +11,7 @@ use super::pair::{Scratch, is_oriented, ring};
 use super::side::{CloudView, ExactView};
 use super::splat::Rect;
 use super::sweep::is_edge_on;
-use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Surface, Tldi, VirtualCamera};
+use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Params, Surface, Tldi, VirtualCamera};
 use glamx::{Pose3, Vec3};
 
 /// Width in pixels of the rim that [`ImpactQuery::core_only`] spares: what is missed there
@@ -21,6 +21,9 @@ const RIM: i32 = 2;
 /// Pixels around an image that tell its rim from its edge: the rim, and one for the closing.
 const BORDER: i32 = RIM + 1;
 
+/// Band above the least distance, in pixels, whose normals are averaged.
+const NORMAL_BAND: f32 = 0.5;
+
 /// Which pixels of a moving surface count, kept from call to call.
 #[derive(Default)]
 pub(super) struct CoreScratch {
@@ -29,6 +32,29 @@ pub(super) struct CoreScratch {
     /// Pixels from the rim's edge, counted up to where the rim ends.
     depth: Vec<u8>,
     spare: Vec<u8>,
+}
+
+/// Where the ray of a pixel sees the surfaces meet.
+pub(super) struct Meeting {
+    pixel: usize,
+    /// How far the moving surface is from there, metres.
+    distance: f32,
+    depth: f32,
+    /// Unit normal towards the moving surface, in the view frame.
+    normal: Vec3,
+}
+
+impl Meeting {
+    fn new(pixel: usize, met: &Layer, leading: &Layer, params: &Params) -> Self {
+        let against = |normal: Vec3| if normal.z > 0.0 { -normal } else { normal };
+        let depth = front(met, params);
+        Self {
+            pixel,
+            distance: depth - back(leading, params),
+            depth,
+            normal: (against(met.normal) + against(leading.normal)).normalize_or(-Vec3::Z),
+        }
+    }
 }
 
 impl Scratch {
@@ -45,37 +71,44 @@ impl Scratch {
         if query.core_only {
             self.core.find(b, &whole_b);
         }
-        let mut first: Option<(f32, usize, &Layer, &Layer)> = None;
+        self.meetings.clear();
         for pixel in 0..b.pixel_count() {
             if query.core_only && !self.core.contains(pixel, b.size[0]) {
                 continue;
             }
-            for (k, met) in a.layers_of(pixel).iter().enumerate() {
-                if leaves_solid(&a.layers_of(pixel)[..=k]) {
-                    continue;
-                }
-                for leading in b.layers_of(pixel) {
-                    if leading.facing == Facing::Entry && !is_edge_on(leading) {
-                        continue;
-                    }
-                    let distance = front(met) - back(leading);
-                    let is_first = first.is_none_or(|(least, ..)| distance < least);
-                    if distance >= query.least_distance && distance <= length && is_first {
-                        first = Some((distance, pixel, met, leading));
-                    }
-                }
-            }
+            let layers = a.layers_of(pixel);
+            let met = (0..layers.len()).filter(|&k| !leaves_solid(&layers[..=k]));
+            let leading = |k: usize| {
+                let moving = b.layers_of(pixel);
+                (0..moving.len())
+                    .filter(|&l| is_leading(moving, l))
+                    .map(move |l| Meeting::new(pixel, &layers[k], &moving[l], &query.params))
+            };
+            let in_way = |meeting: &Meeting| {
+                let approach = -meeting.normal.z * (length - meeting.distance);
+                (0.0..=length).contains(&meeting.distance)
+                    && (meeting.distance >= query.touching || approach > query.params.pixel_size)
+            };
+            let nearest = met
+                .flat_map(leading)
+                .filter(in_way)
+                .min_by(|m, n| m.distance.total_cmp(&n.distance));
+            self.meetings.extend(nearest);
         }
-        let (distance, pixel, met, leading) = first?;
-        let [width, _] = b.size;
-        let column = b.origin[0] + (pixel % width as usize) as i32;
-        let row = b.origin[1] + (pixel / width as usize) as i32;
+        let first = self
+            .meetings
+            .iter()
+            .min_by(|m, n| m.distance.total_cmp(&n.distance))?;
+        // A single pixel's normal may be that of a rim.
+        let near = first.distance + NORMAL_BAND * query.params.pixel_size;
+        let normals = self.meetings.iter().filter(|m| m.distance <= near);
+        let normal: Vec3 = normals.map(|m| m.normal).sum();
+        let column = b.origin[0] + (first.pixel % b.size[0] as usize) as i32;
+        let row = b.origin[1] + (first.pixel / b.size[0] as usize) as i32;
         let frame_from_view = camera.view_from_frame.rotation.inverse();
-        let against = |normal: Vec3| if normal.z > 0.0 { -normal } else { normal };
-        let normal = against(met.normal) + against(leading.normal);
         Some(Impact {
-            distance,
-            point: camera.point_at(column as f32 + 0.5, row as f32 + 0.5, front(met)),
+            distance: first.distance,
+            point: camera.point_at(column as f32 + 0.5, row as f32 + 0.5, first.depth),
             normal: (frame_from_view * normal).normalize_or(-camera.axis()),
         })
     }
@@ -93,13 +126,15 @@ impl Scratch {
             min: seen_b.min,
             max: seen_b.max + way,
         };
-        let meeting_a = Aabb {
+        let mut meeting_a = Aabb {
             min: seen_a.min - way,
             max: seen_a.max,
         };
         if !seen_a.intersects(&met_by_b) {
             return None;
         }
+        // Which layer leads is told by what is before it.
+        meeting_a.max.z = meeting_a.max.z.max(seen_b.max.z);
         if is_oriented(&query.a) {
             // Whether `b` is inside is told by what is behind it.
             met_by_b.min.z = met_by_b.min.z.min(seen_a.min.z);
@@ -242,20 +277,40 @@ fn leaves_solid(layers: &[Layer]) -> bool {
             .is_some_and(|layer| layer.facing == Facing::Entry)
 }
 
-/// Depth at which a ray meets a layer; what is seen edge-on begins where it is nearest.
-fn front(layer: &Layer) -> f32 {
+/// Whether a ray leaves the moving surface at this layer. Without orientation, at every second one
+/// and the last.
+fn is_leading(layers: &[Layer], index: usize) -> bool {
+    let is_last = index + 1 == layers.len();
+    match layers[index].facing {
+        _ if is_edge_on(&layers[index]) => is_last,
+        Facing::Entry => false,
+        Facing::Exit => true,
+        Facing::Unknown => {
+            let before = layers[..index].iter().filter(|layer| !is_edge_on(layer));
+            is_last || before.count() % 2 == 1
+        }
+    }
+}
+
+/// Depth at which a ray meets a layer.
+fn front(layer: &Layer, params: &Params) -> f32 {
     if is_edge_on(layer) {
-        layer.near
+        layer.depth.min(layer.near + rise(params))
     } else {
         layer.depth
     }
 }
 
 /// Depth at which a ray has left a layer.
-fn back(layer: &Layer) -> f32 {
+fn back(layer: &Layer, params: &Params) -> f32 {
     if is_edge_on(layer) {
-        layer.far
+        layer.depth.max(layer.far - rise(params))
     } else {
         layer.depth
     }
+}
+
+/// By how much splats that are seen edge-on stand out in depth beyond their points, metres.
+fn rise(params: &Params) -> f32 {
+    0.5 * params.merge_gap * params.slope_damping
 }

@@ -1,11 +1,10 @@
 //! The CPU backend: the reference that every other backend is compared with.
 //!
-//! One file a stage: `cull`, `zone`, `aim`, `columns`, `normals`, `splat` (with `mark` and
+//! One file a stage: `cull`, `zone`, `aim` (`camera_policy.rs`), `columns`, `normals`, `splat` (with `mark` and
 //! `alloc`), `cast`, `sweep`, `compare`; then the reduction to contact patches, which all backends
 //! share. `pair` runs them, `side` those of one cloud; `lanes` is what
 //! makes their inner loops SIMD. `impact` compares the images of a motion.
 
-mod aim;
 mod cast;
 mod columns;
 mod compare;
@@ -50,7 +49,7 @@ use std::sync::Mutex;
 ///         a: Surface::Cloud(&sheet),
 ///         b: Surface::Cloud(&sheet),
 ///         a_from_b: Pose3::translation(0.0, 0.02, 0.0),
-///         view: View::Aim { toward_b: Vec3::Y, last_axis: None },
+///         view: View::aimed(),
 ///         params: Params::for_radius(0.05),
 ///     }],
 ///     &mut results,
@@ -94,7 +93,7 @@ impl CpuBackend {
     ///     b: Surface::Cloud(&sheet),
     ///     a_from_b: Pose3::translation(0.0, 2.0, 0.0),
     ///     motion: Vec3::new(0.0, -5.0, 0.0),
-    ///     least_distance: 0.0,
+    ///     touching: 0.0,
     ///     core_only: false,
     ///     params: Params::for_radius(0.05),
     /// })?;

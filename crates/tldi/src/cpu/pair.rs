@@ -1,14 +1,14 @@
 //! The stages of one pair, in order.
 
-use super::aim::{self, Hint, MAX_VIEWS, ZoneNormals};
 use super::columns::{Tiles, Touching};
-use super::compare::{self, Middles};
+use super::compare::{self, Middles, Seen};
 use super::cull::{self, Region};
-use super::impact::CoreScratch;
+use super::impact::{CoreScratch, Meeting};
 use super::normals;
 use super::side::{CloudView, ExactView, Side};
 use super::splat::{DepthScale, Imaging, Rect};
 use super::zone::{self, ZoneScratch};
+use crate::camera_policy::{Approach, MAX_VIEWS, ZoneNormals, aim, seen_from_behind};
 use crate::patches::PatchScratch;
 use crate::{
     Aabb, PairQuery, PairResult, Params, RayHit, Surface, Variant, View, VirtualCamera, paper,
@@ -29,6 +29,7 @@ pub(super) struct Scratch {
     pub(super) b: Side,
     pub(super) hits: Vec<RayHit>,
     pub(super) core: CoreScratch,
+    pub(super) meetings: Vec<Meeting>,
     zone: ZoneScratch,
     touching: Touching,
     paper: [paper::Scratch; 2],
@@ -55,15 +56,17 @@ impl Scratch {
                 self.look(query, &camera, 0, result);
             }
             View::Aim {
-                toward_b,
+                policy,
+                motion,
                 last_axis,
             } => {
-                self.aim(
-                    query,
-                    &Hint {
-                        toward_b,
-                        last_axis,
-                    },
+                let (bounds_a, bounds_b) = (query.a.bounds(), query.b.bounds());
+                let approach =
+                    Approach::new(&bounds_a, &bounds_b, &query.a_from_b, motion, last_axis);
+                aim(
+                    policy,
+                    self.zone_normals(query),
+                    &approach,
                     &mut result.axes,
                 );
                 if query.params.variant() == Variant::Paper {
@@ -211,19 +214,11 @@ impl Scratch {
         }
     }
 
-    fn aim(&mut self, query: &PairQuery, hint: &Hint, axes: &mut Vec<Vec3>) {
-        aim::aim(
-            &ZoneNormals {
-                normals: &self.a.near_normals,
-                oriented: is_oriented(&query.a),
-            },
-            &ZoneNormals {
-                normals: &self.b.near_normals,
-                oriented: is_oriented(&query.b),
-            },
-            hint,
-            axes,
-        );
+    fn zone_normals(&self, query: &PairQuery) -> [ZoneNormals<'_>; 2] {
+        [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| ZoneNormals {
+            normals: &side.near_normals,
+            oriented: is_oriented(&surface),
+        })
     }
 
     /// Builds both images for one camera and compares them.
@@ -276,7 +271,10 @@ impl Scratch {
             &self.b.image,
             &axes,
             view,
-            &middles(query, camera),
+            &Seen {
+                middles: middles(query, camera),
+                from_behind: seen_from_behind(camera.axis(), &self.zone_normals(query)),
+            },
             &query.params,
             result,
         );

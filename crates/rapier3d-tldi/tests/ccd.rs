@@ -1,0 +1,100 @@
+//! Fast bodies: they stop at what they meet, and only there.
+
+mod common;
+
+use common::worlds::{TestResult, attached};
+use common::{SPACING, cube, shape, square};
+use rapier3d::prelude::*;
+use rapier3d_tldi::prelude::*;
+
+/// Half the edge of the floors, metres.
+const FLOOR: f32 = 3.0;
+
+/// The lowest that the middle of a body gets above a floor at height 0, while it is over it.
+fn lowest(
+    body: ColliderBuilder,
+    floor: ColliderBuilder,
+    velocity: Velocity,
+) -> Result<f32, TldiError> {
+    let (mut world, mut tldi) = attached();
+    world.insert(RigidBodyBuilder::fixed(), floor.friction(0.0));
+    let flying = RigidBodyBuilder::dynamic()
+        .translation(-2.0 * velocity.linear.normalize())
+        .linvel(velocity.linear)
+        .angvel(velocity.angular)
+        .gravity_scale(0.0);
+    let (body, _) = world.insert(flying, body.friction(0.0));
+    let mut lowest = f32::INFINITY;
+    for _ in 0..30 {
+        tldi.step(&mut world)?;
+        let middle = world.bodies[body].translation();
+        if middle.with_y(0.0).abs().max_element() < FLOOR {
+            lowest = lowest.min(middle.y);
+        }
+    }
+    Ok(lowest)
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Velocity {
+    linear: Vector,
+    angular: Vector,
+}
+
+/// Clouds and exact bodies on clouds and exact floors, straight down and slanting, turning or not.
+#[test]
+fn fast_bodies_stop() -> TestResult {
+    let bodies: [fn() -> ColliderBuilder; 3] = [
+        || cloud_collider(shape(&cube(0.2))),
+        || cloud_collider(shape(&cube(0.05))),
+        || ColliderBuilder::ball(0.1),
+    ];
+    for body in bodies {
+        for speed in [5.0, 30.0, 200.0] {
+            for slant in [0.0, 1.0] {
+                for spin in [0.0, 30.0] {
+                    let velocity = Velocity {
+                        linear: speed * Vector::new(slant, -1.0, 0.0).normalize(),
+                        angular: spin * Vector::new(1.0, 0.5, -0.3),
+                    };
+                    let floors = [
+                        cloud_collider(shape(&square(FLOOR))),
+                        ColliderBuilder::cuboid(FLOOR, 0.02, FLOOR),
+                    ];
+                    let is_cloud = body().shape.as_shape::<PointCloudShape>().is_some();
+                    for floor in floors.into_iter().take(1 + usize::from(is_cloud)) {
+                        let is_exact = floor.shape.as_cuboid().is_some();
+                        let lowest = lowest(body(), floor, velocity)?;
+                        assert!(lowest > 0.0, "{lowest}: {velocity:?}, exact {is_exact}");
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A fast slide over a rough floor is no impact: friction-free, it goes on undiminished.
+#[test]
+fn fast_slides_go_on() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let mut rng = fastrand::Rng::with_seed(1);
+    let rough: Vec<Vector> = square(3.0)
+        .into_iter()
+        .map(|p| p + 0.3 * SPACING * (rng.f32() - 0.5) * Vector::Y)
+        .collect();
+    world.insert(
+        RigidBodyBuilder::fixed(),
+        cloud_collider(shape(&rough)).friction(0.0),
+    );
+    let slider = RigidBodyBuilder::dynamic()
+        .translation(Vector::new(-2.5, 0.2, 0.0))
+        .linvel(Vector::X * 30.0);
+    let (slider, _) = world.insert(slider, cloud_collider(shape(&cube(0.2))).friction(0.0));
+    for _ in 0..9 {
+        tldi.step(&mut world)?;
+    }
+    let moved = world.bodies[slider].translation().x + 2.5;
+    assert!((moved - 4.5).abs() < 0.05, "{moved}");
+    Ok(())
+}

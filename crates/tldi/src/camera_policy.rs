@@ -1,0 +1,403 @@
+//! Stage `aim`: the axes from which a pair is looked at.
+//!
+//! A camera should see the touching surfaces face on: depths along its axis are then distances. So
+//! the first axis is the top eigenvector of Σ n nᵀ over the near points of both surfaces. An axis
+//! along the motion is right for an impact, but looks along the surface whenever bodies slide,
+//! spin or rest. Where both surfaces also meet on faces that the first axis sees edge-on (a corner,
+//! a groove), up to two more axes follow.
+//!
+//! What the motion, the bounds, the last axis and the outside of the surfaces tell is on which side
+//! of `a` lies `b`: the sign of the axis.
+
+use crate::normals::least_variance_axis;
+use crate::{AXIS_HYSTERESIS, Aabb};
+use glamx::{DMat3, DVec3, Mat3, Pose3, Quat, Vec3};
+
+/// How the axes of a pair's views are chosen.
+///
+/// All but the default are there to be compared with it: see the chart of contact errors against
+/// the angle of motion, and the stability suite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum CameraPolicy {
+    /// By the normals of the contact zone; kept from frame to frame while they agree with it within
+    /// [`AXIS_HYSTERESIS`]; up to three views.
+    #[default]
+    ContactZone,
+    /// One view against the motion of `b` relative to `a`; without motion, by the bounds.
+    Motion,
+    /// One view by the normals of the contact zone, anew in every frame.
+    Covariance,
+    /// One view along the axis of the larger surface's frame in which the bounds overlap least.
+    SmallestExtent,
+    /// One view along the last axis; the first time by the normals of the contact zone.
+    LastNormal,
+}
+
+/// Most views of one pair: three axes span all directions.
+pub(crate) const MAX_VIEWS: usize = 3;
+
+/// A normal within this of the axis is well seen: cos 50°. Depth errors of splats grow as the
+/// tangent beyond.
+const WELL_SEEN: f32 = 0.643;
+
+/// The other side must face a further axis within 60° ...
+const SUPPORTED: f32 = 0.5;
+
+/// ... with at least this share of its near points. Fewer is noise at the rim of the zone.
+const LEAST_SHARE: f32 = 0.05;
+
+/// Mean of n·v, over the normals that face an axis, below which their signs say nothing about the
+/// side (a ring around a deep contact has its normals all around the axis); likewise the least
+/// cosine between an axis and the last one.
+const CONCLUSIVE: f32 = 0.3;
+
+/// Weight of the direction to `b` beside the normals of a surface: decides where normals point all
+/// around (balls deep in each other), and turns the axis of a flat contact by 3° at the most.
+const HINT_WEIGHT: f32 = 0.1;
+
+/// Normals of the near points of one surface.
+#[derive(Clone, Copy)]
+pub(crate) struct ZoneNormals<'a> {
+    pub(crate) normals: &'a [Vec3],
+    /// Whether their sign is outward.
+    pub(crate) oriented: bool,
+}
+
+/// What else than the normals decides the axis; in the frame of `a`.
+pub(crate) struct Approach {
+    /// From the frame of `a` into that of the larger surface.
+    larger_from_a: Quat,
+    /// Half the extents of the region where the bounds meet, in the frame of the larger surface,
+    /// metres.
+    half_extents: Vec3,
+    /// From where the bounds meet to where `b` lies, metres.
+    toward_b: Vec3,
+    /// The main axis of the frame before.
+    last_axis: Option<Vec3>,
+}
+
+impl Approach {
+    /// `motion` is that of `b` relative to `a` over the step, in the frame of `a`, metres.
+    pub(crate) fn new(
+        a: &Aabb,
+        b: &Aabb,
+        a_from_b: &Pose3,
+        motion: Vec3,
+        last_axis: Option<Vec3>,
+    ) -> Self {
+        // A small body on a large scan lies on the side of its own middle. In the frame of the
+        // smaller surface the larger one would fill its bounds, and they would tell nothing.
+        let size = |bounds: &Aabb| bounds.extents().length_squared();
+        let meeting = |larger: &Aabb, smaller: &Aabb| {
+            let (low, high) = (larger.min.max(smaller.min), larger.max.min(smaller.max));
+            let half_extents = 0.5 * (high - low).abs();
+            (smaller.center() - 0.5 * (low + high), half_extents)
+        };
+        let (toward_b, half_extents, larger_from_a) = if size(b) <= size(a) {
+            let (toward_b, half_extents) = meeting(a, &b.transformed(a_from_b));
+            (toward_b, half_extents, Quat::IDENTITY)
+        } else {
+            let b_from_a = a_from_b.inverse();
+            let (toward_a, half_extents) = meeting(b, &a.transformed(&b_from_a));
+            let toward_b = a_from_b.rotation * -toward_a;
+            (toward_b, half_extents, b_from_a.rotation)
+        };
+        Self {
+            larger_from_a,
+            half_extents,
+            toward_b: toward_b - motion,
+            last_axis,
+        }
+    }
+
+    /// Whether `b` lies on the side of `a` that `axis` points away from, so surely that nothing else
+    /// needs to be asked: its middle, or where it came from, is outside of where the bounds meet.
+    fn side_by_position(&self, axis: Vec3) -> Option<bool> {
+        let along = self.toward_b.dot(axis);
+        let half_extent = self.half_extents.dot((self.larger_from_a * axis).abs());
+        (along.abs() > half_extent).then_some(along < 0.0)
+    }
+}
+
+/// Fills `axes`, unit vectors from `b` towards `a`; at least one. Empty normals on either side give
+/// the axis of the approach.
+pub(crate) fn aim(
+    policy: CameraPolicy,
+    sides: [ZoneNormals; 2],
+    approach: &Approach,
+    axes: &mut Vec<Vec3>,
+) {
+    axes.clear();
+    let single = match policy {
+        CameraPolicy::ContactZone => None,
+        CameraPolicy::Motion => Some(-approach.toward_b),
+        CameraPolicy::Covariance => top_eigenvector(&zone_covariance(&sides, &Some)),
+        CameraPolicy::SmallestExtent => {
+            Some([Vec3::X, Vec3::Y, Vec3::Z][approach.half_extents.min_position()])
+        }
+        CameraPolicy::LastNormal => approach.last_axis,
+    };
+    match single {
+        Some(axis) => {
+            let axis = axis.try_normalize().unwrap_or(Vec3::Z);
+            axes.push(oriented(axis, &sides, approach).0);
+        }
+        None => aim_at_zone(&sides, approach, axes),
+    }
+    if axes.is_empty() {
+        let fallback = approach.last_axis.unwrap_or(-approach.toward_b);
+        axes.push(fallback.try_normalize().unwrap_or(Vec3::Z));
+    }
+}
+
+fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec3>) {
+    let mut seen: [Vec3; MAX_VIEWS] = [Vec3::ZERO; MAX_VIEWS];
+    let mut views = 0;
+    while views < MAX_VIEWS {
+        let unseen = |n: &Vec3| seen[..views].iter().all(|v| v.dot(*n).abs() < WELL_SEEN);
+        let share = |s: &ZoneNormals, keep: &dyn Fn(&Vec3) -> bool| {
+            s.normals.iter().filter(|n| keep(n)).count() as f32 / s.normals.len().max(1) as f32
+        };
+        // What the earlier views see of a normal is not counted again.
+        let rest = |n: Vec3| seen[..views].iter().fold(n, |n, v| n - n.dot(*v) * *v);
+        let mut covariance = zone_covariance(sides, &|n| unseen(&n).then(|| rest(n)));
+        if views == 0 {
+            covariance += HINT_WEIGHT * outer(approach.toward_b.normalize_or_zero());
+        }
+        let Some(mut axis) = top_eigenvector(&covariance) else {
+            break;
+        };
+        if views > 0 {
+            let left = sides.each_ref().map(|side| share(side, &unseen));
+            let supports = |n: &Vec3| axis.dot(*n).abs() >= SUPPORTED;
+            let worthwhile = left[0].max(left[1]) >= LEAST_SHARE
+                && sides
+                    .iter()
+                    .all(|side| share(side, &supports) >= LEAST_SHARE);
+            if !worthwhile {
+                break;
+            }
+        } else if let Some(last) = approach.last_axis
+            && axis.dot(last).abs() >= AXIS_HYSTERESIS.cos()
+        {
+            axis = last;
+        }
+        let (axis, conclusive) = oriented(axis, sides, approach);
+        if views > 0 && !conclusive {
+            // A guess at the side would turn a gap into a penetration.
+            break;
+        }
+        seen[views] = axis;
+        axes.push(axis);
+        views += 1;
+    }
+}
+
+/// The axis or its opposite, such that it points from `b` towards `a`; and whether anything told.
+///
+/// The side that a body was on it keeps, whatever it looks like now: that is what holds it on a
+/// sheet without an inside. Next comes where it plainly lies; only what is deep in each other asks
+/// for the outside of the surfaces, which for thin ones may be the wrong one.
+fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3, bool) {
+    let by_memory = approach.last_axis.map_or(0.0, |last| axis.dot(last));
+    let by_normals = || {
+        let [a, b] = sides.each_ref().map(|side| mean_along(side, axis));
+        b - a
+    };
+    let conclusive = |sign: f32| (sign.abs() >= CONCLUSIVE).then_some(sign > 0.0);
+    let agrees = conclusive(by_memory)
+        .or_else(|| approach.side_by_position(axis))
+        .or_else(|| conclusive(by_normals()));
+    let by_position = -axis.dot(approach.toward_b.normalize_or_zero());
+    let agrees = agrees.or_else(|| conclusive(by_position));
+    if agrees.unwrap_or(by_position >= 0.0) {
+        (axis, agrees.is_some())
+    } else {
+        (-axis, agrees.is_some())
+    }
+}
+
+/// Mean of n·axis over the normals that face it or its opposite, if they tell the outside.
+fn mean_along(side: &ZoneNormals, axis: Vec3) -> f32 {
+    let facing = || {
+        let along = side.normals.iter().map(|n| n.dot(axis));
+        along.filter(|d| d.abs() >= SUPPORTED)
+    };
+    let count = facing().count() as f32;
+    if !side.oriented || count < LEAST_SHARE * side.normals.len() as f32 {
+        return 0.0;
+    }
+    facing().sum::<f32>() / count.max(1.0)
+}
+
+/// Whether `axis` looks at `a`, and at `b`, from behind: their outward normals say so.
+pub(crate) fn seen_from_behind(axis: Vec3, [a, b]: &[ZoneNormals; 2]) -> [bool; 2] {
+    [
+        mean_along(a, axis) >= CONCLUSIVE,
+        mean_along(b, axis) <= -CONCLUSIVE,
+    ]
+}
+
+/// Mean of n nᵀ over the normals of both sides, each as `map` makes it, if it keeps it.
+fn zone_covariance(sides: &[ZoneNormals; 2], map: &dyn Fn(Vec3) -> Option<Vec3>) -> Mat3 {
+    let [a, b] = sides.each_ref().map(|side| {
+        let kept = side.normals.iter().filter_map(|n| map(*n));
+        let sum = kept.fold(Mat3::ZERO, |m, n| m + outer(n));
+        sum * (1.0 / side.normals.len().max(1) as f32)
+    });
+    a + b
+}
+
+fn outer(n: Vec3) -> Mat3 {
+    Mat3::from_cols(n * n.x, n * n.y, n * n.z)
+}
+
+fn top_eigenvector(m: &Mat3) -> Option<Vec3> {
+    let trace = m.x_axis.x + m.y_axis.y + m.z_axis.z;
+    if trace.is_nan() || trace <= 0.0 {
+        return None;
+    }
+    // The largest eigenvalue of m is the least of trace − m.
+    let rest = DMat3::from_diagonal(DVec3::splat(f64::from(trace))) - m.as_dmat3();
+    least_variance_axis(rest).as_vec3().try_normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `b` lies towards `toward_b`, near or far.
+    fn lying(toward_b: Vec3) -> Approach {
+        Approach {
+            larger_from_a: Quat::IDENTITY,
+            half_extents: Vec3::ONE,
+            toward_b,
+            last_axis: None,
+        }
+    }
+
+    fn zone(normals: &[Vec3], oriented: bool) -> ZoneNormals<'_> {
+        ZoneNormals { normals, oriented }
+    }
+
+    fn axes_of(policy: CameraPolicy, sides: [ZoneNormals; 2], approach: &Approach) -> Vec<Vec3> {
+        let mut axes = vec![];
+        aim(policy, sides, approach, &mut axes);
+        axes
+    }
+
+    fn zone_axes(sides: [ZoneNormals; 2], approach: &Approach) -> Vec<Vec3> {
+        axes_of(CameraPolicy::ContactZone, sides, approach)
+    }
+
+    #[test]
+    fn facing_planes_give_one_axis_from_b_to_a() {
+        let (up, down) = (vec![Vec3::Y; 50], vec![-Vec3::Y; 30]);
+        let oriented = [zone(&up, true), zone(&down, true)];
+        // Deep in each other, the outside decides; elsewhere where `b` lies.
+        assert_eq!(zone_axes(oriented, &lying(-0.5 * Vec3::Y)), [-Vec3::Y]);
+        assert_eq!(zone_axes(oriented, &lying(-2.0 * Vec3::Y)), [Vec3::Y]);
+        let bare = [zone(&up, false), zone(&down, false)];
+        assert_eq!(zone_axes(bare, &lying(-0.5 * Vec3::Y)), [Vec3::Y]);
+    }
+
+    #[test]
+    fn a_corner_gives_two_axes_and_a_box_on_a_floor_one() {
+        let corner = [vec![Vec3::Y; 50], vec![Vec3::X; 30]].concat();
+        let edges = [vec![-Vec3::Y; 20], vec![-Vec3::X; 20]].concat();
+        let edges = zone(&edges, true);
+        let above = lying(0.5 * Vec3::Y);
+        assert_eq!(
+            zone_axes([zone(&corner, true), edges], &above),
+            [-Vec3::Y, -Vec3::X]
+        );
+        let floor = vec![Vec3::Y; 50];
+        assert_eq!(zone_axes([zone(&floor, true), edges], &above), [-Vec3::Y]);
+    }
+
+    /// A ball's normals around a flat contact are no second face.
+    #[test]
+    fn a_ball_on_a_floor_is_seen_once() {
+        let around = |k: u32| Vec3::new((k as f32).cos(), -0.75, (k as f32).sin()).normalize();
+        let (up, ball) = (vec![Vec3::Y; 50], (0..50).map(around).collect::<Vec<_>>());
+        let sides = [zone(&up, false), zone(&ball, true)];
+        assert_eq!(zone_axes(sides, &lying(2.0 * Vec3::Y)).len(), 1);
+    }
+
+    /// The axis stays the same within the hysteresis, and its side beyond it, even if `b` seems to
+    /// lie on the other one.
+    #[test]
+    fn the_last_axis_and_side_are_kept() {
+        let tilted = |angle: f32| vec![Vec3::new(angle.sin(), angle.cos(), 0.0); 10];
+        for toward_b in [Vec3::Y, -2.0 * Vec3::Y] {
+            let approach = Approach {
+                last_axis: Some(-Vec3::Y),
+                ..lying(toward_b)
+            };
+            for (angle, kept) in [(0.1, true), (0.3, false)] {
+                let normals = tilted(angle);
+                let side = zone(&normals, false);
+                let axes = zone_axes([side, side], &approach);
+                assert_eq!(axes[0] == -Vec3::Y, kept, "{angle}");
+                assert!(axes[0].y < 0.0);
+            }
+        }
+    }
+
+    /// What each policy looks along: flat surfaces tilted by 0.1, a motion along x, a last axis.
+    #[test]
+    fn policies() {
+        let tilt = Vec3::new(0.1f32.sin(), 0.1f32.cos(), 0.0);
+        let (up, down) = (vec![tilt; 10], vec![-tilt; 10]);
+        let sides = [zone(&up, true), zone(&down, true)];
+        let unit = Aabb {
+            min: -Vec3::ONE,
+            max: Vec3::ONE,
+        };
+        let above = Pose3::translation(0.3, 1.9, 0.0);
+        let last = Vec3::new(0.0, -0.6, 0.8);
+        let approach = |motion| Approach::new(&unit, &unit, &above, motion, Some(last));
+        let axis = |policy| axes_of(policy, sides, &approach(9.0 * Vec3::X))[0];
+        assert_eq!(axis(CameraPolicy::SmallestExtent), -Vec3::Y);
+        assert!(axis(CameraPolicy::Covariance).distance(-tilt) < 1e-5);
+        assert_eq!(axis(CameraPolicy::LastNormal), last);
+        let against = axis(CameraPolicy::Motion);
+        assert!(against.x.abs() > 0.98, "{against}");
+        let still = axes_of(CameraPolicy::Motion, sides, &approach(Vec3::ZERO))[0];
+        assert!(still.y < -0.95, "{still}");
+    }
+
+    /// A motion towards `a` puts `b` on the side that it came from, however deep it is.
+    #[test]
+    fn motion_tells_where_b_came_from() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        let sheet = Aabb {
+            min: Vec3::new(-9.0, 0.0, -9.0),
+            max: Vec3::new(9.0, 0.0, 9.0),
+        };
+        let body = Aabb {
+            min: -Vec3::ONE,
+            max: Vec3::ONE,
+        };
+        let half_through = Pose3::translation(0.0, -0.2, 0.0);
+        for (motion, axis) in [
+            (-Vec3::Y, -Vec3::Y),
+            (Vec3::Y, Vec3::Y),
+            (Vec3::ZERO, Vec3::Y),
+        ] {
+            let approach = Approach::new(&sheet, &body, &half_through, motion, None);
+            assert_eq!(zone_axes(sides, &approach), [axis], "{motion}");
+        }
+    }
+
+    #[test]
+    fn behind_is_where_outward_normals_point_away() {
+        let up = vec![Vec3::Y; 10];
+        let behind = |axis| seen_from_behind(axis, &[zone(&up, true), zone(&up, true)]);
+        assert_eq!(behind(-Vec3::Y), [false, true]);
+        assert_eq!(behind(Vec3::Y), [true, false]);
+        let bare = [zone(&up, false), zone(&up, false)];
+        assert_eq!(seen_from_behind(Vec3::Y, &bare), [false, false]);
+    }
+}
