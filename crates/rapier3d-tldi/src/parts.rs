@@ -139,15 +139,13 @@ pub(crate) fn append_part_pairs<'a>(
                 .map(|shape| shape.cloud().mean_radius())
                 .reduce(f32::max);
             let comparison = radius.map(|radius| {
-                let a = part1.compute_local_aabb().loosened(prediction);
-                let b = part2.compute_aabb(&a_from_b);
-                let middle = meeting_region(&a, &b).center();
+                let (middle, toward_b) = meeting(part1, part2, &a_from_b, prediction);
                 let Hint { motion, last_axis } = hint([i, j], pose1, middle);
                 let query = sides.len();
                 sides.push([ExactShape(part1), ExactShape(part2)]);
                 Comparison {
                     view: View::Aim {
-                        toward_b: toward_b(&a, &b, middle) - motion,
+                        toward_b: toward_b - motion,
                         last_axis,
                     },
                     params: config.params(radius, prediction),
@@ -193,20 +191,36 @@ pub(crate) fn surface<'s>(side: &'s ExactShape<'_>) -> Surface<'s> {
     }
 }
 
+/// Where the bounds of two parts meet, and an offset in metres that tells in which direction from
+/// there the second part lies: a small body on a large scan lies on the side of its own centre.
+/// Both in the frame of the first part.
+///
+/// The bounds are those in the frame of the larger part. In that of the other, a scan would fill
+/// the bounds of a turned body and tell nothing.
+fn meeting(
+    part1: &dyn Shape,
+    part2: &dyn Shape,
+    a_from_b: &Pose,
+    prediction: f32,
+) -> (Vector, Vector) {
+    let (a, b) = (part1.compute_local_aabb(), part2.compute_local_aabb());
+    if b.extents().length_squared() <= a.extents().length_squared() {
+        let b = part2.compute_aabb(a_from_b);
+        let middle = meeting_region(&a.loosened(prediction), &b).center();
+        (middle, b.center() - middle)
+    } else {
+        let a = part1.compute_aabb(&a_from_b.inverse());
+        let middle = meeting_region(&a, &b.loosened(prediction)).center();
+        (
+            *a_from_b * middle,
+            a_from_b.rotation * (middle - a.center()),
+        )
+    }
+}
+
 /// Where the bounds meet; if they do not quite, the region between them.
 fn meeting_region(a: &Aabb, b: &Aabb) -> Aabb {
     let low = a.mins.max(b.mins);
     let high = a.maxs.min(b.maxs);
     Aabb::new(low.min(high), low.max(high))
-}
-
-/// Direction, as an offset in metres, in which the second of two bounds lies as seen from where
-/// they meet: the smaller one's centre tells (a small body on a large scan lies on the side of its
-/// own centre).
-fn toward_b(a: &Aabb, b: &Aabb, middle: Vector) -> Vector {
-    if b.extents().length_squared() <= a.extents().length_squared() {
-        b.center() - middle
-    } else {
-        middle - a.center()
-    }
 }
