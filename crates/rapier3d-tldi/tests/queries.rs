@@ -450,6 +450,10 @@ fn surfaces_that_cross_nowhere() {
     // Inside of a solid of rapier's, which is one, and of a cloud, which is a surface.
     let room = Cuboid::new(Vector::ONE);
     assert_eq!(distance(&Pose::IDENTITY, &room, &body), 0.0);
+    let at_the_side = Pose::from_translation(Vector::X * 0.6);
+    let inside = checked_contact(&ours, &at_the_side, &room, &body, 0.0);
+    assert!((inside.dist + 0.7).abs() < 0.2 * R, "{inside:?}");
+    assert!(inside.normal1.distance(Vector::X) < 0.01, "{inside:?}");
     let bead = Ball::new(0.1);
     assert!((distance(&Pose::IDENTITY, &body, &bead) - 0.2).abs() < 0.05 * R);
     // Under the shell of a mesh without inside.
@@ -458,6 +462,25 @@ fn surfaces_that_cross_nowhere() {
     assert!((distance(&Pose::IDENTITY, &shell, &body) - 0.7).abs() < 0.05 * R);
     let through = Pose::from_translation(Vector::X * 0.71);
     assert_eq!(distance(&through, &shell, &body), 0.0);
+}
+
+/// Where the depth cannot be compared, as by the paper's variant with a shape of rapier's, the
+/// contact says where and which way, with depth 0.
+#[test]
+fn contacts_without_a_comparison() {
+    let mut rng = fastrand::Rng::with_seed(9);
+    let config = TldiConfig {
+        variant: Variant::Paper,
+        ..TldiConfig::default()
+    };
+    let pipeline = TldiPipeline::new(config).expect("valid settings");
+    let (ours, floor) = (pipeline.dispatcher(), shape(&plane(&mut rng), true));
+    let (ball, pose) = (Ball::new(BALL), Pose::from_translation(Vector::Y * 0.19));
+    let ahead = checked_contact(&ours, &pose, &floor, &ball, 0.0);
+    let back = checked_contact(&ours, &pose.inverse(), &ball, &floor, 0.0);
+    // The ball is 62 mm wide in the floor: up to 18° off at the rim.
+    assert!(ahead.dist == 0.0 && ahead.normal1.y > 0.94, "{ahead:?}");
+    assert!(back.dist == 0.0 && back.normal1.y < -0.94, "{back:?}");
 }
 
 /// Parts of compounds answer for themselves, those without a cloud through rapier.
