@@ -1,13 +1,15 @@
 //! Shared by the tests of all packages: sampled shapes, oracles, random poses, real data.
 
+mod accuracy;
 mod data;
 mod oracle;
 mod pairs;
 mod random;
 mod shapes;
 
+pub use accuracy::{ANGLE_BINS, ANGLE_STEP, AccuracyRow, ContactPair, Regime, measure_accuracy};
 pub use data::{data_file, load_cloud};
 pub use oracle::{OracleFragment, oracle_layers};
 pub use pairs::{aimed, compare, compare_clouds, deepest_point};
 pub use random::{random_pose, random_unit};
-pub use shapes::{Samples, sampled_box, sampled_plane, sampled_sphere};
+pub use shapes::{Samples, sampled_box, sampled_plane, sampled_ramp, sampled_sphere};

@@ -89,6 +89,49 @@ pub fn sampled_box(half: Vec3, spacing: f32, rng: &mut fastrand::Rng) -> Samples
     samples
 }
 
+/// A wedge: `size.x` along its foot, `size.y` high, `size.z` wide, with the slope up along +x; the
+/// middle of its bounds is the origin. Also the pose in it of a frame of which the plane y = 0 is
+/// the slope, +y its outward normal, and the origin its middle.
+pub fn sampled_ramp(size: Vec3, spacing: f32, rng: &mut fastrand::Rng) -> (Samples, Pose3) {
+    use std::f32::consts::{FRAC_PI_2, PI};
+    let mut samples = Samples::default();
+    let mut face =
+        |extents: Vec2, pose: Pose3, rng: &mut fastrand::Rng, keep: &dyn Fn(Vec3) -> bool| {
+            grid(extents, spacing, rng, |p| {
+                let point = pose * Vec3::new(p.x, 0.0, p.y);
+                if keep(point) {
+                    samples.push(point, pose.rotation * Vec3::Y);
+                }
+            });
+        };
+    let all = |_: Vec3| true;
+    let slope = Pose3::rotation(Vec3::Z * size.y.atan2(size.x));
+    let half = 0.5 * size;
+    face(Vec2::new(size.x.hypot(size.y), size.z), slope, rng, &all);
+    face(
+        Vec2::new(size.x, size.z),
+        Pose3::new(Vec3::NEG_Y * half.y, Vec3::X * PI),
+        rng,
+        &all,
+    );
+    face(
+        Vec2::new(size.y, size.z),
+        Pose3::new(Vec3::X * half.x, Vec3::NEG_Z * FRAC_PI_2),
+        rng,
+        &all,
+    );
+    for side in [1.0, -1.0] {
+        let under_slope = |p: Vec3| p.y * size.x <= p.x * size.y;
+        face(
+            Vec2::new(size.x, size.y),
+            Pose3::new(Vec3::Z * (side * half.z), Vec3::X * (side * FRAC_PI_2)),
+            rng,
+            &under_slope,
+        );
+    }
+    (samples, slope)
+}
+
 /// Calls `visit` for a jittered grid over a rectangle of `size` about the origin, rim included.
 fn grid(size: Vec2, spacing: f32, rng: &mut fastrand::Rng, mut visit: impl FnMut(Vec2)) {
     let cells = (size / spacing).ceil().max(Vec2::ONE);

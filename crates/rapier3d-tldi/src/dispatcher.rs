@@ -35,6 +35,42 @@ use tldi::PairResult;
 /// | distance, closest points | between the surfaces; 0 where they intersect | declined |
 /// | contact | the deepest point of a comparison where they intersect, else the nearest points | declined |
 /// | shape casts | declined | declined |
+///
+/// # Distances, nearest points and contacts
+/// The surface of a cloud is a disc a sample, as for rays ([`PointCloudShape`](crate::PointCloudShape));
+/// a cloud without normals has those of planes through 13 samples, and at an edge or a corner there
+/// is the bare sample. Of compounds the nearest parts count, and are named. Shapes intersect where
+/// discs cross each other or a surface, where a sample is inside a solid of rapier's, and where the
+/// nearest discs of two clouds with oriented normals lie behind each other. A body inside a cloud,
+/// surfaces apart, does not intersect it.
+///
+/// Accuracy, for samples of radius r (spacing r): where smooth surfaces with radii of curvature R₁
+/// and R₂ are nearest, a distance is within r²/2 · (1/R₁ + 1/R₂) of the true one, exact for planes;
+/// closer ones may count as touching. At the edges and corners of a box it is too large by what
+/// the outermost samples are short of them. Estimated normals add 0.03 r, the edges of rapier's own
+/// shapes 0.15 r. How deep shapes are that intersect is measured by a comparison, on the spot.
+///
+/// Cost: O(log n) for each sample that may be nearest. On curved surfaces these are few; of faces
+/// that lie flat on each other it is all, as in rapier's own answers for meshes. 3,000 samples
+/// against a shape of rapier's take 15–180 µs, against a cloud of 10,000 0.4–1.5 ms, flat on its
+/// face 3 ms (one core). The tree, and the normals of a cloud without, are built when first asked
+/// for.
+///
+/// ```
+/// use rapier3d::parry::query::QueryDispatcher;
+/// use rapier3d::prelude::*;
+/// use rapier3d_tldi::prelude::*;
+/// let points: Vec<Vector> = (0..400)
+///     .map(|i| Vector::new((i % 20) as f32, 0.0, (i / 20) as f32) * 0.1)
+///     .collect();
+/// let floor = PointCloudShape::new(PointCloud::builder(points).radius(0.1).build()?);
+/// let dispatcher = TldiPipeline::new(TldiConfig::default())?.dispatcher();
+/// // A ball of 0.2 m half a metre above the floor.
+/// let pose = Pose::from_translation(Vector::new(1.02, 0.7, 0.93));
+/// let answer = dispatcher.distance(&pose, &floor, &Ball::new(0.2)).expect("holds a cloud");
+/// assert!((answer.distance - 0.5).abs() < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone)]
 pub struct TldiDispatcher {
     shared: Arc<Shared>,

@@ -24,8 +24,9 @@ fn next_revision() -> u64 {
 
 /// A [`PointCloud`] as a collider's shape.
 ///
-/// Contacts and shape casts need the dispatcher of this crate; rapier's default one knows custom
-/// shapes only through rays and point projections. Clones share the points; replacing the points
+/// Contacts, distances and shape casts need the dispatcher of this crate
+/// ([`TldiDispatcher`](crate::TldiDispatcher)); rapier's default one knows custom shapes only through
+/// rays and point projections. Clones share the points; replacing the points
 /// of one clone leaves the others as they are.
 ///
 /// # The surface that rays and projections see
@@ -70,6 +71,7 @@ struct Content {
     unit_mass: OnceLock<MassProperties>,
     bvh: OnceLock<Bvh>,
     fitted_normals: OnceLock<Vec<Vec3>>,
+    least_radius: OnceLock<f32>,
 }
 
 impl Content {
@@ -81,6 +83,7 @@ impl Content {
             unit_mass: OnceLock::new(),
             bvh: OnceLock::new(),
             fitted_normals: OnceLock::new(),
+            least_radius: OnceLock::new(),
         }
     }
 }
@@ -145,6 +148,7 @@ impl PointCloudShape {
             content.cloud.set_points(points, normals)?;
             content.bvh.take();
             content.fitted_normals.take();
+            content.least_radius.take();
             content.revision = next_revision();
         } else {
             let mut cloud = self.cloud().clone();
@@ -176,6 +180,17 @@ impl PointCloudShape {
                 .collect();
             Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves)
         })
+    }
+
+    /// The smallest point radius, metres; computed once.
+    pub(crate) fn least_radius(&self) -> f32 {
+        *self
+            .content
+            .least_radius
+            .get_or_init(|| match self.cloud().radii() {
+                Radii::Global(radius) => *radius,
+                Radii::PerPoint(radii) => radii.iter().copied().fold(f32::MAX, f32::min),
+            })
     }
 
     /// The cloud's normals or, where it has none, those of planes through neighbours, which are not

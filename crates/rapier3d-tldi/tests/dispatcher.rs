@@ -193,3 +193,14 @@ fn surfaces_apart_do_not_intersect() {
         assert_eq!(answer.intersecting, expected, "at {height}");
     }
 }
+
+/// Distances of pairs without a cloud are rapier's own.
+#[test]
+fn queries_of_others_are_declined() {
+    let (ball, cuboid) = (Ball::new(0.5), Cuboid::new(Vector::ONE));
+    let ours = dispatcher();
+    let pose = Pose::from_translation(Vector::Y * 2.0);
+    assert!(ours.distance(&pose, &cuboid, &ball).is_err());
+    assert!(ours.contact(&pose, &cuboid, &ball, 0.1).is_err());
+    assert!(ours.closest_points(&pose, &cuboid, &ball, 2.0).is_err());
+}

@@ -90,11 +90,13 @@ impl Disc {
     }
 }
 
-/// The discs of a cloud, made as they are asked for.
+/// The discs of a cloud.
 pub(super) struct DiscSurface<'a> {
     pub(super) shape: &'a PointCloudShape,
     normals: &'a [Vec3],
-    discs: RefCell<HashMap<u32, Disc>>,
+    least_radius: f32,
+    /// Whether the surface is smooth around the samples that were asked for.
+    smooth: RefCell<HashMap<u32, bool>>,
 }
 
 impl<'a> DiscSurface<'a> {
@@ -102,42 +104,57 @@ impl<'a> DiscSurface<'a> {
         Self {
             shape,
             normals: shape.surface_normals(),
-            discs: RefCell::default(),
+            least_radius: shape.least_radius(),
+            smooth: RefCell::default(),
         }
     }
 
-    /// The tree over the samples; the box of a leaf holds the disc of its sample.
+    /// The tree over the samples.
     pub(super) fn bvh(&self) -> &'a Bvh {
         self.shape.bvh()
     }
 
-    pub(super) fn disc(&self, sample: u32) -> Disc {
-        *self
-            .discs
-            .borrow_mut()
-            .entry(sample)
-            .or_insert_with(|| self.make_disc(sample as usize))
+    /// Bounds of the samples of a node.
+    pub(super) fn sample_bounds(&self, node: &BvhNode) -> Aabb {
+        node.aabb().tightened(self.least_radius)
     }
 
-    fn make_disc(&self, sample: usize) -> Disc {
-        let cloud = self.shape.cloud();
-        let (center, normal) = (cloud.point(sample), self.normals[sample]);
-        let radius = cloud.radius(sample);
-        let distance = NEIGHBORHOOD * radius;
-        let around = Aabb::from_half_extents(center, Vec3::splat(distance));
+    /// The disc of a sample as if the surface were smooth there: nothing that
+    /// [`disc`](Self::disc) has is nearer to anything than what this has.
+    pub(super) fn full_disc(&self, sample: u32) -> Disc {
+        let (cloud, sample) = (self.shape.cloud(), sample as usize);
+        Disc {
+            center: cloud.point(sample),
+            normal: self.normals[sample],
+            reach: cloud.radius(sample),
+        }
+    }
+
+    /// What a sample stands for.
+    pub(super) fn disc(&self, sample: u32) -> Disc {
+        let full = self.full_disc(sample);
+        let is_smooth = *self
+            .smooth
+            .borrow_mut()
+            .entry(sample)
+            .or_insert_with(|| self.is_smooth(&full));
+        Disc {
+            reach: if is_smooth { full.reach } else { 0.0 },
+            ..full
+        }
+    }
+
+    fn is_smooth(&self, disc: &Disc) -> bool {
+        let distance = NEIGHBORHOOD * disc.reach;
+        let around = Aabb::from_half_extents(disc.center, Vec3::splat(distance));
         let stands_out = |neighbor: u32| {
-            let offset = cloud.point(neighbor as usize) - center;
+            let offset = self.shape.cloud().point(neighbor as usize) - disc.center;
             offset.length_squared() < distance * distance
-                && normal.dot(offset).abs() > LEAST_SMOOTH * radius
+                && disc.normal.dot(offset).abs() > LEAST_SMOOTH * disc.reach
         };
-        let is_smooth = !self
+        !self
             .bvh()
             .leaves(|node: &BvhNode| node.aabb().intersects(&around))
-            .any(stands_out);
-        Disc {
-            center,
-            normal,
-            reach: if is_smooth { radius } else { 0.0 },
-        }
+            .any(stands_out)
     }
 }

@@ -1,4 +1,10 @@
 //! Where a cloud is nearest to another surface: branch and bound over the cloud's tree.
+//!
+//! First the samples, without discs, that are nearest: their distance D is no less than that of the
+//! surfaces, d. Where smooth surfaces are nearest they face each other: the discs that meet there
+//! lie across the line between the nearest points, so that their samples are at most √(d² + l²)
+//! apart, with the sum of their radii for l. So only pairs of samples at most √(D² + l²) apart are
+//! looked at; which these are does not depend on the order of the search.
 
 use super::discs::{Disc, DiscSurface};
 use crate::ExactShape;
@@ -31,14 +37,61 @@ pub(super) struct Nearest {
     overlap: bool,
 }
 
-/// What a cloud may be near to. Points and discs are in the target's own frame.
-pub(super) trait Target {
-    /// A lower bound on the distance in metres from `point` to any disc or surface, which changes
-    /// by no more than the point is moved by; at most 0 inside.
-    fn bound(&self, point: Vec3) -> f32;
+/// A sample of the cloud that is searched, seen from the target.
+pub(super) struct Sample<'a> {
+    source: &'a DiscSurface<'a>,
+    target_from_source: &'a Pose3,
+    index: u32,
+}
 
-    /// Where the target is nearest to `disc`; may be `None` if that is `limit` metres or more.
-    fn nearest(&self, disc: &Disc, limit: f32) -> Option<Nearest>;
+impl Sample<'_> {
+    fn disc(&self) -> Disc {
+        self.source.disc(self.index).moved(self.target_from_source)
+    }
+
+    /// See [`DiscSurface::full_disc`].
+    fn full_disc(&self) -> Disc {
+        self.source
+            .full_disc(self.index)
+            .moved(self.target_from_source)
+    }
+}
+
+/// What a cloud may be near to. Points are in the target's own frame.
+pub(super) trait Target {
+    /// Distance in metres from `point` to the nearest sample, or to an exact surface; at most 0
+    /// inside of one.
+    fn distance(&self, point: Vec3) -> f32;
+
+    /// Greatest distance in metres of the surface from its nearest sample.
+    fn reach(&self) -> f32;
+
+    /// Whether [`Nearest::overlap`] is known, and not only from surfaces that cross.
+    fn tells_overlap(&self) -> bool;
+
+    /// Where the target is nearest to a sample's disc; may be `None` if that is `limit` metres or
+    /// more.
+    fn nearest(&self, sample: &Sample<'_>, candidates: Candidates, limit: f32) -> Option<Nearest>;
+}
+
+/// The pairs of samples that may be nearest.
+#[derive(Clone, Copy)]
+pub(super) struct Candidates {
+    /// Distance in metres of the samples that are nearest, or of a sample and an exact surface.
+    least: f32,
+}
+
+impl Candidates {
+    /// Least distance of the discs of two samples that are `distance` metres apart and whose radii
+    /// add up to `reach`; [`f32::MAX`] if they are too far apart to be candidates.
+    fn bound(self, distance: f32, reach: f32) -> f32 {
+        let facing_squared = distance * distance - reach * reach;
+        if distance > 0.0 && facing_squared > self.least * self.least {
+            f32::MAX
+        } else {
+            (distance - reach).max(0.0)
+        }
+    }
 }
 
 /// Where `source` is nearest to `target`, if that is less than `limit` metres.
@@ -48,29 +101,43 @@ pub(super) fn nearest(
     target: &impl Target,
     limit: f32,
 ) -> Option<Nearest> {
-    let cloud = source.shape.cloud();
-    let best = source.bvh().find_best(
-        limit,
-        |node: &BvhNode, _| {
-            let around = node.aabb();
-            let bound = target.bound(*target_from_source * around.center());
-            (bound - around.half_extents().length()).max(0.0)
+    let distance_to_node = |node: &BvhNode| {
+        let around = source.sample_bounds(node);
+        let center = *target_from_source * around.center();
+        target.distance(center) - around.half_extents().length()
+    };
+    let (_, least) = source.bvh().find_best(
+        f32::MAX,
+        |node: &BvhNode, _| distance_to_node(node),
+        |index, _| {
+            let center = source.shape.cloud().point(index as usize);
+            Some(target.distance(*target_from_source * center).max(0.0))
         },
-        |sample, limit| {
-            let center = *target_from_source * cloud.point(sample as usize);
-            if target.bound(center) - cloud.radius(sample as usize) >= limit {
-                return None;
-            }
-            let disc = source.disc(sample).moved(target_from_source);
-            target
-                .nearest(&disc, limit)
-                .map(|near| (near.distance, near))
+    )?;
+    let candidates = Candidates { least };
+    let reach = source.shape.cloud().max_radius() + target.reach();
+    // Surfaces that overlap may be farther from each other than surfaces apart should be.
+    if !target.tells_overlap() && candidates.bound(least, reach) >= limit {
+        return None;
+    }
+    let best = source.bvh().find_best(
+        f32::MAX,
+        |node: &BvhNode, _| candidates.bound(distance_to_node(node), reach),
+        |index, limit| {
+            let sample = Sample {
+                source,
+                target_from_source,
+                index,
+            };
+            let near = target.nearest(&sample, candidates, limit)?;
+            Some((near.distance, near))
         },
     );
     best.map(|(_, (_, near))| Nearest {
         distance: if near.overlap { 0.0 } else { near.distance },
         ..near
     })
+    .filter(|near| near.distance < limit)
 }
 
 /// Another cloud.
@@ -91,28 +158,46 @@ impl<'a> CloudTarget<'a> {
 }
 
 impl Target for CloudTarget<'_> {
-    fn bound(&self, point: Vec3) -> f32 {
+    fn distance(&self, point: Vec3) -> f32 {
         let cloud = self.discs.shape.cloud();
-        let nearest_ball = self.discs.bvh().find_best(
+        let nearest = self.discs.bvh().find_best(
             f32::MAX,
-            |node: &BvhNode, _| node.aabb().distance_to_local_point(point, true),
-            |sample, _| {
-                let sample = sample as usize;
-                Some((cloud.point(sample).distance(point) - cloud.radius(sample)).max(0.0))
+            |node: &BvhNode, _| {
+                let around = self.discs.sample_bounds(node);
+                around.distance_to_local_point(point, true)
             },
+            |sample, _| Some(cloud.point(sample as usize).distance(point)),
         );
-        nearest_ball.map_or(f32::MAX, |(_, distance)| distance)
+        nearest.map_or(f32::MAX, |(_, distance)| distance)
     }
 
-    fn nearest(&self, disc: &Disc, limit: f32) -> Option<Nearest> {
+    fn reach(&self) -> f32 {
+        self.discs.shape.cloud().max_radius()
+    }
+
+    fn tells_overlap(&self) -> bool {
+        self.are_oriented
+    }
+
+    fn nearest(&self, sample: &Sample<'_>, candidates: Candidates, limit: f32) -> Option<Nearest> {
+        let full = sample.full_disc();
+        let reach = full.reach + self.reach();
+        let distance = |[p, q]: [Vec3; 2]| p.distance(q);
         let best = self.discs.bvh().find_best(
             limit,
             |node: &BvhNode, _| {
-                let distance = node.aabb().distance_to_local_point(disc.center, true);
-                (distance - disc.reach).max(0.0)
+                let around = self.discs.sample_bounds(node);
+                candidates.bound(around.distance_to_local_point(full.center, true), reach)
             },
-            |sample, _| {
-                let other = self.discs.disc(sample);
+            |index, limit| {
+                let other = self.discs.full_disc(index);
+                let apart = full.center.distance(other.center);
+                if candidates.bound(apart, full.reach + other.reach) >= limit
+                    || distance(full.nearest_points(&other)) >= limit
+                {
+                    return None;
+                }
+                let (disc, other) = (sample.disc(), self.discs.disc(index));
                 let [on_source, on_target] = disc.nearest_points(&other);
                 let near = Nearest {
                     distance: on_source.distance(on_target),
@@ -156,27 +241,45 @@ impl<'a> ExactTarget<'a> {
 }
 
 impl Target for ExactTarget<'_> {
-    fn bound(&self, point: Vec3) -> f32 {
+    fn distance(&self, point: Vec3) -> f32 {
         self.project(point).0
     }
 
-    fn nearest(&self, disc: &Disc, _limit: f32) -> Option<Nearest> {
-        let mut at = disc.center;
+    fn reach(&self) -> f32 {
+        0.0
+    }
+
+    fn tells_overlap(&self) -> bool {
+        false
+    }
+
+    fn nearest(&self, sample: &Sample<'_>, candidates: Candidates, limit: f32) -> Option<Nearest> {
+        let full = sample.full_disc();
+        let mut at = full.center;
         let (mut distance, mut normal) = self.project(at);
+        if candidates.bound(distance, full.reach) >= limit {
+            return None;
+        }
+        let disc = sample.disc();
         for _ in 0..DESCENT_STEPS {
             let uphill = normal - normal.dot(disc.normal) * disc.normal;
             let sine = uphill.length();
             if distance <= 0.0 || sine < FLAT || disc.reach == 0.0 {
                 break;
             }
-            // To where the tangent plane of the surface is met, or to the rim.
-            let down = at - uphill * (distance / (sine * sine)) - disc.center;
-            let next = disc.center + down.clamp_length_max(disc.reach);
-            let (next_distance, next_normal) = self.project(next);
-            if next_distance >= distance {
+            // To where the tangent plane of the surface is met, or to the rim; a surface that bends
+            // away is nearest before that.
+            let to_plane = disc.nearest_to(at - uphill * (distance / (sine * sine)));
+            let to_foot = disc.nearest_to(at - distance * normal);
+            let lower = [to_plane, to_foot]
+                .map(|next| (next, self.project(next)))
+                .into_iter()
+                .min_by(|p, q| p.1.0.total_cmp(&q.1.0))
+                .filter(|(_, (next_distance, _))| *next_distance < distance);
+            let Some((next, projection)) = lower else {
                 break;
-            }
-            (at, distance, normal) = (next, next_distance, next_normal);
+            };
+            (at, (distance, normal)) = (next, projection);
         }
         if distance <= ROUNDING * disc.reach {
             distance = 0.0;

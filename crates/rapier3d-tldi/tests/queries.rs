@@ -1,0 +1,592 @@
+//! Distances, nearest points and contacts of clouds, and rapier's query pipeline, against analytic
+//! truth.
+
+mod common;
+
+use common::worlds::{TestResult, attached};
+use rapier3d::parry::query::{ClosestPoints, Contact, DefaultQueryDispatcher, QueryDispatcher};
+use rapier3d::parry::shape::Shape;
+use rapier3d::prelude::*;
+use rapier3d_tldi::TldiDispatcher;
+use rapier3d_tldi::prelude::*;
+
+/// Spacing and radius of all samples here, metres.
+const R: f32 = 0.02;
+
+/// Half the edges of the box, metres.
+const HALF: Vector = Vector::new(0.2, 0.1, 0.15);
+
+/// Radius of the sampled sphere, metres.
+const SPHERE: f32 = 0.3;
+
+/// Radius of rapier's ball, metres.
+const BALL: f32 = 0.2;
+
+fn dispatcher() -> TldiDispatcher {
+    TldiPipeline::new(TldiConfig::default())
+        .expect("valid settings")
+        .dispatcher()
+}
+
+fn unit(rng: &mut fastrand::Rng) -> Vector {
+    loop {
+        let v = Vector::from_array([(); 3].map(|()| 2.0 * rng.f32() - 1.0));
+        if (1e-3..=1.0).contains(&v.length_squared()) {
+            return v.normalize();
+        }
+    }
+}
+
+/// Points and outward normals.
+type Samples = (Vec<Vector>, Vec<Vector>);
+
+/// The sphere about the origin (Fibonacci lattice).
+fn sphere() -> Samples {
+    let count = (4.0 * std::f32::consts::PI * SPHERE * SPHERE / (R * R)) as usize;
+    let golden = std::f64::consts::PI * (3.0 - 5.0f64.sqrt());
+    let normal = |i: usize| {
+        let y = 1.0 - 2.0 * (i as f64 + 0.5) / count as f64;
+        let (s, c) = (golden * i as f64).sin_cos();
+        let r = (1.0 - y * y).sqrt();
+        Vector::new((r * c) as f32, y as f32, (r * s) as f32)
+    };
+    (0..count).map(|i| (SPHERE * normal(i), normal(i))).unzip()
+}
+
+/// A rectangle across `axis` at `height`, points moved by up to 0.3 of their spacing, but not
+/// beyond the rim.
+fn face(axis: usize, height: f32, half: Vector, rng: &mut fastrand::Rng) -> Samples {
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let cells = [u, v].map(|k| (2.0 * half[k] / R).ceil() as i32);
+    let mut normal = Vector::ZERO;
+    normal[axis] = if height < 0.0 { -1.0 } else { 1.0 };
+    let mut points = Vec::new();
+    for i in 0..=cells[0] {
+        for j in 0..=cells[1] {
+            let mut point = Vector::ZERO;
+            point[axis] = height;
+            for (k, step, cells) in [(u, i, cells[0]), (v, j, cells[1])] {
+                let at = step as f32 + 0.6 * (rng.f32() - 0.5);
+                point[k] = half[k] * (2.0 * at / cells as f32 - 1.0).clamp(-1.0, 1.0);
+            }
+            points.push(point);
+        }
+    }
+    let normals = vec![normal; points.len()];
+    (points, normals)
+}
+
+/// The box about the origin.
+fn cuboid(rng: &mut fastrand::Rng) -> Samples {
+    let mut all = Samples::default();
+    for axis in 0..3 {
+        for sign in [-1.0, 1.0] {
+            let (points, normals) = face(axis, sign * HALF[axis], HALF, rng);
+            all.0.extend(points);
+            all.1.extend(normals);
+        }
+    }
+    all
+}
+
+/// The plane y = 0 with normal +y and edges of 2 m.
+fn plane(rng: &mut fastrand::Rng) -> Samples {
+    face(1, 0.0, Vector::ONE, rng)
+}
+
+fn shape((points, normals): &Samples, with_normals: bool) -> PointCloudShape {
+    let builder = PointCloud::builder(points.clone()).radius(R);
+    let builder = if with_normals {
+        builder.normals(normals.clone())
+    } else {
+        builder
+    };
+    PointCloudShape::new(builder.build().expect("a valid cloud"))
+}
+
+/// Signed distance of a point to the box.
+fn from_box(point: Vector) -> f32 {
+    let beyond = point.abs() - HALF;
+    beyond.max(Vector::ZERO).length() + beyond.max_element().min(0.0)
+}
+
+/// Height of the lowest corner of a box.
+fn lowest_corner(pose: &Pose) -> f32 {
+    (0..8)
+        .map(|k| {
+            let sign = |bit: i32| if k & bit == 0 { 1.0 } else { -1.0 };
+            (*pose * (HALF * Vector::new(sign(1), sign(2), sign(4)))).y
+        })
+        .fold(f32::MAX, f32::min)
+}
+
+/// A pair of which the distance is known.
+struct Case<'a> {
+    name: &'static str,
+    shapes: [&'a dyn Shape; 2],
+    /// Signed distance of the second shape at a pose to the first.
+    distance: &'a dyn Fn(&Pose) -> f32,
+    /// Whether the second is above the first one's top; else anywhere around it.
+    is_above: bool,
+    /// Sum of the curvatures of both surfaces where they are nearest, 1/m: discs are off by half of
+    /// it × R².
+    curvature: f32,
+    /// Whether edges and corners of a sampled box meet something: the outermost sample may be 0.3
+    /// spacings off in two directions.
+    has_edges: bool,
+}
+
+impl Case<'_> {
+    /// Second shape at a random pose, `gap` from the first.
+    fn pose(&self, gap: f32, rng: &mut fastrand::Rng) -> Pose {
+        let rotation = Rotation::from_axis_angle(unit(rng), std::f32::consts::TAU * rng.f32());
+        let direction = if self.is_above { Vector::Y } else { unit(rng) };
+        // The distance grows along the direction from the middle of a convex shape.
+        let at = |t: f32| Pose::from_parts(t * direction, rotation);
+        let (mut low, mut high) = (0.0, 10.0);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if (self.distance)(&at(middle)) < gap {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        at(high)
+    }
+
+    /// Least and greatest error of a distance, metres.
+    fn tolerance(&self, with_normals: bool) -> [f32; 2] {
+        let sagitta = 0.5 * self.curvature * R * R;
+        // Planes through 13 samples are tilted where the surface bends, and at the box's faces
+        // where samples of the next face are among them.
+        let tilt = if with_normals { 0.0 } else { 0.03 * R };
+        let rounding = 1e-3 * R;
+        let sampling = if self.has_edges { 0.3 * R } else { 0.0 };
+        // Where an edge of rapier's cuboid is nearest, between samples, a centre stands for it.
+        let between = if self.name == "sphere, cuboid" {
+            0.15 * R
+        } else {
+            0.0
+        };
+        [
+            -(sagitta + tilt + rounding),
+            sagitta + tilt + rounding + sampling + between,
+        ]
+    }
+}
+
+/// Calls `visit` for all pairs of shapes, with and without normals.
+fn for_all_cases(mut visit: impl FnMut(&Case<'_>, bool)) {
+    let mut rng = fastrand::Rng::with_seed(1);
+    let samples = [sphere(), cuboid(&mut rng), plane(&mut rng)];
+    let (ball, solid) = (Ball::new(BALL), Cuboid::new(HALF));
+    let half_space = HalfSpace::new(Vector::Y);
+    for with_normals in [true, false] {
+        let [sphere, boxed, plane] = samples.each_ref().map(|s| shape(s, with_normals));
+        let case = |name, shapes, distance, is_above, curvature, has_edges| Case {
+            name,
+            shapes,
+            distance,
+            is_above,
+            curvature,
+            has_edges,
+        };
+        let (bent, flat) = (1.0 / SPHERE, 0.0);
+        for case in [
+            case(
+                "sphere, ball",
+                [&sphere, &ball],
+                &|p: &Pose| p.translation.length() - SPHERE - BALL,
+                false,
+                bent,
+                false,
+            ),
+            case(
+                "sphere, cuboid",
+                [&solid, &sphere],
+                &|p: &Pose| from_box(p.translation) - SPHERE,
+                false,
+                bent,
+                false,
+            ),
+            case(
+                "sphere, sphere",
+                [&sphere, &sphere],
+                &|p: &Pose| p.translation.length() - 2.0 * SPHERE,
+                false,
+                2.0 * bent,
+                false,
+            ),
+            case(
+                "sphere, plane",
+                [&plane, &sphere],
+                &|p: &Pose| p.translation.y - SPHERE,
+                true,
+                bent,
+                false,
+            ),
+            case(
+                "ball, plane",
+                [&plane, &ball],
+                &|p: &Pose| p.translation.y - BALL,
+                true,
+                flat,
+                false,
+            ),
+            case(
+                "box, half-space",
+                [&half_space, &boxed],
+                &lowest_corner,
+                true,
+                flat,
+                true,
+            ),
+            case(
+                "box, plane",
+                [&plane, &boxed],
+                &lowest_corner,
+                true,
+                flat,
+                true,
+            ),
+            case(
+                "box, ball",
+                [&boxed, &ball],
+                &|p: &Pose| from_box(p.translation) - BALL,
+                false,
+                flat,
+                true,
+            ),
+        ] {
+            visit(&case, with_normals);
+        }
+    }
+}
+
+/// Distances within the stated error, in either order, from a tenth of a radius to 40 radii.
+#[test]
+fn distances_of_surfaces_apart() {
+    let ours = dispatcher();
+    let mut rng = fastrand::Rng::with_seed(2);
+    for_all_cases(|case, with_normals| {
+        let name = case.name;
+        let [low, high] = case.tolerance(with_normals);
+        for scale in [0.1, 0.5, 2.0, 20.0] {
+            for _ in 0..25 {
+                let pose = case.pose(scale * R * (1.0 + rng.f32()), &mut rng);
+                let truth = (case.distance)(&pose);
+                let [shape1, shape2] = case.shapes;
+                let answers = [
+                    ours.distance(&pose, shape1, shape2),
+                    ours.distance(&pose.inverse(), shape2, shape1),
+                ];
+                for answer in answers {
+                    let distance = answer.expect("answered").distance;
+                    let error = distance - truth;
+                    assert!(
+                        low <= error && error <= high,
+                        "{name}, normals {with_normals}, {} r apart: off by {} r",
+                        truth / R,
+                        error / R
+                    );
+                }
+            }
+        }
+    });
+}
+
+/// The nearest points are as far apart as said and lie on both surfaces; beyond the limit there
+/// are none.
+#[test]
+fn closest_points_lie_on_both_surfaces() {
+    let ours = dispatcher();
+    let mut rng = fastrand::Rng::with_seed(3);
+    for_all_cases(|case, with_normals| {
+        let name = case.name;
+        let [low, high] = case.tolerance(with_normals);
+        for scale in [0.5, 10.0] {
+            let pose = case.pose(scale * R, &mut rng);
+            let [shape1, shape2] = case.shapes;
+            let closest = |limit| ours.closest_points(&pose, shape1, shape2, limit);
+            let distance = ours
+                .distance(&pose, shape1, shape2)
+                .expect("answered")
+                .distance;
+            let ClosestPoints::WithinMargin(point1, point2) =
+                closest(distance + 1e-6).expect("answered")
+            else {
+                panic!("{name}: nothing within the distance");
+            };
+            let apart = point1.distance(pose * point2);
+            assert!(
+                (apart - distance).abs() < 1e-5,
+                "{name}: {apart} {distance}"
+            );
+            assert_eq!(
+                closest(0.99 * distance),
+                Ok(ClosestPoints::Disjoint),
+                "{name}"
+            );
+            // Each point is as far from the other surface as the shapes are.
+            let bead = Ball::new(1e-5);
+            let chain = ours.clone().chain(DefaultQueryDispatcher);
+            for (bead_in_other, other) in [
+                (pose.inverse() * Pose::from_translation(point1), shape2),
+                (pose * Pose::from_translation(point2), shape1),
+            ] {
+                let from_other = chain.distance(&bead_in_other, other, &bead);
+                let off = from_other.expect("answered").distance - distance;
+                assert!(
+                    low - high <= off && off <= high - low,
+                    "{name}: {} r off",
+                    off / R
+                );
+            }
+        }
+    });
+}
+
+/// Surfaces that cross intersect: their distance is 0, and contacts tell how deep.
+#[test]
+fn contacts_of_surfaces_that_cross() {
+    let ours = dispatcher();
+    let mut rng = fastrand::Rng::with_seed(4);
+    for_all_cases(|case, with_normals| {
+        let name = case.name;
+        if case.has_edges {
+            return; // Of a corner in a face, depth is not distance.
+        }
+        for depth in [0.5 * R, 2.0 * R] {
+            for _ in 0..10 {
+                let pose = case.pose(-depth, &mut rng);
+                let [shape1, shape2] = case.shapes;
+                let what = format!("{name}, normals {with_normals}, {} r deep", depth / R);
+                let distance = ours.distance(&pose, shape1, shape2).expect("answered");
+                assert_eq!(distance.distance, 0.0, "{what}");
+                let closest = ours.closest_points(&pose, shape1, shape2, 0.0);
+                assert_eq!(closest, Ok(ClosestPoints::Intersecting), "{what}");
+                let ahead = checked_contact(&ours, &pose, shape1, shape2, 0.0);
+                let back = checked_contact(&ours, &pose.inverse(), shape2, shape1, 0.0);
+                if name == "sphere, cuboid" {
+                    continue; // The same at the cuboid's edges and corners.
+                }
+                for contact in [ahead, back] {
+                    // What the comparison is good for on curved surfaces.
+                    assert!(
+                        (contact.dist + depth).abs() < 0.25 * R,
+                        "{what}: {contact:?}"
+                    );
+                }
+                let turned = pose.rotation * back.normal1;
+                assert!(
+                    ahead.normal1.dot(turned) < -0.99,
+                    "{what}: {ahead:?} {back:?}"
+                );
+            }
+        }
+    });
+}
+
+/// A contact whose frames agree with each other.
+fn checked_contact(
+    ours: &TldiDispatcher,
+    pose: &Pose,
+    shape1: &dyn Shape,
+    shape2: &dyn Shape,
+    prediction: f32,
+) -> Contact {
+    let contact = ours
+        .contact(pose, shape1, shape2, prediction)
+        .expect("answered")
+        .expect("within the prediction");
+    let normal2 = pose.rotation * contact.normal2;
+    assert!(contact.normal1.distance(-normal2) < 1e-5, "{contact:?}");
+    let along = (*pose * contact.point2 - contact.point1).dot(contact.normal1);
+    assert!((along - contact.dist).abs() < 1e-5, "{contact:?}");
+    contact
+}
+
+/// Contacts of surfaces apart are their nearest points, up to the prediction.
+#[test]
+fn contacts_of_surfaces_apart() {
+    let mut rng = fastrand::Rng::with_seed(5);
+    let ours = dispatcher();
+    let floor = shape(&plane(&mut rng), true);
+    let ball = Ball::new(BALL);
+    let pose = Pose::from_translation(Vector::new(0.1, BALL + 0.05, 0.2));
+    let contact = checked_contact(&ours, &pose, &floor, &ball, 0.06);
+    assert!((contact.dist - 0.05).abs() < 1e-5, "{contact:?}");
+    // The distance is flat around its least: 0.1 r aside it is 5 µm more.
+    assert!(contact.normal1.distance(Vector::Y) < 0.02, "{contact:?}");
+    assert!(
+        contact.point1.distance(Vector::new(0.1, 0.0, 0.2)) < 0.2 * R,
+        "{contact:?}"
+    );
+    assert_eq!(ours.contact(&pose, &floor, &ball, 0.04), Ok(None));
+}
+
+/// Which side of a surface a body is on decides where surfaces cross nowhere.
+#[test]
+fn surfaces_that_cross_nowhere() {
+    let mut rng = fastrand::Rng::with_seed(6);
+    let ours = dispatcher();
+    let floor = shape(&plane(&mut rng), true);
+    let distance = |pose: &Pose, shape1: &dyn Shape, shape2: &dyn Shape| {
+        ours.distance(pose, shape1, shape2)
+            .expect("answered")
+            .distance
+    };
+    // An upturned sheet above the floor and one that has sunk through it.
+    let upturned = |height| Pose::new(Vector::Y * height, Vector::X * std::f32::consts::PI);
+    assert!((distance(&upturned(0.1), &floor, &floor) - 0.1).abs() < 1e-5);
+    assert_eq!(distance(&upturned(-0.1), &floor, &floor), 0.0);
+    let sunk = checked_contact(&ours, &upturned(-2.0 * R), &floor, &floor, 0.0);
+    assert!((sunk.dist + 2.0 * R).abs() < 0.02 * R, "{sunk:?}");
+    // A body under an open scan.
+    let body = shape(&sphere(), true);
+    let below = Pose::from_translation(Vector::Y * -0.5);
+    assert!((distance(&below, &floor, &body) - 0.2).abs() < 0.05 * R);
+    // Inside of a solid of rapier's, which is one, and of a cloud, which is a surface.
+    let room = Cuboid::new(Vector::ONE);
+    assert_eq!(distance(&Pose::IDENTITY, &room, &body), 0.0);
+    let at_the_side = Pose::from_translation(Vector::X * 0.6);
+    let inside = checked_contact(&ours, &at_the_side, &room, &body, 0.0);
+    assert!((inside.dist + 0.7).abs() < 0.2 * R, "{inside:?}");
+    assert!(inside.normal1.distance(Vector::X) < 0.01, "{inside:?}");
+    let bead = Ball::new(0.1);
+    assert!((distance(&Pose::IDENTITY, &body, &bead) - 0.2).abs() < 0.05 * R);
+    // Under the shell of a mesh without inside.
+    let (vertices, triangles) = room.to_trimesh();
+    let shell = TriMesh::new(vertices, triangles).expect("a valid mesh");
+    assert!((distance(&Pose::IDENTITY, &shell, &body) - 0.7).abs() < 0.05 * R);
+    let through = Pose::from_translation(Vector::X * 0.71);
+    assert_eq!(distance(&through, &shell, &body), 0.0);
+}
+
+/// Where the depth cannot be compared, as by the paper's variant with a shape of rapier's, the
+/// contact says where and which way, with depth 0.
+#[test]
+fn contacts_without_a_comparison() {
+    let mut rng = fastrand::Rng::with_seed(9);
+    let config = TldiConfig {
+        variant: Variant::Paper,
+        ..TldiConfig::default()
+    };
+    let pipeline = TldiPipeline::new(config).expect("valid settings");
+    let (ours, floor) = (pipeline.dispatcher(), shape(&plane(&mut rng), true));
+    let (ball, pose) = (Ball::new(BALL), Pose::from_translation(Vector::Y * 0.19));
+    let ahead = checked_contact(&ours, &pose, &floor, &ball, 0.0);
+    let back = checked_contact(&ours, &pose.inverse(), &ball, &floor, 0.0);
+    // The ball is 62 mm wide in the floor: up to 18° off at the rim.
+    assert!(ahead.dist == 0.0 && ahead.normal1.y > 0.94, "{ahead:?}");
+    assert!(back.dist == 0.0 && back.normal1.y < -0.94, "{back:?}");
+}
+
+/// Parts of compounds answer for themselves, those without a cloud through rapier.
+#[test]
+fn parts_of_compounds() {
+    let mut rng = fastrand::Rng::with_seed(7);
+    let ours = dispatcher();
+    let floor = shape(&plane(&mut rng), true);
+    let body = |height: f32| {
+        Compound::new(vec![
+            (
+                Pose::from_translation(Vector::new(0.4, 0.0, 0.0)),
+                SharedShape::ball(0.1),
+            ),
+            (
+                Pose::new(Vector::new(-0.4, height, 0.0), Vector::new(0.3, 0.2, 0.1)),
+                SharedShape::new(shape(&sphere(), true)),
+            ),
+        ])
+    };
+    for (height, part, expected) in [(0.3, 0, 0.4), (0.0, 1, 0.2), (-0.25, 1, 0.0)] {
+        let (compound, pose) = (body(height), Pose::from_translation(Vector::Y * 0.5));
+        let ahead = ours.distance(&pose, &floor, &compound).expect("answered");
+        let back = ours
+            .distance(&pose.inverse(), &compound, &floor)
+            .expect("answered");
+        assert!((ahead.distance - expected).abs() < 0.05 * R, "{ahead:?}");
+        assert!((back.distance - ahead.distance).abs() < 1e-4, "{back:?}");
+        assert_eq!((ahead.subshape1, ahead.subshape2), (0, part));
+        assert_eq!((back.subshape1, back.subshape2), (part, 0));
+        let contact = checked_contact(&ours, &pose, &floor, &compound, 0.5);
+        let deep = if height < 0.0 { -0.05 } else { expected };
+        assert!((contact.dist - deep).abs() < 0.2 * R, "{contact:?}");
+        assert_eq!((contact.subshape1, contact.subshape2), (0, part));
+        assert!(contact.normal1.y > 0.999, "{contact:?}");
+    }
+    // Two compounds whose nearest parts are no clouds.
+    let pose = Pose::from_translation(Vector::Y * 0.7);
+    let (below, above) = (body(-2.0), body(2.0));
+    let answer = ours.distance(&pose, &below, &above).expect("answered");
+    assert!((answer.distance - 0.5).abs() < 1e-4, "{answer:?}");
+    let pose = Pose::from_translation(Vector::Y * 0.15);
+    let contact = checked_contact(&ours, &pose, &below, &above, 0.0);
+    assert!((contact.dist + 0.05).abs() < 1e-4, "{contact:?}");
+    assert_eq!((contact.subshape1, contact.subshape2), (0, 0));
+}
+
+/// Rapier's scene queries on a world with a cloud for a floor.
+#[test]
+fn query_pipeline() -> TestResult {
+    let mut rng = fastrand::Rng::with_seed(8);
+    let (mut world, mut tldi) = attached();
+    let floor_cloud = shape(&plane(&mut rng), true);
+    let (_, floor) = world.insert(RigidBodyBuilder::fixed(), cloud_collider(floor_cloud));
+    let at = Vector::new(0.5, 0.5, 0.0);
+    let cuboid = ColliderBuilder::cuboid(0.1, 0.1, 0.1).translation(at);
+    let (_, cuboid) = world.insert(RigidBodyBuilder::fixed(), cuboid);
+    tldi.step(&mut world)?;
+    let pipeline = world.broad_phase.as_query_pipeline(
+        world.narrow_phase.query_dispatcher(),
+        &world.bodies,
+        &world.colliders,
+        QueryFilter::default(),
+    );
+
+    let down = |x: f32| Ray::new(Vector::new(x, 2.0, 0.03), -Vector::Y);
+    let (hit, distance) = pipeline
+        .cast_ray(&down(0.1), 10.0, true)
+        .expect("the floor");
+    assert_eq!(hit, floor);
+    assert!((distance - 2.0).abs() < 1e-5);
+    let (hit, distance) = pipeline
+        .cast_ray(&down(0.5), 10.0, true)
+        .expect("the cuboid");
+    assert_eq!(hit, cuboid);
+    assert!((distance - 1.4).abs() < 1e-5);
+    let slanted = Ray::new(Vector::new(-0.5, 1.0, 0.0), Vector::new(0.3, -1.0, 0.2));
+    let (hit, answer) = pipeline
+        .cast_ray_and_get_normal(&slanted, 10.0, true)
+        .expect("the floor");
+    assert_eq!((hit, answer.normal), (floor, Vector::Y));
+    assert!((answer.time_of_impact - 1.0).abs() < 1e-5);
+
+    let point = Vector::new(-0.3, 0.07, 0.2);
+    let (hit, projection) = pipeline.project_point(point, 1.0, true).expect("the floor");
+    assert_eq!(hit, floor);
+    assert!(!projection.is_inside);
+    assert!(projection.point.distance(point.with_y(0.0)) < 1e-5);
+
+    // Shapes without and with a cloud, of which some are in the floor and some in the cuboid.
+    let ball = Ball::new(0.1);
+    let body = shape(&sphere(), true);
+    for (query, radius) in [(&ball as &dyn Shape, 0.1), (&body, SPHERE)] {
+        for (x, height, expected) in [
+            (-0.5, radius + 0.01, vec![]),
+            (-0.5, radius - 0.01, vec![floor]),
+            (0.5, 0.6 + radius - 0.01, vec![cuboid]),
+            (0.5, 0.6 + radius + 0.01, vec![]),
+        ] {
+            let pose = Pose::from_translation(Vector::new(x, height, 0.0));
+            let hits: Vec<_> = pipeline
+                .intersect_shape(pose, query)
+                .map(|(handle, _)| handle)
+                .collect();
+            assert_eq!(hits, expected, "radius {radius} at {x}, {height}");
+        }
+    }
+    Ok(())
+}
