@@ -22,6 +22,10 @@ use glamx::{Pose3, Vec3};
 /// that cross between neighbouring pixels are at most two merge gaps apart in both.
 const REACH: f32 = 2.0;
 
+/// Depth in pixels to which a body that has sunk into a sheet is looked for. Points that are culled
+/// in vain cost little; the deeper ones of two large clouds would be many.
+const SUNK: f32 = 16.0;
+
 /// Everything one pair needs while it is compared.
 #[derive(Default)]
 pub(super) struct Scratch {
@@ -121,16 +125,22 @@ impl Scratch {
         result.gap = found.gap;
     }
 
-    /// Fills both sides' culled points; returns the overlap of the bounds in the frame of `a`, or
-    /// `None` where a cloud has no point in it.
+    /// Fills both sides' culled points; returns bounds of them in the frame of `a`, or `None` where a
+    /// cloud has none.
     fn cull(&mut self, query: &PairQuery) -> Option<Aabb> {
         let (bounds_a, bounds_b) = (query.a.bounds(), query.b.bounds());
         let ring = |surface| ring(surface, &query.params);
         let margin = query.params.prediction + ring(&query.a).max(ring(&query.b));
-        let overlap = bounds_a
+        // What has sunk into a sheet is out of its bounds.
+        let [sunk_a, sunk_b] = sunk(query).map(|depth| margin + depth);
+        let b_in_a = bounds_b.transformed(&query.a_from_b);
+        let overlap_a = bounds_a
             .loosened(margin)
-            .intersection(bounds_b.transformed(&query.a_from_b).loosened(margin));
-        if overlap.is_empty() {
+            .intersection(b_in_a.loosened(sunk_a));
+        let overlap_b = bounds_a
+            .loosened(sunk_b)
+            .intersection(b_in_a.loosened(margin));
+        if overlap_a.intersection(overlap_b).is_empty() {
             return None;
         }
         let b_from_a = query.a_from_b.inverse();
@@ -139,9 +149,9 @@ impl Scratch {
             || {
                 if let Surface::Cloud(cloud) = query.a {
                     let region = Region {
-                        overlap,
+                        overlap: overlap_a,
                         other_from_frame: b_from_a,
-                        other_bounds: bounds_b.loosened(margin),
+                        other_bounds: bounds_b.loosened(sunk_a),
                     };
                     let stride = cull::stride(cloud, query.params.pixel_size);
                     let frame = Pose3::IDENTITY;
@@ -153,9 +163,9 @@ impl Scratch {
             || {
                 if let Surface::Cloud(cloud) = query.b {
                     let region = Region {
-                        overlap,
+                        overlap: overlap_b,
                         other_from_frame: Pose3::IDENTITY,
-                        other_bounds: bounds_a.loosened(margin),
+                        other_bounds: bounds_a.loosened(sunk_b),
                     };
                     let stride = cull::stride(cloud, query.params.pixel_size);
                     let frame = query.a_from_b;
@@ -171,7 +181,7 @@ impl Scratch {
         if lacks(&self.a, &query.a) || lacks(&self.b, &query.b) {
             return None;
         }
-        Some(overlap)
+        Some(overlap_a.merged(overlap_b))
     }
 
     /// Finds the near points of both sides and their normals; `false` where nothing is near.
@@ -320,6 +330,25 @@ impl Scratch {
             || side_b.image(b, &imaging, Some(touching)),
         );
         Some(seen_b.rect)
+    }
+}
+
+/// How deep each surface may have sunk out of the other's bounds and is still looked for, metres:
+/// the smaller one up to its middle, but no deeper than [`SUNK`] and what it moved.
+fn sunk(query: &PairQuery) -> [f32; 2] {
+    let motion = match query.view {
+        View::Aim { motion, .. } => motion.length(),
+        View::Fixed(_) => 0.0,
+    };
+    let [extents_a, extents_b] = [query.a, query.b].map(|surface| surface.bounds().extents());
+    let depth = |extents: Vec3| {
+        let to_middle = 0.5 * extents.min_element();
+        to_middle.min(SUNK * query.params.pixel_size + motion)
+    };
+    if extents_b.length_squared() <= extents_a.length_squared() {
+        [0.0, depth(extents_b)]
+    } else {
+        [depth(extents_a), 0.0]
     }
 }
 
