@@ -54,6 +54,18 @@ pub enum TldiError {
         /// What is wrong with the points.
         source: CloudError,
     },
+    /// A deforming cloud was given another number of points than it has.
+    #[error(
+        "collider {collider:?} has {expected} points and was given {found}: a surface that deforms keeps its points; use `set_points` for new ones"
+    )]
+    OtherPoints {
+        /// The collider.
+        collider: ColliderHandle,
+        /// Points of the cloud.
+        expected: usize,
+        /// Points given.
+        found: usize,
+    },
     /// The collider does not exist (any more).
     #[error("collider {0:?} does not exist: was it removed?")]
     NoSuchCollider(ColliderHandle),

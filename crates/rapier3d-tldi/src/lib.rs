@@ -69,6 +69,7 @@ mod queries;
 mod report;
 mod shape;
 mod shape_casts;
+mod surface_motion;
 
 pub use collider::cloud_collider;
 pub use config::TldiConfig;
@@ -79,4 +80,5 @@ pub use mass::{MassModel, unit_mass_properties};
 pub use pipeline::TldiPipeline;
 pub use report::{Contact, StepReport};
 pub use shape::PointCloudShape;
+pub use surface_motion::TldiHooks;
 pub use tldi::{self, CameraPolicy, CloudError, NonFinite, PointCloud, RayHit, RaySurface};

@@ -6,6 +6,7 @@ use crate::exact::ExactShape;
 use crate::parts::{PartPair, append_queries};
 use crate::prepared::{Batch, PROBE_ANSWER, Shared};
 use crate::report::{cloud_pairs, contacts_of};
+use crate::surface_motion::{SurfaceMotions, TldiHooks};
 use crate::{
     Contact, PointCloudShape, StepReport, TldiConfig, TldiDispatcher, TldiError, cloud_collider,
 };
@@ -13,7 +14,7 @@ use rapier3d::dynamics::{IntegrationParameters, RigidBodySet};
 use rapier3d::geometry::{ColliderBuilder, ColliderHandle, ColliderSet, NarrowPhase};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher};
-use rapier3d::pipeline::{EventHandler, PhysicsHooks, PhysicsWorld};
+use rapier3d::pipeline::{ActiveHooks, EventHandler, PhysicsHooks, PhysicsWorld};
 use std::sync::Arc;
 use std::time::Instant;
 use tldi::{Backend, BackendError, CpuBackend, PairQuery, PointCloud};
@@ -33,6 +34,7 @@ pub struct TldiPipeline {
     search: CandidateSearch,
     memory: PairMemory,
     changed: Vec<ColliderHandle>,
+    motions: SurfaceMotions,
     sides: Vec<[ExactShape<'static>; 2]>,
     queries: Vec<PairQuery<'static>>,
     prepare_seconds: f64,
@@ -60,6 +62,7 @@ impl TldiPipeline {
             search: CandidateSearch::default(),
             memory: PairMemory::default(),
             changed: Vec::new(),
+            motions: SurfaceMotions::default(),
             sides: Vec::new(),
             queries: Vec::new(),
             prepare_seconds: 0.0,
@@ -94,8 +97,9 @@ impl TldiPipeline {
     /// [`PointCloud::set_points`] for the radii. The mass of a body whose collider has a density is
     /// computed anew.
     ///
-    /// Called in every step, it keeps what touches the collider awake for ever: where the points
-    /// rest, call it only when they did change. Bodies that share the points keep the old ones.
+    /// Called with other points in every step, it keeps what touches the collider awake for ever;
+    /// with the points that the cloud has it does nothing. Bodies that share the points keep the
+    /// old ones.
     ///
     /// # Errors
     /// [`TldiError::NoSuchCollider`], [`TldiError::NotACloud`], and [`TldiError::Cloud`] where the
@@ -124,8 +128,12 @@ impl TldiPipeline {
         let current = colliders
             .get(collider)
             .ok_or(TldiError::NoSuchCollider(collider))?;
-        if current.shape().as_shape::<PointCloudShape>().is_none() {
+        let Some(shape) = current.shape().as_shape::<PointCloudShape>() else {
             return Err(TldiError::NotACloud(collider));
+        };
+        self.motions.forget(collider);
+        if shape.cloud().consists_of(points, normals) {
+            return Ok(());
         }
         // The batch of a step that was not finished shares the shape: without it the change is
         // made in place.
@@ -141,6 +149,106 @@ impl TldiPipeline {
             self.changed.push(collider);
         }
         Ok(())
+    }
+
+    /// [`set_points`](Self::set_points) for a surface that deforms: the same points, where they are
+    /// a step later. In the step to come they are taken to go on with the velocity that brought
+    /// them there, which reaches the contacts: what stands on a floor that slides or rises is
+    /// carried along.
+    ///
+    /// Sets [`ActiveHooks::MODIFY_SOLVER_CONTACTS`] on the collider; the hooks of
+    /// [`step_with_events`](Self::step_with_events) see its contacts then, too. Cost beside that of
+    /// `set_points`: for each contact, a pass over the points in the blocks around it.
+    ///
+    /// # Errors
+    /// Those of `set_points`, and [`TldiError::OtherPoints`] if there are not as many points as the
+    /// cloud has.
+    ///
+    /// ```
+    /// use rapier3d::prelude::*;
+    /// use rapier3d_tldi::prelude::*;
+    /// let mut world = PhysicsWorld::default();
+    /// let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// tldi.attach(&mut world);
+    /// let mut points: Vec<Vector> = (0..441)
+    ///     .map(|i| Vector::new((i % 21) as f32, 0.0, (i / 21) as f32) * 0.05)
+    ///     .collect();
+    /// let belt = PointCloud::builder(&points).radius(0.05).build()?.into_owned();
+    /// let (_, belt) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(belt));
+    /// let start = Vector::new(0.2, 0.1, 0.5);
+    /// let parcel = RigidBodyBuilder::dynamic().translation(start);
+    /// let (parcel, _) = world.insert(parcel, ColliderBuilder::cuboid(0.1, 0.1, 0.1));
+    /// for _ in 0..30 {
+    ///     for point in &mut points {
+    ///         point.x += 0.6 * world.integration_parameters.dt; // 0.6 m/s
+    ///     }
+    ///     tldi.deform(&mut world, belt, &points, None)?;
+    ///     tldi.step(&mut world)?;
+    /// }
+    /// assert!(world.bodies[parcel].linvel().x > 0.5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn deform(
+        &mut self,
+        world: &mut PhysicsWorld,
+        collider: ColliderHandle,
+        points: &[Vector],
+        normals: Option<&[Vector]>,
+    ) -> Result<(), TldiError> {
+        let dt = world.integration_parameters.dt;
+        self.deform_collider(&mut world.colliders, collider, points, normals, dt)
+    }
+
+    /// [`deform`](Self::deform) for split sets, for a step of `dt` seconds. Give the step
+    /// [`hooks`](Self::hooks).
+    ///
+    /// # Errors
+    /// Those of [`deform`](Self::deform).
+    pub fn deform_collider(
+        &mut self,
+        colliders: &mut ColliderSet,
+        collider: ColliderHandle,
+        points: &[Vector],
+        normals: Option<&[Vector]>,
+        dt: f32,
+    ) -> Result<(), TldiError> {
+        let cloud_of = |colliders: &ColliderSet| {
+            let shape = colliders.get(collider)?.shape();
+            shape.as_shape::<PointCloudShape>().cloned()
+        };
+        let before = cloud_of(colliders).map(|shape| self.motions.before(shape.cloud()));
+        if let Some(before) = before
+            .as_ref()
+            .filter(|before| before.len() != points.len())
+        {
+            return Err(TldiError::OtherPoints {
+                collider,
+                expected: before.len(),
+                found: points.len(),
+            });
+        }
+        self.set_collider_points(colliders, collider, points, normals)?;
+        let (Some(before), Some(after)) = (before, cloud_of(colliders)) else {
+            return Ok(()); // refused above
+        };
+        // Without a time there is no velocity, and dropped points leave none to compare with.
+        if dt > 0.0 && after.cloud().len() == before.len() {
+            self.motions.record(collider, before, after.cloud(), dt);
+            if let Some(collider) = colliders.get_mut(collider) {
+                let hooks = collider.active_hooks() | ActiveHooks::MODIFY_SOLVER_CONTACTS;
+                collider.set_active_hooks(hooks);
+            }
+        }
+        Ok(())
+    }
+
+    /// `inner` and what tells rapier the velocities of [deforming](Self::deform) clouds: the hooks
+    /// for a step with split sets.
+    pub fn hooks<'a>(&'a self, inner: &'a dyn PhysicsHooks) -> TldiHooks<'a> {
+        TldiHooks {
+            motions: &self.motions,
+            inner,
+        }
     }
 
     /// Compares the pairs that rapier is going to ask about in its next step, in one batch.
@@ -162,6 +270,7 @@ impl TldiPipeline {
         let start = Instant::now();
         let shared = Arc::clone(&self.shared);
         shared.take_spot_counts();
+        self.motions.prepare(integration);
         // Taken out and put back: no lock is held during the comparison.
         let mut batch = std::mem::take(&mut *shared.batch_mut());
         batch.clear();
@@ -227,6 +336,7 @@ impl TldiPipeline {
             self.memory.update(self.search.candidates(), &batch);
             batch.clear();
         }
+        self.motions.clear();
         if let Some((count, first)) = self.shared.take_failures() {
             return Err(TldiError::OnTheSpot { count, first });
         }
@@ -270,7 +380,7 @@ impl TldiPipeline {
             &world.bodies,
             &world.colliders,
         )?;
-        world.step_with_events(hooks, events);
+        world.step_with_events(&self.hooks(hooks), events);
         self.finish(&world.narrow_phase, &world.colliders)
     }
 

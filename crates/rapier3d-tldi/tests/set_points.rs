@@ -79,3 +79,120 @@ fn shared_points_are_replaced_for_one() -> TestResult {
     assert_eq!(count(second), Some(square(0.4).len()));
     Ok(())
 }
+
+/// The points that a cloud has already wake nobody.
+#[test]
+fn the_same_points_leave_sleepers_asleep() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let floor = insert_floor(&mut world, 0.8);
+    let (body, _) = world.insert(dynamic_at(HALF), tldi.collider(cloud(&cube(HALF))));
+    settle(&mut world, &mut tldi)?;
+    for _ in 0..3 {
+        tldi.set_points(&mut world, floor, &square(0.8), None)?;
+        let report = tldi.step(&mut world)?;
+        assert_eq!(report.pairs_batched, 0);
+        assert!(world.bodies[body].is_sleeping());
+    }
+    Ok(())
+}
+
+/// Moves a floor at `velocity` m/s for a second under a cube and returns the cube's position and
+/// velocity relative to the floor; as a deforming surface, or as new points.
+fn carried(velocity: Vector, floor_first: bool, deforms: bool) -> Result<[Vector; 2], TldiError> {
+    let (mut world, mut tldi) = attached();
+    let cube = tldi.collider(cloud(&cube(HALF)));
+    let (floor, body) = if floor_first {
+        let floor = insert_floor(&mut world, 1.6);
+        (floor, world.insert(dynamic_at(HALF), cube).0)
+    } else {
+        let body = world.insert(dynamic_at(HALF), cube).0;
+        (insert_floor(&mut world, 1.6), body)
+    };
+    let dt = world.integration_parameters.dt;
+    let mut moved = Vector::ZERO;
+    for step in 0..90 {
+        if step >= 30 {
+            moved += velocity * dt;
+            let points: Vec<Vector> = square(1.6).into_iter().map(|p| p + moved).collect();
+            if deforms {
+                tldi.deform(&mut world, floor, &points, None)?;
+            } else {
+                tldi.set_points(&mut world, floor, &points, None)?;
+            }
+        }
+        tldi.step(&mut world)?;
+        if velocity.y > 0.4 && step % 5 == 0 {
+            let b = &world.bodies[body];
+            eprintln!(
+                "STEP {step} {:?} {:?} {:?}",
+                b.translation() - moved,
+                b.linvel(),
+                b.angvel()
+            );
+            for c in tldi.contacts(&world.narrow_phase, &world.colliders) {
+                eprintln!("   {:?} {:?} {}", c.point - moved, c.normal, c.depth);
+            }
+        }
+    }
+    // In its last step the surface went on from the last points.
+    moved += velocity * dt;
+    let body = &world.bodies[body];
+    let start = Vector::Y * HALF;
+    Ok([body.translation() - start - moved, body.linvel() - velocity])
+}
+
+/// A floor that slides and rises carries what stands on it, in either order of the colliders.
+#[test]
+fn deforming_floors_carry_what_stands_on_them() -> TestResult {
+    for floor_first in [true, false] {
+        for (velocity, lag) in [
+            // Friction of 0.5 brings the cube to the speed within 0.1 s and 25 mm.
+            (Vector::X * 0.5, 0.04),
+            (Vector::Y * 0.5, 0.02),
+            (Vector::new(0.3, 0.3, -0.2), 0.04),
+            (Vector::Y * -0.5, 0.02),
+        ] {
+            let [behind, slower] = carried(velocity, floor_first, true)?;
+            let case = format!("{velocity}, floor first {floor_first}: {behind} m, {slower} m/s");
+            // Where new corners bear the cube in every step it rocks a little, and creeps.
+            assert!(behind.length() < lag, "{case}");
+            assert!(slower.with_y(0.0).length() < 0.1, "{case}");
+        }
+    }
+    // New points have no velocity: they slide away under the cube.
+    let [behind, _] = carried(Vector::X * 0.5, true, false)?;
+    assert!(behind.x < -0.4, "{behind}");
+    Ok(())
+}
+
+/// A surface comes to rest when it is not moved any more, and other points are no motion.
+#[test]
+fn motion_lasts_for_a_step() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let floor = insert_floor(&mut world, 0.8);
+    let (body, _) = world.insert(dynamic_at(HALF), tldi.collider(cloud(&cube(HALF))));
+    let slid: Vec<Vector> = square(0.8)
+        .into_iter()
+        .map(|p| p + Vector::X * 0.01)
+        .collect();
+    tldi.deform(&mut world, floor, &slid, None)?;
+    for _ in 0..60 {
+        tldi.step(&mut world)?;
+    }
+    assert!(world.bodies[body].linvel().length() < 0.01);
+    let fewer = &slid[1..];
+    assert_eq!(
+        tldi.deform(&mut world, floor, fewer, None),
+        Err(TldiError::OtherPoints {
+            collider: floor,
+            expected: slid.len(),
+            found: fewer.len()
+        })
+    );
+    // New points, as many as before, after a motion in the same step.
+    tldi.deform(&mut world, floor, &square(0.8), None)?;
+    tldi.set_points(&mut world, floor, &slid, None)?;
+    tldi.step(&mut world)?;
+    assert!(world.bodies[body].linvel().length() < 0.01);
+    Ok(())
+}

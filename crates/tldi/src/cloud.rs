@@ -162,6 +162,32 @@ impl<'a> PointCloud<'a> {
         self.order.as_deref()
     }
 
+    /// Whether [`set_points`](Self::set_points) with these points and normals would leave the cloud
+    /// as it is. `false` also where that is not sure: points were dropped, or normals made unit
+    /// vectors. Cost: one pass, up to the first difference.
+    ///
+    /// ```
+    /// use tldi::{PointCloud, glamx::Vec3};
+    /// let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.5).build()?;
+    /// assert!(cloud.consists_of(&[Vec3::ZERO, Vec3::X], None));
+    /// assert!(!cloud.consists_of(&[Vec3::X, Vec3::ZERO], None));
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    pub fn consists_of(&self, points: &[Vec3], normals: Option<&[Vec3]>) -> bool {
+        let given = |i: usize| self.order.as_ref().map_or(i, |order| order[i] as usize);
+        let same_normals = match (self.normals(), normals) {
+            (None, None) => true,
+            (Some(own), Some(new)) => {
+                new.len() == own.len() && (0..own.len()).all(|i| own[i] == new[given(i)])
+            }
+            _ => false,
+        };
+        points.len() == self.len()
+            && self.dropped == 0
+            && (0..self.len()).all(|i| self.point(i) == points[given(i)])
+            && same_normals
+    }
+
     /// Replaces all points, as a deforming or streaming cloud does in every frame.
     ///
     /// - A global radius is kept. So are radii and colours for each point, if as many points as the
