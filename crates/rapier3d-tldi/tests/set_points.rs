@@ -121,18 +121,6 @@ fn carried(velocity: Vector, floor_first: bool, deforms: bool) -> Result<[Vector
             }
         }
         tldi.step(&mut world)?;
-        if velocity.y > 0.4 && step % 5 == 0 {
-            let b = &world.bodies[body];
-            eprintln!(
-                "STEP {step} {:?} {:?} {:?}",
-                b.translation() - moved,
-                b.linvel(),
-                b.angvel()
-            );
-            for c in tldi.contacts(&world.narrow_phase, &world.colliders) {
-                eprintln!("   {:?} {:?} {}", c.point - moved, c.normal, c.depth);
-            }
-        }
     }
     // In its last step the surface went on from the last points.
     moved += velocity * dt;
@@ -154,9 +142,10 @@ fn deforming_floors_carry_what_stands_on_them() -> TestResult {
         ] {
             let [behind, slower] = carried(velocity, floor_first, true)?;
             let case = format!("{velocity}, floor first {floor_first}: {behind} m, {slower} m/s");
-            // Where new corners bear the cube in every step it rocks a little, and creeps.
+            // Where new corners bear the cube in every step it rocks a little; on a floor that sinks
+            // it falls in small hops, since rapier ends every step without relative velocity.
             assert!(behind.length() < lag, "{case}");
-            assert!(slower.with_y(0.0).length() < 0.1, "{case}");
+            assert!(slower.with_y(0.0).length() < 0.2, "{case}");
         }
     }
     // New points have no velocity: they slide away under the cube.
