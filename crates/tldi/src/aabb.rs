@@ -42,6 +42,26 @@ impl Aabb {
         }
     }
 
+    /// The box, grown to where `body` ends that passes through it: on each axis on which `body`
+    /// stands out on both sides, on the side on which it stands out less.
+    ///
+    /// ```
+    /// use tldi::{Aabb, glamx::Vec3};
+    /// let floor = Aabb { min: Vec3::new(-9.0, 0.0, -9.0), max: Vec3::new(9.0, 0.0, 9.0) };
+    /// let body = Aabb { min: Vec3::new(8.0, -0.2, 0.0), max: Vec3::new(10.0, 1.0, 1.0) };
+    /// let grown = floor.reached_through(body);
+    /// assert_eq!((grown.min.y, grown.max), (-0.2, floor.max));
+    /// ```
+    pub fn reached_through(self, body: Self) -> Self {
+        let (below, above) = (self.min - body.min, body.max - self.max);
+        let through = below.cmpgt(Vec3::ZERO) & above.cmpgt(Vec3::ZERO);
+        let down = below.cmple(above);
+        Self {
+            min: Vec3::select(through & down, body.min, self.min),
+            max: Vec3::select(through & !down, body.max, self.max),
+        }
+    }
+
     /// What both boxes hold; may be empty.
     pub fn intersection(self, other: Self) -> Self {
         Self {

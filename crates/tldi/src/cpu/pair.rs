@@ -128,7 +128,7 @@ impl Scratch {
     /// Fills both sides' culled points; returns bounds of them in the frame of `a`, or `None` where a
     /// cloud has none.
     fn cull(&mut self, query: &PairQuery) -> Option<Aabb> {
-        let (bounds_a, bounds_b) = (query.a.bounds(), query.b.bounds());
+        let [bounds_a, bounds_b] = bounds_with_inside(query);
         let ring = |surface| ring(surface, &query.params);
         let margin = query.params.prediction + ring(&query.a).max(ring(&query.b));
         // What has sunk into a sheet is out of its bounds.
@@ -370,6 +370,19 @@ pub(super) fn ring(surface: &Surface, params: &Params) -> f32 {
             (2.0 + normals::SUPPORT * stride.sqrt()) * cloud.mean_radius()
         }
         surface => 2.0 * surface.mean_radius(),
+    }
+}
+
+/// Bounds of both surfaces, each in its own frame; those of the larger one with what of a body that
+/// passes through it is behind: the bounds of a floor hold its surface only, and a body that has
+/// sunk deeper than the margins would lose what is below.
+fn bounds_with_inside(query: &PairQuery) -> [Aabb; 2] {
+    let (a, b) = (query.a.bounds(), query.b.bounds());
+    if a.extents().length() >= b.extents().length() {
+        [a.reached_through(b.transformed(&query.a_from_b)), b]
+    } else {
+        let a_in_b = a.transformed(&query.a_from_b.inverse());
+        [a, b.reached_through(a_in_b)]
     }
 }
 
