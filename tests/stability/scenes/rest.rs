@@ -11,7 +11,7 @@ use tldi::glamx::{Vec2, Vec3};
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "rest",
-    about: "A box, a ball and a bunny of 0.3 m on a plane, points 1 cm apart (r̄ = 1 cm), whose \
+    about: "A box, a ball and a bunny of 0.3 m on a plane, points 2 cm apart (r̄ = 2 cm, the bunny's 0.5 cm), whose \
             samples stay or are drawn anew in every frame (σ = 0.25 r̄ along the normal).",
     rule: "Samples that stay: asleep within 2 s; from then on, over 10 s, drift ≤ 0.1 r̄ and turn \
            ≤ 0.1°, and the box within 0.1° of upright. New samples: RMS speed over the last 5 of \
@@ -20,7 +20,9 @@ pub(crate) const SCENE: Scene = Scene {
 };
 
 /// Distance of points, and their radius, metres.
-const SPACING: f32 = 0.01;
+const SPACING: f32 = 0.02;
+/// The same of the bunny.
+const BUNNY_SPACING: f32 = 0.005;
 /// Half the size of box and ball, metres.
 const HALF: f32 = 0.15;
 /// How high above the surface bodies start, metres.
@@ -51,7 +53,7 @@ impl Body {
         match self {
             Self::Box => Surface::cuboid(Vec3::splat(HALF), SPACING, rng),
             Self::Ball => Surface::ball(HALF, SPACING),
-            Self::Bunny => model::bunny(2.0 * HALF, 0.5 * SPACING),
+            Self::Bunny => model::bunny(2.0 * HALF, BUNNY_SPACING),
         }
     }
 
