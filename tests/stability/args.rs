@@ -38,6 +38,9 @@ pub(crate) struct Args {
     /// Drops of `tunnelling` over all surfaces [default: 240, or 10,000 with --long]
     #[arg(long, value_name = "N")]
     drops: Option<usize>,
+    /// Only this one of each row's drops, as a failure names it (use with --case and --trace)
+    #[arg(long, value_name = "INDEX")]
+    only_drop: Option<usize>,
     /// Write the rows to this file as JSON, and beside it a .run.json that says when and where
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
@@ -87,6 +90,7 @@ impl Args {
                 .collect(),
             long: self.long,
             drops: self.drops.unwrap_or(default_drops),
+            only_drop: self.only_drop,
         }
     }
 

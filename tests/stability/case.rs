@@ -36,6 +36,8 @@ pub(crate) struct Scale {
     pub(crate) long: bool,
     /// Drops of `tunnelling`, over all surfaces.
     pub(crate) drops: usize,
+    /// Only this one of each row's drops.
+    pub(crate) only_drop: Option<usize>,
 }
 
 impl Scale {

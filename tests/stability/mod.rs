@@ -11,6 +11,7 @@ mod model;
 mod report;
 mod row;
 mod runner;
+mod scan_spots;
 mod scenes;
 mod surface;
 
