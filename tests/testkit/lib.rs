@@ -6,6 +6,7 @@ mod oracle;
 mod pairs;
 mod random;
 mod shapes;
+mod sheets;
 
 pub use accuracy::{ANGLE_BINS, ANGLE_STEP, AccuracyRow, ContactPair, Regime, measure_accuracy};
 pub use data::{data_file, load_cloud};
@@ -13,3 +14,4 @@ pub use oracle::{OracleFragment, oracle_layers};
 pub use pairs::{aimed, compare, compare_clouds, deepest_point};
 pub use random::{random_pose, random_unit};
 pub use shapes::{Samples, sampled_box, sampled_plane, sampled_ramp, sampled_sphere};
+pub use sheets::{Sheet, standard_normal};

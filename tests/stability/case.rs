@@ -1,0 +1,168 @@
+//! Scenes, their cases, and what a case finds.
+
+use super::method::Method;
+use rapier3d_tldi::TldiConfig;
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// How a case is to be run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Setup {
+    /// Who detects the collisions.
+    pub(crate) method: Method,
+    /// Settings of the clouds' pipeline.
+    pub(crate) config: TldiConfig,
+    /// Whether every step is written to stderr.
+    pub(crate) trace: bool,
+}
+
+impl Setup {
+    /// The same run with rapier's primitives, untraced.
+    pub(crate) fn of_primitive(&self) -> Self {
+        Self {
+            method: Method::Primitive,
+            trace: false,
+            ..*self
+        }
+    }
+}
+
+/// How much to run.
+#[derive(Clone, Debug)]
+pub(crate) struct Scale {
+    /// Seeds of all random cases.
+    pub(crate) seeds: Vec<u64>,
+    /// Whether the long version is wanted.
+    pub(crate) long: bool,
+    /// Drops of `tunnelling`, over all surfaces.
+    pub(crate) drops: usize,
+    /// Only this one of each row's drops.
+    pub(crate) only_drop: Option<usize>,
+}
+
+impl Scale {
+    /// One of two values, by the length of the run.
+    pub(crate) fn pick<T>(&self, short: T, long: T) -> T {
+        if self.long { long } else { short }
+    }
+}
+
+/// A family of cases with one rule.
+pub(crate) struct Scene {
+    /// Name on the command line and in rows.
+    pub(crate) name: &'static str,
+    /// What is shown, in one sentence.
+    pub(crate) about: &'static str,
+    /// What passes, in one sentence.
+    pub(crate) rule: &'static str,
+    /// Its cases.
+    pub(crate) cases: fn(&Scale) -> Vec<Case>,
+}
+
+type Run = dyn Fn(&Setup, &mut Verdict) -> Result<(), Stop> + Send + Sync;
+
+/// One situation, for every method the same.
+pub(crate) struct Case {
+    /// Name of the scene.
+    pub(crate) scene: &'static str,
+    /// Name within the scene.
+    pub(crate) name: String,
+    /// Seed of everything random in it.
+    pub(crate) seed: u64,
+    run: Box<Run>,
+}
+
+impl Case {
+    /// A case that `run` carries out.
+    pub(crate) fn new(
+        scene: &'static str,
+        name: impl Into<String>,
+        seed: u64,
+        run: impl Fn(&Setup, &mut Verdict) -> Result<(), Stop> + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            scene,
+            name: name.into(),
+            seed,
+            run: Box::new(run),
+        }
+    }
+
+    /// Runs it with one method.
+    pub(crate) fn run(&self, setup: &Setup) -> Result<Verdict, Stop> {
+        let mut verdict = Verdict::default();
+        (self.run)(setup, &mut verdict)?;
+        Ok(verdict)
+    }
+}
+
+/// Why a case came to no verdict.
+#[derive(Clone, Debug, Error)]
+pub(crate) enum Stop {
+    /// The method cannot represent the scene: not applicable, not a failure.
+    #[error("{0}")]
+    Unfit(&'static str),
+    /// The method gave an error: a failure.
+    #[error("{0}")]
+    Failed(String),
+}
+
+/// What was measured, and which of the rules it breaks.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Verdict {
+    /// Measured values; units are in the names.
+    pub(crate) metrics: BTreeMap<String, f64>,
+    /// Broken rules, each with its number.
+    pub(crate) failures: Vec<String>,
+}
+
+impl Verdict {
+    /// Notes a value that nothing is asked of.
+    pub(crate) fn note(&mut self, name: &str, value: impl Into<f64>) -> f64 {
+        let value = value.into();
+        if value.is_finite() {
+            self.metrics.insert(name.to_owned(), rounded(value));
+        } else {
+            self.failures.push(format!("{name} is {value}"));
+        }
+        value
+    }
+
+    /// Notes a value that must be `limit` at most.
+    pub(crate) fn at_most(&mut self, name: &str, value: impl Into<f64>, limit: f64) {
+        let value = self.note(name, value);
+        if value > limit {
+            self.failures.push(format!("{name} {value:.4} > {limit}"));
+        }
+    }
+
+    /// Notes a value that must be `limit` at least.
+    pub(crate) fn at_least(&mut self, name: &str, value: impl Into<f64>, limit: f64) {
+        let value = self.note(name, value);
+        if value < limit {
+            self.failures.push(format!("{name} {value:.4} < {limit}"));
+        }
+    }
+
+    /// Notes a value that must not be farther than `tolerance` from `expected`.
+    pub(crate) fn near(&mut self, name: &str, value: impl Into<f64>, expected: f64, tolerance: f64) {
+        let value = self.note(name, value);
+        if (value - expected).abs() > tolerance {
+            self.failures.push(format!(
+                "{name} {value:.4} is not {expected:.4} ± {tolerance:.2e}"
+            ));
+        }
+    }
+
+    /// Something that must hold.
+    pub(crate) fn require(&mut self, holds: bool, otherwise: impl FnOnce() -> String) {
+        if !holds {
+            self.failures.push(otherwise());
+        }
+    }
+}
+
+/// Six significant digits, which is more than any measurement here tells.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}

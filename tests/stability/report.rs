@@ -1,0 +1,197 @@
+//! Rows as files and as a table.
+
+use super::args::Args;
+use super::chart;
+use super::host::RunInfo;
+use super::method::Method;
+use super::row::Row;
+use super::runner::Timings;
+use super::scenes::SCENES;
+use anyhow::{Context, bail};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// What stands before and after the table in a document that contains it.
+const BEGIN: &str = "<!-- results: begin (written by the stability suite) -->";
+const END: &str = "<!-- results: end -->";
+
+/// How many cases of a scene a method passed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Tally {
+    /// Rows that passed.
+    pub(crate) passed: usize,
+    /// Rows that passed or failed; the rest are not applicable.
+    pub(crate) applicable: usize,
+    /// Rows.
+    pub(crate) rows: usize,
+}
+
+/// All results of a run.
+pub(crate) struct Report {
+    run: RunInfo,
+    rows: Vec<Row>,
+    timings: Timings,
+}
+
+impl Report {
+    /// A report of these rows.
+    pub(crate) fn new(run: RunInfo, rows: Vec<Row>, timings: Timings) -> Self {
+        Self { run, rows, timings }
+    }
+
+    /// When and where the run was made.
+    pub(crate) fn run(&self) -> &RunInfo {
+        &self.run
+    }
+
+    /// Methods that have rows, in the order of tables.
+    pub(crate) fn methods(&self) -> Vec<Method> {
+        let has_rows = |m: &Method| self.rows.iter().any(|row| row.method == m.name());
+        Method::ALL.into_iter().filter(has_rows).collect()
+    }
+
+    /// Names of the scenes that have rows.
+    pub(crate) fn scenes(&self) -> Vec<&'static str> {
+        let has_rows = |name: &&str| self.rows.iter().any(|row| row.scene == *name);
+        SCENES.iter().map(|scene| scene.name).filter(has_rows).collect()
+    }
+
+    /// How a method did in a scene.
+    pub(crate) fn tally(&self, scene: &str, method: Method) -> Tally {
+        let mut tally = Tally::default();
+        for row in &self.rows {
+            if row.scene == scene && row.method == method.name() {
+                tally.rows += 1;
+                tally.applicable += usize::from(row.passed.is_some());
+                tally.passed += usize::from(row.passed == Some(true));
+            }
+        }
+        tally
+    }
+
+    /// Failures of ours that are not declared.
+    pub(crate) fn undeclared_failures(&self) -> Vec<&Row> {
+        (self.rows.iter()).filter(|row| row.is_undeclared_failure()).collect()
+    }
+
+    /// One line that says when, where and of what.
+    pub(crate) fn provenance(&self) -> String {
+        let run = &self.run;
+        let seeds: Vec<String> = run.seeds.iter().map(u64::to_string).collect();
+        format!(
+            "{}, commit {}, {} cores of {}, seeds {}, {} version, {} drops",
+            run.date,
+            run.commit,
+            run.cores,
+            run.cpu,
+            seeds.join(" "),
+            if run.long { "long" } else { "short" },
+            run.drops,
+        )
+    }
+
+    /// The table of passes, and every failure with its numbers.
+    pub(crate) fn markdown(&self) -> String {
+        let methods = self.methods();
+        let mut text = format!("{}.\n\n| scene |", self.provenance());
+        for method in &methods {
+            let _infallible = write!(text, " {method} |");
+        }
+        text.push_str(" seconds of one core |\n|---|");
+        text.push_str(&"---|".repeat(methods.len() + 1));
+        text.push('\n');
+        for scene in self.scenes() {
+            let _infallible = write!(text, "| {scene} |");
+            for method in &methods {
+                let cell = match self.tally(scene, *method) {
+                    tally if tally.applicable == 0 => "n/a".into(),
+                    tally => format!("{} of {}", tally.passed, tally.applicable),
+                };
+                let _infallible = write!(text, " {cell} |");
+            }
+            let seconds: Vec<String> = (methods.iter())
+                .map(|m| format!("{:.1}", self.timings.get(&(scene, *m)).unwrap_or(&0.0)))
+                .collect();
+            let _infallible = writeln!(text, " {} |", seconds.join(" / "));
+        }
+        for method in methods {
+            self.list(&mut text, method, "fails", Some(false));
+        }
+        for method in self.methods() {
+            self.list(&mut text, method, "is not applicable to", None);
+        }
+        text
+    }
+
+    /// The rows of a method with this outcome; equal reasons of several seeds are one line.
+    fn list(&self, text: &mut String, method: Method, title: &str, passed: Option<bool>) {
+        let rows: Vec<&Row> = self
+            .rows
+            .iter()
+            .filter(|row| row.method == method.name() && row.passed == passed)
+            .collect();
+        if rows.is_empty() {
+            return;
+        }
+        let _infallible = write!(text, "\n`{method}` {title}:\n\n");
+        for group in rows.chunk_by(|a, b| {
+            passed.is_none() && (a.scene, &a.reason) == (b.scene, &b.reason)
+        }) {
+            let row = group[0];
+            let reason = row.reason.as_deref().unwrap_or_default();
+            let cases = match (passed, group.len()) {
+                (None, count) => format!("{count} cases, as {}", row.case),
+                (Some(_), _) => format!("{}, seed {}", row.case, row.seed),
+            };
+            let _infallible = write!(text, "- {}: {cases}: {reason}", row.scene);
+            if let Some(cause) = row.known_cause {
+                let _infallible = write!(text, " **Known:** {cause}");
+            }
+            text.push('\n');
+        }
+    }
+
+    /// Writes what the command line asks for.
+    pub(crate) fn write_files(&self, args: &Args) -> anyhow::Result<()> {
+        if let Some(file) = &args.json {
+            self.write_json(file)?;
+        }
+        if let Some(folder) = &args.out {
+            self.write_json(&folder.join("stability.json"))?;
+            write(&folder.join("stability.md"), &self.markdown())?;
+            chart::draw(self, folder)?;
+        }
+        if let Some(file) = &args.docs {
+            self.fill_in(file)?;
+        }
+        Ok(())
+    }
+
+    /// Rows into the file, and the run's circumstances into a `.run.json` beside it: equal seeds
+    /// then give equal files of rows.
+    fn write_json(&self, file: &Path) -> anyhow::Result<()> {
+        write(file, &(serde_json::to_string_pretty(&self.rows)? + "\n"))?;
+        let run = serde_json::to_string_pretty(&self.run)? + "\n";
+        write(&file.with_extension("run.json"), &run)
+    }
+
+    fn fill_in(&self, file: &Path) -> anyhow::Result<()> {
+        let text = std::fs::read_to_string(file)
+            .with_context(|| format!("cannot read {}", file.display()))?;
+        let (Some((before, _)), Some((_, after))) = (text.split_once(BEGIN), text.split_once(END))
+        else {
+            bail!("{} has no place marked {BEGIN} … {END}", file.display());
+        };
+        let table = self.markdown();
+        write(file, &format!("{before}{BEGIN}\n{table}{END}{after}"))
+    }
+}
+
+/// Writes a file, and makes the folder for it.
+fn write(file: &Path, text: &str) -> anyhow::Result<()> {
+    if let Some(folder) = file.parent() {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    }
+    std::fs::write(file, text).with_context(|| format!("cannot write {}", file.display()))
+}

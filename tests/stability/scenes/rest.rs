@@ -1,0 +1,190 @@
+//! Bodies at rest on a plane whose samples stay, or are new in every frame.
+
+use crate::suite::arena::{Arena, DT, Material, Placed};
+use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::model;
+use crate::suite::surface::{Backing, Normals, Surface};
+use fastrand::Rng;
+use rapier3d::prelude::*;
+use tldi::glamx::{Vec2, Vec3};
+
+/// The scene.
+pub(crate) const SCENE: Scene = Scene {
+    name: "rest",
+    about: "A box, a ball and a bunny of 0.3 m on a plane, points 2 cm apart (r̄ = 2 cm, the bunny's 0.5 cm), whose \
+            samples stay or are drawn anew in every frame (σ = 0.25 r̄ along the normal).",
+    rule: "Samples that stay: asleep within 2 s; from then on, over 10 s, drift ≤ 0.1 r̄ and turn \
+           ≤ 0.1°, and the box within 0.1° of upright. New samples: RMS speed over the last 5 of \
+           12 s ≤ 1 cm/s.",
+    cases,
+};
+
+/// Distance of points, and their radius, metres.
+const SPACING: f32 = 0.02;
+/// The same of the bunny.
+const BUNNY_SPACING: f32 = 0.005;
+/// Half the size of box and ball, metres.
+const HALF: f32 = 0.15;
+/// How high above the surface bodies start, metres.
+const LIFT: f32 = 0.005;
+/// Seconds to fall asleep, and seconds that follow.
+const SETTLE_SECONDS: f32 = 2.0;
+const REST_SECONDS: f32 = 10.0;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Body {
+    Box,
+    Ball,
+    Bunny,
+}
+
+impl Body {
+    const ALL: [Self; 3] = [Self::Box, Self::Ball, Self::Bunny];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Ball => "ball",
+            Self::Bunny => "bunny",
+        }
+    }
+
+    fn surface(self, rng: &mut Rng) -> Surface {
+        match self {
+            Self::Box => Surface::cuboid(Vec3::splat(HALF), SPACING, rng),
+            Self::Ball => Surface::ball(HALF, SPACING),
+            Self::Bunny => model::bunny(2.0 * HALF, BUNNY_SPACING),
+        }
+    }
+
+    /// The pose in which it lies on y = 0.
+    fn resting_pose(self, surface: &Surface) -> Pose {
+        match self {
+            Self::Box | Self::Ball => Pose::from_translation(Vec3::Y * HALF),
+            Self::Bunny => model::lowest_resting_pose(surface),
+        }
+    }
+}
+
+fn cases(scale: &Scale) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for &seed in &scale.seeds {
+        for body in Body::ALL {
+            for (normals, name) in [(Normals::Given, "oriented"), (Normals::Absent, "bare")] {
+                let name = format!("{}, {name} plane", body.name());
+                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
+                    fixed_samples(setup, verdict, body, normals, seed)
+                }));
+            }
+            let name = format!("{}, new samples each frame", body.name());
+            cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
+                new_samples(setup, verdict, body, seed)
+            }));
+        }
+    }
+    cases
+}
+
+fn plane(noise: f32, normals: Normals, rng: &mut Rng) -> Surface {
+    let size = Vec2::splat(0.5);
+    let plane = if noise > 0.0 {
+        Surface::noisy(size, SPACING, noise * SPACING, Backing::Solid, rng)
+    } else {
+        Surface::flat(size, SPACING, Backing::Solid, rng)
+    };
+    plane.with_normals(normals)
+}
+
+/// A world with a body just above a plane, and the pose in which the body lies on it.
+fn start(
+    setup: &Setup,
+    body: Body,
+    plane: &Surface,
+    rng: &mut Rng,
+) -> Result<(Arena, [Placed; 2], Pose), Stop> {
+    let mut arena = Arena::new(setup)?;
+    let floor = arena.insert(RigidBodyBuilder::fixed(), plane, Material::default())?;
+    let surface = body.surface(rng);
+    let resting = body.resting_pose(&surface);
+    let lifted = resting.append_translation(LIFT * Vec3::Y);
+    let builder = RigidBodyBuilder::dynamic().pose(lifted);
+    let placed = arena.insert(builder, &surface, Material::default())?;
+    Ok((arena, [floor, placed], resting))
+}
+
+fn fixed_samples(
+    setup: &Setup,
+    verdict: &mut Verdict,
+    body: Body,
+    normals: Normals,
+    seed: u64,
+) -> Result<(), Stop> {
+    let mut rng = Rng::with_seed(seed);
+    let plane = plane(0.0, normals, &mut rng);
+    let (mut arena, [_, placed], truth) = start(setup, body, &plane, &mut rng)?;
+    let mut asleep_after = None;
+    let mut settled = Pose::IDENTITY;
+    let mut last_awake = 0.0;
+    for step in 1..=((SETTLE_SECONDS + REST_SECONDS) / DT) as usize {
+        arena.step()?;
+        let seconds = step as f32 * DT;
+        if arena.body(&placed).is_sleeping() {
+            asleep_after.get_or_insert(seconds);
+        } else {
+            last_awake = seconds;
+        }
+        if step == (SETTLE_SECONDS / DT) as usize {
+            settled = *arena.body(&placed).position();
+        }
+    }
+    let end = *arena.body(&placed).position();
+    match asleep_after {
+        Some(seconds) => verdict.at_most("asleep_after_s", seconds, SETTLE_SECONDS.into()),
+        None => verdict.require(false, || "never asleep".into()),
+    }
+    verdict.note("last_awake_s", last_awake);
+    let drift = end.translation.distance(settled.translation) / SPACING;
+    verdict.at_most("drift_mean_radii", drift, 0.1);
+    let turn = end.rotation.angle_between(settled.rotation).to_degrees();
+    verdict.at_most("turn_deg", turn, 0.1);
+    verdict.note("height_error_mean_radii", (end.translation.y - truth.translation.y) / SPACING);
+    verdict.note("landing_shift_mean_radii", (end.translation - truth.translation).with_y(0.0).length() / SPACING);
+    let tilt = (end.rotation * Vec3::Y).angle_between(truth.rotation * Vec3::Y).to_degrees();
+    if body == Body::Box {
+        verdict.at_most("tilt_deg", tilt, 0.1);
+    } else {
+        verdict.note("tilt_deg", tilt);
+    }
+    Ok(())
+}
+
+fn new_samples(
+    setup: &Setup,
+    verdict: &mut Verdict,
+    body: Body,
+    seed: u64,
+) -> Result<(), Stop> {
+    let mut rng = Rng::with_seed(seed);
+    let mut sample = {
+        let mut rng = Rng::with_seed(seed ^ 0x5eed);
+        move || plane(0.25, Normals::Absent, &mut rng)
+    };
+    let (mut arena, [floor, placed], truth) = start(setup, body, &sample(), &mut rng)?;
+    let steps = ((SETTLE_SECONDS + REST_SECONDS) / DT) as usize;
+    let watched = (5.0 / DT) as usize;
+    let mut speeds = Vec::with_capacity(watched);
+    for step in 0..steps {
+        arena.reshape(&floor, &sample())?;
+        arena.step()?;
+        if step >= steps - watched {
+            speeds.push(f64::from(arena.speed(&placed)));
+        }
+    }
+    let mean_square = speeds.iter().map(|v| v * v).sum::<f64>() / speeds.len() as f64;
+    verdict.at_most("rms_speed_m_s", mean_square.sqrt(), 0.01);
+    verdict.note("max_speed_m_s", speeds.iter().fold(0.0, |a: f64, b| a.max(*b)));
+    let end = arena.position(&placed);
+    verdict.note("height_error_mean_radii", (end.y - truth.translation.y) / SPACING);
+    verdict.note("drift_mean_radii", (end - truth.translation).with_y(0.0).length() / SPACING);
+    Ok(())
+}

@@ -1,0 +1,172 @@
+//! Bodies on both sides of sheets that are one layer of points.
+
+use crate::suite::arena::{Arena, DT, Material, Placed};
+use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::surface::{Backing, Mesh, Normals, Surface, slab};
+use fastrand::Rng;
+use rapier3d::prelude::*;
+use tldi::glamx::{Pose3, Vec2, Vec3};
+
+/// The scene.
+pub(crate) const SCENE: Scene = Scene {
+    name: "thin-sheet",
+    about: "Bodies of 0.2 m reach a sheet of one layer of points (r̄ = 2 cm) from above and from \
+            below (gravity reversed), and two sheets 1.5 r̄ apart in one cloud, from both sides.",
+    rule: "The body's middle stays on its side in every step, and after 2 s the body is within \
+           0.5 r̄ of where it rests on its sheet.",
+    cases,
+};
+
+/// Distance of points, and their radius, metres.
+const SPACING: f32 = 0.02;
+/// Half the size of the bodies, metres.
+const HALF: f32 = 0.1;
+/// Edge of the sheets, metres.
+const EDGE: f32 = 0.8;
+/// Distance of the two sheets, metres.
+const APART: f32 = 1.5 * SPACING;
+const SECONDS: f32 = 2.0;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Body {
+    Box,
+    Ball,
+}
+
+impl Body {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Ball => "ball",
+        }
+    }
+
+    fn surface(self, rng: &mut Rng) -> Surface {
+        match self {
+            Self::Box => Surface::cuboid(Vec3::splat(HALF), SPACING, rng),
+            Self::Ball => Surface::ball(HALF, SPACING),
+        }
+    }
+}
+
+fn cases(scale: &Scale) -> Vec<Case> {
+    let speeds: &[f32] = scale.pick(&[0.0, 3.0], &[0.0, 1.0, 3.0, 5.0]);
+    let mut cases = Vec::new();
+    for &seed in &scale.seeds {
+        for body in [Body::Box, Body::Ball] {
+            for (normals, kind) in [(Normals::Given, "oriented"), (Normals::Absent, "bare")] {
+                for (side, place) in [(1.0, "above"), (-1.0, "below")] {
+                    for &speed in speeds {
+                        let name = format!("{} from {place}, {kind}, {speed} m/s", body.name());
+                        cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
+                            one_sheet(setup, verdict, body, normals, side, speed, seed)
+                        }));
+                    }
+                }
+                let name = format!("{} on each of two sheets, {kind}", body.name());
+                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
+                    two_sheets(setup, verdict, body, normals, seed)
+                }));
+            }
+        }
+    }
+    cases
+}
+
+/// A body that is pulled to `height` from one side (`side` is 1 from above, -1 from below), with
+/// a start `SPACING` away from the sheet, and `speed` towards it.
+fn insert(
+    arena: &mut Arena,
+    surface: &Surface,
+    side: f32,
+    height: f32,
+    speed: f32,
+) -> Result<Placed, Stop> {
+    let start = Vec3::Y * (height + side * (HALF + SPACING));
+    let body = RigidBodyBuilder::dynamic()
+        .translation(start)
+        .linvel(Vec3::NEG_Y * (side * speed))
+        .gravity_scale(side)
+        .ccd_enabled(true);
+    arena.insert(body, surface, Material::default())
+}
+
+/// How far each body's middle is on its side of its sheet, at least and in the end, metres.
+fn watch(arena: &mut Arena, bodies: &[(Placed, f32, f32)]) -> Result<Vec<(f32, f32)>, Stop> {
+    let mut heights = vec![(f32::INFINITY, 0.0); bodies.len()];
+    for _ in 0..(SECONDS / DT) as usize {
+        arena.step()?;
+        for ((placed, side, sheet), (least, last)) in bodies.iter().zip(&mut heights) {
+            *last = side * (arena.position(placed).y - sheet);
+            *least = least.min(*last);
+        }
+    }
+    Ok(heights)
+}
+
+fn judge(verdict: &mut Verdict, name: &str, (least, last): (f32, f32)) {
+    let of = |what: &str| format!("{name}{what}");
+    verdict.at_least(&of("least_height_m"), least, 0.0);
+    let error = (last - HALF) / SPACING;
+    verdict.near(&of("height_error_mean_radii"), error, 0.0, 0.5);
+}
+
+fn one_sheet(
+    setup: &Setup,
+    verdict: &mut Verdict,
+    body: Body,
+    normals: Normals,
+    side: f32,
+    speed: f32,
+    seed: u64,
+) -> Result<(), Stop> {
+    let mut rng = Rng::with_seed(seed);
+    let mut arena = Arena::new(setup)?;
+    let sheet = Surface::flat(Vec2::splat(EDGE), SPACING, Backing::Film, &mut rng);
+    let sheet = sheet.with_normals(normals);
+    arena.insert(RigidBodyBuilder::fixed(), &sheet, Material::default())?;
+    let body = insert(&mut arena, &body.surface(&mut rng), side, 0.0, speed)?;
+    let heights = watch(&mut arena, &[(body, side, 0.0)])?;
+    judge(verdict, "", heights[0]);
+    Ok(())
+}
+
+/// Two sheets, facing away from each other, in one cloud: at 0 and at `-APART`.
+fn sheet_pair(rng: &mut Rng) -> Surface {
+    let size = Vec2::splat(EDGE);
+    let mut upper = Surface::flat(size, SPACING, Backing::Film, rng);
+    let lower = Surface::flat(size, SPACING, Backing::Film, rng);
+    let down = Pose3::from_translation(Vec3::NEG_Y * APART);
+    for (p, n) in lower.samples.points.iter().zip(&lower.samples.normals) {
+        upper.samples.points.push(down * *p);
+        upper.samples.normals.push(-*n);
+    }
+    if let (Ok(Mesh { vertices, triangles, .. }), Ok(other)) = (&mut upper.mesh, &lower.mesh) {
+        let first = vertices.len() as u32;
+        vertices.extend(other.vertices.iter().map(|p| down * *p));
+        triangles.extend(other.triangles.iter().map(|[a, b, c]| [a + first, c + first, b + first]));
+    }
+    let (pose, shape) = slab(Vec2::ZERO, size, SPACING, Backing::Film);
+    upper.primitive = Ok(vec![(pose, shape.clone()), (down * pose, shape)]);
+    upper
+}
+
+fn two_sheets(
+    setup: &Setup,
+    verdict: &mut Verdict,
+    body: Body,
+    normals: Normals,
+    seed: u64,
+) -> Result<(), Stop> {
+    let mut rng = Rng::with_seed(seed);
+    let mut arena = Arena::new(setup)?;
+    let sheets = sheet_pair(&mut rng).with_normals(normals);
+    arena.insert(RigidBodyBuilder::fixed(), &sheets, Material::default())?;
+    let surface = body.surface(&mut rng);
+    let upper = insert(&mut arena, &surface, 1.0, 0.0, 0.0)?;
+    let lower = insert(&mut arena, &surface, -1.0, -APART, 0.0)?;
+    let heights = watch(&mut arena, &[(upper, 1.0, 0.0), (lower, -1.0, -APART)])?;
+    judge(verdict, "upper_", heights[0]);
+    judge(verdict, "lower_", heights[1]);
+    Ok(())
+}

@@ -1,0 +1,73 @@
+//! Fast, small, spinning bodies against sheets, scans and waves: nothing may pass through.
+
+mod drops;
+
+use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use drops::{Outcome, SizeClass, Target, run_drop};
+
+/// The scene.
+pub(crate) const SCENE: Scene = Scene {
+    name: "tunnelling",
+    about: "Boxes and balls of 2 mm to 1 m, of a few hundred points each, at 0 to 200 m/s, 0 to \
+            75° off the normal, spinning up to 50 rad/s, with `ccd_enabled`, onto a sheet, a spot \
+            of a scan (scaled to the body) and a sheet that waves (new points each frame).",
+    rule: "No body's middle passes through the surface.",
+    cases,
+};
+
+/// How many failures of a row are named.
+const NAMED_FAILURES: usize = 5;
+
+fn cases(scale: &Scale) -> Vec<Case> {
+    let rows = Target::ALL.len() * SizeClass::ALL.len() * scale.seeds.len();
+    let drops = scale.drops.div_ceil(rows.max(1));
+    let only = scale.only_drop;
+    let mut cases = Vec::new();
+    for &seed in &scale.seeds {
+        for target in Target::ALL {
+            for size in SizeClass::ALL {
+                let name = format!("{}, {}", target.name(), size.name());
+                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
+                    let chosen = only.map_or(0..drops, |k| k..k + 1);
+                    drop_all(setup, verdict, target, size, chosen, seed)
+                }));
+            }
+        }
+    }
+    cases
+}
+
+fn drop_all(
+    setup: &Setup,
+    verdict: &mut Verdict,
+    target: Target,
+    size: SizeClass,
+    drops: std::ops::Range<usize>,
+    seed: u64,
+) -> Result<(), Stop> {
+    let mut hits = 0_u32;
+    let mut failures = Vec::new();
+    let count = drops.len();
+    for index in drops {
+        // Every drop has a seed of its own, so that it can be run alone (`--only-drop`).
+        let row = seed.wrapping_mul(31).wrapping_add(10 * target as u64 + size as u64);
+        let drop_seed = row.wrapping_mul(1_000_003).wrapping_add(index as u64);
+        let (outcome, description) = run_drop(setup, target, size, drop_seed)?;
+        match outcome {
+            Outcome::Missed => {}
+            Outcome::Stopped => hits += 1,
+            Outcome::Passed => {
+                hits += 1;
+                failures.push(format!("drop {index} ({description})"));
+            }
+        }
+    }
+    verdict.note("drops", count as f64);
+    verdict.note("hits", hits);
+    verdict.note("passed_through", failures.len() as f64);
+    verdict.require(failures.is_empty(), || {
+        let named = &failures[..failures.len().min(NAMED_FAILURES)];
+        format!("{} of {hits} passed through: {}", failures.len(), named.join(", "))
+    });
+    Ok(())
+}
