@@ -121,7 +121,11 @@ impl Args {
             .iter()
             .filter(|scene| self.scene.is_empty() || self.scene.iter().any(|n| n == scene.name))
             .flat_map(|scene| (scene.cases)(scale))
-            .filter(|case| self.case.as_ref().is_none_or(|text| case.name.contains(text)))
+            .filter(|case| {
+                self.case
+                    .as_ref()
+                    .is_none_or(|text| case.name.contains(text))
+            })
             .collect();
         if cases.is_empty() {
             bail!("no case is left to run");

@@ -149,7 +149,12 @@ impl Surface {
     }
 
     /// A flat rectangle of `size` metres (x, z) in y = 0, facing up.
-    pub(crate) fn flat(size: Vec2, spacing: f32, backing: Backing, rng: &mut fastrand::Rng) -> Self {
+    pub(crate) fn flat(
+        size: Vec2,
+        spacing: f32,
+        backing: Backing,
+        rng: &mut fastrand::Rng,
+    ) -> Self {
         let sheet = Sheet::sampled(size, spacing, rng, |_| 0.0);
         Self {
             mesh: Ok(rectangle_mesh(size)),
@@ -257,7 +262,9 @@ impl Surface {
     pub(crate) fn parts(&self, method: Method) -> Result<Vec<Part>, Stop> {
         match method {
             Method::Tldi => {
-                let cloud = self.cloud().map_err(|error| Stop::Failed(error.to_string()))?;
+                let cloud = self
+                    .cloud()
+                    .map_err(|error| Stop::Failed(error.to_string()))?;
                 let shape = SharedShape::new(PointCloudShape::new(cloud));
                 Ok(vec![(Pose::IDENTITY, shape)])
             }

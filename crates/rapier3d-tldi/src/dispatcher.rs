@@ -1,7 +1,7 @@
 //! What rapier's narrow phase asks, and who answers.
 
 use crate::manifolds;
-use crate::measured::Measured;
+use crate::measured::{Measured, rolls};
 use crate::parts::{PartPair, ShapePair, has_cloud, part};
 use crate::prepared::{Batch, PROBE_ANSWER, PairKey, PreparedPair, Shared};
 use crate::queries;
@@ -131,6 +131,7 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for TldiDispatc
         drop(batch);
         let measured = Measured::new(&pair, &self.shared.config);
         let filled = self.shared.compare_on_the_spot(pair, |parts, results| {
+            let measured = measured.filter(|_| !rolls(parts, results));
             manifolds::fill(&pair, measured, parts, results, manifolds, workspace);
         });
         if filled.is_none() {

@@ -7,10 +7,23 @@
 //! (`contact_recycling`), with a distance that does not know how fine the cloud is.
 
 use crate::TldiConfig;
-use crate::parts::{ShapePair, clouds_of};
+use crate::parts::{PartPair, ShapePair, clouds_of};
 use rapier3d::math::Pose;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::shape::Shape;
+use tldi::PairResult;
+
+/// Whether a pair touches in one round spot: it rolls there, and a point that rides on the bodies
+/// would soon be behind. One that stays a tenth of a radius behind drives a ball like a slope.
+pub(crate) fn rolls(parts: &[PartPair], results: &[PairResult]) -> bool {
+    let mut patches = (parts.iter())
+        .filter_map(|part| part.comparison.as_ref())
+        .flat_map(|comparison| &results[comparison.query].patches);
+    let first = patches.next();
+    parts.iter().all(|part| part.comparison.is_some())
+        && patches.next().is_none()
+        && first.is_some_and(|patch| patch.is_round)
+}
 
 /// Where a pair's contacts were measured, and for how long they hold.
 #[derive(Clone, Copy, PartialEq)]

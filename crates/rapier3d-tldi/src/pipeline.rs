@@ -300,6 +300,7 @@ impl TldiPipeline {
         if error.is_some() {
             batch.clear();
         } else {
+            batch.expire();
             self.changed.clear();
         }
         *shared.batch_mut() = batch;

@@ -2,7 +2,7 @@
 //! workspaces for pairs that are not in it, and the errors that rapier would drop.
 
 use crate::TldiConfig;
-use crate::measured::Measured;
+use crate::measured::{Measured, rolls};
 use crate::parts::{Hint, PartPair, ShapePair, append_part_pairs, append_queries, within_reach};
 use rapier3d::geometry::{ColliderHandle, SharedShape};
 use rapier3d::math::Pose;
@@ -77,6 +77,15 @@ impl Batch {
     pub(crate) fn push(&mut self, key: PairKey, pair: PreparedPair) {
         self.index.entry(key).or_insert(self.pairs.len());
         self.pairs.push(pair);
+    }
+
+    /// Forgets the measurements that do not outlive the step, once the results are there.
+    pub(crate) fn expire(&mut self) {
+        let (parts, results) = (&self.parts, &self.results);
+        for pair in self.pairs.iter_mut().filter(|pair| !pair.is_kept) {
+            pair.measured
+                .take_if(|_| rolls(&parts[pair.parts.clone()], results));
+        }
     }
 
     /// The pair with this key.

@@ -19,7 +19,7 @@ pub struct ImpactQuery<'a> {
     /// met only if the motion goes on towards it by more than a pixel, and what is behind it may be
     /// met instead.
     pub touching: f32,
-    /// Whether the rim of `b`, two pixels wide where `b` is wider than that, passes what it meets:
+    /// Whether the rim of `b`, three pixels wide where `b` is wider than that, passes what it meets:
     /// a body that slides along a rough surface is not stopped by it.
     pub core_only: bool,
     /// Parameters of the images; `prediction` adds to the region that is looked at.

@@ -6,7 +6,7 @@
 
 use crate::gap_fit::fitted_gap;
 use crate::links::Links;
-use crate::supports::{Supports, longest_axis, supports};
+use crate::supports::{longest_axis, supports};
 use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, PairResult, Params};
 use glamx::Vec3;
 use std::ops::Range;
@@ -48,6 +48,11 @@ const DEEPEST_BAND: f32 = 0.1;
 /// By how much that point must be deeper than the support points to count, in roughnesses: on flat
 /// faces it is noise, and four corners bear more than three.
 const DEEPER: f32 = 0.4;
+
+/// Roughness, in pixels, from which on a bend of the surfaces does not count as such. Gaps that rise
+/// through all of the support band, as around a ball's contact, deviate from a plane by 0.29; those
+/// of a small face whose rim is blurred by estimated normals by 0.1.
+const LEAST_RISE: f32 = 0.15;
 
 /// Variance (1 − mean length) that a surface's normals are taken to have at least: keeps the
 /// weights of two perfectly flat surfaces finite.
@@ -315,15 +320,21 @@ impl Shape {
                 .filter(|&m| smooth[m].gap <= limit)
                 .map(|m| self.point(contacts[m].middle(), smooth[m].gap)),
         );
-        let Supports { indices, roughness } =
-            supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
+        let supports = supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
+        let rises = supports.roughness >= LEAST_RISE * params.pixel_size;
+        let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
+        let unevenness = match rises {
+            true => supports.roughness_about_bowl,
+            false => supports.roughness,
+        };
         let mut patch = ContactPatch {
             normal: self.normal,
-            points: indices.into_iter().map(|k| points[k]).collect(),
+            points: supports.indices.into_iter().map(|k| points[k]).collect(),
+            is_round: lowest_of_bowl.is_some(),
         };
         patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
-        let deepest = self.deepest(points, params);
-        if deepest.gap < patch.points[0].gap - DEEPER * roughness {
+        let deepest = lowest_of_bowl.unwrap_or_else(|| self.deepest(points, params));
+        if deepest.gap < patch.points[0].gap - DEEPER * unevenness {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
         }

@@ -11,7 +11,18 @@ pub struct Supports {
     pub indices: ArrayVec<usize, PATCH_POINTS>,
     /// Standard deviation, in metres, of the gaps about the plane that fits them best.
     pub roughness: f32,
+    /// Standard deviation, in metres, of the gaps about the bowl that fits them best: a paraboloid
+    /// that widens along the main axes, or does not bend. What is left of the roughness where the
+    /// surfaces are round.
+    pub roughness_about_bowl: f32,
+    /// The lowest point of that bowl, if it is one in both directions, among the points, and most of
+    /// the roughness.
+    pub lowest_of_bowl: Option<ContactPoint>,
 }
+
+/// Farthest that the lowest point of a bowl is from the middle of the points, in standard deviations
+/// along each main axis. In a disc the rim is at 2.
+const LOWEST_OF_BOWL: f32 = 1.5;
 
 /// Of points on one plane with unit normal `normal`, those on which a body would rest: in each
 /// quadrant about the middle the one that is farthest out and lowest, a standard deviation of
@@ -54,6 +65,23 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     // A perfectly flat patch has none, by which nothing can be divided.
     let least = least_roughness.max(f32::MIN_POSITIVE);
     let roughness = (squares / count).sqrt().max(least);
+    let residuals = || points.iter().map(|p| (place(p), residual(p)));
+    let (widening, left) = bowl(residuals(), count);
+    let lowest = -0.5 * slope / widening;
+    let is_bowl = left < 0.5 * roughness && lowest.abs().max_element() <= LOWEST_OF_BOWL;
+    let lowest_of_bowl = is_bowl.then(|| {
+        let gap = mean_gap + slope.dot(lowest) + widening.dot(lowest * lowest - Vec2::ONE);
+        let aside = lowest * sigma;
+        let middle = centre + aside.x * longest + aside.y * across;
+        // The middles of points that are not level rise with half their gaps.
+        let above = (0.5 * (gap - mean_gap)) * normal;
+        let middle = middle + above;
+        ContactPoint {
+            point_a: middle - 0.5 * gap * normal,
+            point_b: middle + 0.5 * gap * normal,
+            gap,
+        }
+    });
     let mut best = [(f32::NEG_INFINITY, 0); PATCH_POINTS];
     for (k, point) in points.iter().enumerate() {
         let (place, low) = (place(point), -residual(point) / roughness);
@@ -76,7 +104,39 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
             indices.push(k);
         }
     }
-    Supports { indices, roughness }
+    Supports {
+        indices,
+        roughness,
+        roughness_about_bowl: left.clamp(least, roughness),
+        lowest_of_bowl,
+    }
+}
+
+/// The bowl that fits `count` heights above a plane best, at places in standard deviations along the
+/// main axes: by how much it rises with the square of the place, and the standard deviation of what
+/// it leaves.
+fn bowl(heights: impl Iterator<Item = (Vec2, f32)> + Clone, count: f32) -> (Vec2, f32) {
+    // Squares of the places, less their mean.
+    let bend = |place: Vec2| place * place - Vec2::ONE;
+    let (mut squares, mut mixed, mut moment) = (Vec2::ZERO, 0.0, Vec2::ZERO);
+    for (place, height) in heights.clone() {
+        let bend = bend(place);
+        squares += bend * bend;
+        mixed += bend.x * bend.y;
+        moment += height * bend;
+    }
+    let determinant = squares.x * squares.y - mixed * mixed;
+    let widening = Vec2::new(
+        moment.x * squares.y - moment.y * mixed,
+        moment.y * squares.x - moment.x * mixed,
+    ) / determinant;
+    let widening = if widening.is_finite() {
+        widening.max(Vec2::ZERO)
+    } else {
+        Vec2::ZERO
+    };
+    let left = heights.map(|(place, height)| (height - widening.dot(bend(place))).powi(2));
+    (widening, (left.sum::<f32>() / count).sqrt())
 }
 
 /// Direction across `normal`, of unit length, in which points about `centre` extend the most.
@@ -129,6 +189,38 @@ mod tests {
             assert_eq!(indices[..], [60, 61, 62, 63], "{tilt}");
             assert!(found.roughness < 0.002, "{}", found.roughness);
         }
+    }
+
+    /// A ball's cap is rough about a plane and smooth about a bowl; a dome upside down is no bowl.
+    #[test]
+    fn bowls_are_smooth() {
+        let cap = |bend: Vec2| {
+            let points: Vec<ContactPoint> = (0..81)
+                .map(|k| Vec2::new((k % 9) as f32 - 4.0, (k / 9) as f32 - 4.0))
+                .map(|p| ContactPoint {
+                    point_a: Vec3::new(p.x, 0.0, p.y),
+                    point_b: Vec3::new(p.x, 0.0, p.y),
+                    gap: (bend * p * p).element_sum() + 0.1 * p.x,
+                })
+                .collect();
+            supports(&points, Vec3::Y, 1e-4)
+        };
+        for bend in [Vec2::splat(0.02), Vec2::new(0.02, 0.0), Vec2::ZERO] {
+            let found = cap(bend);
+            assert!(found.roughness_about_bowl < 2e-4, "{bend}: {found:?}");
+            // The variance of k² over −4 … 4 is 34.2.
+            let expected = (34.22 * bend.length_squared()).sqrt().max(1e-4);
+            assert!((found.roughness / expected - 1.0).abs() < 0.01, "{found:?}");
+        }
+        let dome = cap(Vec2::splat(-0.02));
+        assert_eq!(dome.roughness_about_bowl, dome.roughness);
+        assert_eq!(dome.lowest_of_bowl, None);
+        // d(0.02 x² + 0.1 x) = 0 at −2.5.
+        let lowest = cap(Vec2::splat(0.02)).lowest_of_bowl.expect("a bowl");
+        assert!((lowest.gap + 0.125).abs() < 1e-3, "{lowest:?}");
+        assert!((lowest.middle().x + 2.5).abs() < 0.01, "{lowest:?}");
+        assert!(lowest.middle().z.abs() < 0.01, "{lowest:?}");
+        assert_eq!(cap(Vec2::new(0.02, 0.0)).lowest_of_bowl, None);
     }
 
     #[test]

@@ -8,4 +8,9 @@ mod tunnelling;
 use super::case::Scene;
 
 /// All scenes, in the order of tables.
-pub(crate) const SCENES: &[Scene] = &[rest::SCENE, slide::SCENE, thin_sheet::SCENE, tunnelling::SCENE];
+pub(crate) const SCENES: &[Scene] = &[
+    rest::SCENE,
+    slide::SCENE,
+    thin_sheet::SCENE,
+    tunnelling::SCENE,
+];

@@ -141,10 +141,23 @@ fn sheet_pair(rng: &mut Rng) -> Surface {
         upper.samples.points.push(down * *p);
         upper.samples.normals.push(-*n);
     }
-    if let (Ok(Mesh { vertices, triangles, .. }), Ok(other)) = (&mut upper.mesh, &lower.mesh) {
+    if let (
+        Ok(Mesh {
+            vertices,
+            triangles,
+            ..
+        }),
+        Ok(other),
+    ) = (&mut upper.mesh, &lower.mesh)
+    {
         let first = vertices.len() as u32;
         vertices.extend(other.vertices.iter().map(|p| down * *p));
-        triangles.extend(other.triangles.iter().map(|[a, b, c]| [a + first, c + first, b + first]));
+        triangles.extend(
+            other
+                .triangles
+                .iter()
+                .map(|[a, b, c]| [a + first, c + first, b + first]),
+        );
     }
     let (pose, shape) = slab(Vec2::ZERO, size, SPACING, Backing::Film);
     upper.primitive = Ok(vec![(pose, shape.clone()), (down * pose, shape)]);

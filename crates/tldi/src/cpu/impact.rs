@@ -9,14 +9,14 @@ use super::columns::dilate;
 use super::cull::{self, Region};
 use super::pair::{Scratch, is_oriented, ring};
 use super::side::{CloudView, ExactView};
-use super::splat::Rect;
 use super::sweep::is_edge_on;
 use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Params, Surface, Tldi, VirtualCamera};
 use glamx::{Pose3, Vec3};
 
-/// Width in pixels of the rim that [`ImpactQuery::core_only`] spares: what is missed there
-/// penetrates by no more, which contacts push out again.
-const RIM: i32 = 2;
+/// Width in pixels of the rim that [`ImpactQuery::core_only`] spares: splats stand out by one on
+/// either side, and one is for roughness. What is missed there
+/// penetrates by no more than that one, which contacts push out again.
+const RIM: i32 = 3;
 
 /// Pixels around an image that tell its rim from its edge: the rim, and one for the closing.
 const BORDER: i32 = RIM + 1;
@@ -40,6 +40,8 @@ pub(super) struct Meeting {
     /// How far the moving surface is from there, metres.
     distance: f32,
     depth: f32,
+    /// Least cosine between the motion and the normals of both.
+    facing: f32,
     /// Unit normal towards the moving surface, in the view frame.
     normal: Vec3,
 }
@@ -47,10 +49,12 @@ pub(super) struct Meeting {
 impl Meeting {
     fn new(pixel: usize, met: &Layer, leading: &Layer, params: &Params) -> Self {
         let against = |normal: Vec3| if normal.z > 0.0 { -normal } else { normal };
+        let facing = met.normal.z.abs().min(leading.normal.z.abs());
         let depth = front(met, params);
         Self {
             pixel,
             distance: depth - back(leading, params),
+            facing,
             depth,
             normal: (against(met.normal) + against(leading.normal)).normalize_or(-Vec3::Z),
         }
@@ -66,10 +70,11 @@ impl Scratch {
         }
         let camera = VirtualCamera::along(query.motion, query.params.pixel_size);
         self.cull_swept(query, &camera)?;
-        let whole_b = self.images_of_motion(query, &camera, length)?;
+        self.images_of_motion(query, &camera, length)?;
         let (a, b) = (&self.a.image, &self.b.image);
         if query.core_only {
-            self.core.find(b, &whole_b);
+            self.core
+                .find(b, &covered_by_bounds(&query.b, &query.a_from_b, &camera));
         }
         self.meetings.clear();
         for pixel in 0..b.pixel_count() {
@@ -85,7 +90,7 @@ impl Scratch {
                     .map(move |l| Meeting::new(pixel, &layers[k], &moving[l], &query.params))
             };
             let in_way = |meeting: &Meeting| {
-                let approach = -meeting.normal.z * (length - meeting.distance);
+                let approach = meeting.facing * (length - meeting.distance);
                 (0.0..=length).contains(&meeting.distance)
                     && (meeting.distance >= query.touching || approach > query.params.pixel_size)
             };
@@ -172,13 +177,13 @@ impl Scratch {
         Some(())
     }
 
-    /// Builds both images and returns the rectangle of all of `b`, whose image may hold less.
+    /// Builds both images.
     fn images_of_motion(
         &mut self,
         query: &ImpactQuery,
         camera: &VirtualCamera,
         length: f32,
-    ) -> Option<Rect> {
+    ) -> Option<()> {
         let params = &query.params;
         let view_of = |cloud, frame_from_cloud| CloudView {
             cloud,
@@ -220,10 +225,22 @@ impl Scratch {
     }
 }
 
+/// Least and greatest pixel coordinates that the splats of a surface cover, by its bounds.
+fn covered_by_bounds(
+    surface: &Surface,
+    frame_from_surface: &Pose3,
+    camera: &VirtualCamera,
+) -> [[f32; 2]; 2] {
+    let view_from_surface = camera.view_from_frame * *frame_from_surface;
+    let bounds = surface.bounds().loosened(surface.mean_radius());
+    let seen = bounds.transformed(&view_from_surface);
+    [seen.min, seen.max].map(|corner| camera.pixel_from_view(corner))
+}
+
 impl CoreScratch {
-    /// Finds the pixels of `image` that are not of its rim. Beyond the image it is taken to go on
-    /// as far as `whole`.
-    fn find(&mut self, image: &Tldi, whole: &Rect) {
+    /// Finds the pixels of `image` that are not of its rim. Beyond the image, which holds only what
+    /// can be met, it is taken to go on between the pixel coordinates `first` and `last`.
+    fn find(&mut self, image: &Tldi, [first, last]: &[[f32; 2]; 2]) {
         let [width, height] = image.size.map(|n| n as i32);
         let row = (width + 2 * BORDER) as usize;
         self.covered.clear();
@@ -232,7 +249,10 @@ impl CoreScratch {
                 let inside = (0..width).contains(&i) && (0..height).contains(&j);
                 let covered = match inside {
                     true => !image.layers_of((j * width + i) as usize).is_empty(),
-                    false => whole.contains([image.origin[0] + i, image.origin[1] + j]),
+                    false => [i, j].into_iter().enumerate().all(|(k, c)| {
+                        let middle = (image.origin[k] + c) as f32 + 0.5;
+                        (first[k]..=last[k]).contains(&middle)
+                    }),
                 };
                 self.covered.push(u8::from(covered));
             }

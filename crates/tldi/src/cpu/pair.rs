@@ -6,7 +6,7 @@ use super::cull::{self, Region};
 use super::impact::{CoreScratch, Meeting};
 use super::normals;
 use super::side::{CloudView, ExactView, Side};
-use super::splat::{DepthScale, Imaging, Rect};
+use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneScratch};
 use crate::camera_policy::{Approach, MAX_VIEWS, ZoneNormals, aim, seen_from_behind};
 use crate::patches::PatchScratch;
@@ -290,14 +290,14 @@ impl Scratch {
         );
     }
 
-    /// Builds the images of two clouds where `a` is less than `reach` metres behind `b`, and returns
-    /// where `b` is seen; `None` if that is nowhere.
+    /// Builds the images of two clouds where `a` is less than `reach` metres behind `b`; `None` if
+    /// that is nowhere.
     pub(super) fn look_at_clouds(
         &mut self,
         a: &CloudView,
         b: &CloudView,
         reach: f32,
-    ) -> Option<Rect> {
+    ) -> Option<()> {
         let (camera, params) = (a.camera, a.params);
         let (side_a, side_b) = (&mut self.a, &mut self.b);
         let (seen_a, seen_b) = rayon::join(|| side_a.project(a), || side_b.project(b));
@@ -329,7 +329,7 @@ impl Scratch {
             || side_a.image(a, &imaging, Some(touching)),
             || side_b.image(b, &imaging, Some(touching)),
         );
-        Some(seen_b.rect)
+        Some(())
     }
 }
 

@@ -4,7 +4,7 @@ use super::cast::{self, Rays};
 use super::columns::{Columns, Tiles, Touching};
 use super::cull::{CullScratch, PointRadii, Survivors};
 use super::normals::{self, NormalScratch};
-use super::splat::{DepthScale, Footprint, Fragments, Imaging, Rect, SplatPoints};
+use super::splat::{DepthScale, Footprint, Fragments, Imaging, SplatPoints};
 use super::sweep;
 use crate::{Params, PointCloud, RayHit, RaySurface, Tldi, VirtualCamera};
 use glamx::{Mat3, Pose3, Vec3};
@@ -224,15 +224,15 @@ impl Side {
         );
     }
 
-    /// Image of this cloud, and of an exact surface into `image` over the same pixels, which are
-    /// returned; `None` where nothing is in view.
+    /// Image of this cloud, and of an exact surface into `image` over the same pixels; `None`
+    /// where nothing is in view.
     pub(super) fn look_with(
         &mut self,
         view: &CloudView,
         exact: &ExactView,
         hits: &mut Vec<RayHit>,
         image: &mut Tldi,
-    ) -> Option<Rect> {
+    ) -> Option<()> {
         let seen = self.project(view)?;
         self.whole_image(view, &seen);
         // Rays must pass through all of the surface, or what is deepest would be missed.
@@ -247,6 +247,6 @@ impl Side {
             cover: (!exact.everywhere).then_some(&self.image),
         };
         cast::cast(exact.surface, exact.frame_from_surface, &rays, hits, image);
-        Some(seen.rect)
+        Some(())
     }
 }

@@ -115,11 +115,6 @@ impl Rect {
         )
     }
 
-    pub(crate) fn contains(&self, pixel: [i32; 2]) -> bool {
-        let last = self.last();
-        (0..2).all(|k| (self.origin[k]..=last[k]).contains(&pixel[k]))
-    }
-
     pub(crate) fn pixels(&self) -> usize {
         self.size[0] as usize * self.size[1] as usize
     }

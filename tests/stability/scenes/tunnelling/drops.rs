@@ -150,7 +150,11 @@ impl Plan {
             aim,
             start: Vec3::new(aim.x, 0.0, aim.y) - direction * way,
             oriented: rng.bool(),
-            wave_phase: if is_waving { between(0.0, TAU, rng) } else { 0.0 },
+            wave_phase: if is_waving {
+                between(0.0, TAU, rng)
+            } else {
+                0.0
+            },
         }
     }
 
