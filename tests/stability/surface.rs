@@ -225,6 +225,42 @@ impl Surface {
         Self { normals, ..self }
     }
 
+    /// The same surface in another frame.
+    #[must_use]
+    pub(crate) fn moved(&self, pose: &Pose) -> Self {
+        let mut moved = self.clone();
+        moved.samples = self.samples.moved(pose);
+        if let Ok(mesh) = &mut moved.mesh {
+            for vertex in &mut mesh.vertices {
+                *vertex = *pose * *vertex;
+            }
+        }
+        if let Ok(parts) = &mut moved.primitive {
+            for (part, _) in parts {
+                *part = *pose * *part;
+            }
+        }
+        moved
+    }
+
+    /// Both surfaces as one cloud, one mesh, one set of shapes; radii and normals as those of the
+    /// first.
+    #[must_use]
+    pub(crate) fn joined(mut self, other: &Self) -> Self {
+        self.samples.points.extend(&other.samples.points);
+        self.samples.normals.extend(&other.samples.normals);
+        if let (Ok(mesh), Ok(more)) = (&mut self.mesh, &other.mesh) {
+            let first = mesh.vertices.len() as u32;
+            mesh.vertices.extend(&more.vertices);
+            mesh.triangles.extend(more.triangles.iter().map(|t| t.map(|i| first + i)));
+            mesh.closed &= more.closed;
+        }
+        if let (Ok(parts), Ok(more)) = (&mut self.primitive, &other.primitive) {
+            parts.extend(more.iter().cloned());
+        }
+        self
+    }
+
     /// Radius that stands for the points: the global one, or half a voxel.
     pub(crate) fn mean_radius(&self) -> f32 {
         match self.radius {
