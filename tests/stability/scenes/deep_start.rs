@@ -11,9 +11,10 @@ use tldi::glamx::Vec3;
 pub(crate) const SCENE: Scene = Scene {
     name: "deep-start",
     about: "Boxes and balls of 0.2 m start 10 to 80 % inside a floor (a box of 1 × 0.6 × 1 m) or \
-            inside each other, without gravity; r̄ = 2 cm.",
+            inside each other (there without gravity); r̄ = 2 cm.",
     rule: "Out of the nearer side within 3 s: on the floor within r̄ of the height at which it rests, \
-           apart from each other to within r̄; never faster than 2 m/s.",
+           apart from each other to within r̄, and when they first are, more along the line on which \
+           they overlapped than sideways; never faster than 2 m/s.",
     cases,
 };
 
@@ -95,13 +96,30 @@ fn in_each_other(
         placed.push(arena.insert(builder, &body(is_ball, &mut rng), Material::default())?);
     }
     let mut fastest = 0.0_f32;
+    let mut at_parting: Option<Vec3> = None;
     for _ in 0..(SECONDS / DT) as usize {
         arena.step()?;
+        let apart = (arena.position(&placed[1]) - arena.position(&placed[0])).abs();
+        let distance = if is_ball { apart.length() } else { apart.max_element() };
+        if distance >= 2.0 * HALF - SPACING {
+            at_parting.get_or_insert(apart);
+        }
         fastest = placed.iter().map(|p| arena.speed(p)).fold(fastest, f32::max);
     }
-    let apart = arena.position(&placed[1]) - arena.position(&placed[0]);
-    verdict.at_least("apart_along_x_m", apart.x, f64::from(2.0 * HALF - SPACING));
+    match at_parting {
+        Some(apart) => {
+            verdict.note("parting_along_x_m", apart.x);
+            verdict.note("parting_sideways_m", apart.with_x(0.0).length());
+            verdict.require(apart.x > apart.with_x(0.0).length(), || {
+                format!("they part sideways: {apart:.3}")
+            });
+        }
+        None => {
+            let apart = arena.position(&placed[1]).distance(arena.position(&placed[0]));
+            verdict.note("distance_m", apart);
+            verdict.require(false, || format!("still in each other, {apart:.3} m apart"));
+        }
+    }
     verdict.at_most("fastest_m_s", fastest, 2.0);
-    verdict.note("sideways_mean_radii", apart.with_x(0.0).length() / SPACING);
     Ok(())
 }

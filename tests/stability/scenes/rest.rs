@@ -1,6 +1,6 @@
 //! Bodies at rest on a plane whose samples stay, or are new in every frame.
 
-use crate::suite::arena::{Arena, DT, Material, Placed};
+use crate::suite::arena::{Arena, DT, Material, Placed, SamePoints};
 use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
 use crate::suite::model;
 use crate::suite::surface::{Backing, Normals, Surface};
@@ -174,7 +174,7 @@ fn new_samples(
     let watched = (5.0 / DT) as usize;
     let mut speeds = Vec::with_capacity(watched);
     for step in 0..steps {
-        arena.reshape(&floor, &sample())?;
+        arena.reshape(&floor, &sample(), SamePoints::No)?;
         arena.step()?;
         if step >= steps - watched {
             speeds.push(f64::from(arena.speed(&placed)));
