@@ -23,7 +23,7 @@ static BUNNY_MESH: LazyLock<Mesh> = LazyLock::new(|| {
     Mesh {
         vertices: raw.points.iter().map(|p| (*p - middle) * scale).collect(),
         triangles: raw.faces,
-        closed: true,
+        one_sided: true,
     }
 });
 
@@ -68,7 +68,7 @@ fn clustered(mesh: &Mesh, scale: f32, spacing: f32) -> Mesh {
     Mesh {
         vertices,
         triangles,
-        closed: mesh.closed,
+        one_sided: mesh.one_sided,
     }
 }
 
@@ -120,6 +120,6 @@ fn pebble() -> Mesh {
     Mesh {
         vertices,
         triangles,
-        closed: true,
+        one_sided: true,
     }
 }

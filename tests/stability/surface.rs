@@ -39,8 +39,8 @@ pub(crate) struct Mesh {
     pub(crate) vertices: Vec<Vec3>,
     /// Indices of corners.
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Whether it encloses a volume.
-    pub(crate) closed: bool,
+    /// Whether bodies come only from outside: what is behind is solid.
+    pub(crate) one_sided: bool,
 }
 
 /// A part of a primitive: where it is in the body's frame, and its shape.
@@ -122,7 +122,7 @@ impl Surface {
             mesh: Ok(Mesh {
                 vertices,
                 triangles,
-                closed: true,
+                one_sided: true,
             }),
             primitive: Ok(vec![(Pose::IDENTITY, primitive)]),
             mass: None,
@@ -152,7 +152,7 @@ impl Surface {
     pub(crate) fn flat(size: Vec2, spacing: f32, backing: Backing, rng: &mut fastrand::Rng) -> Self {
         let sheet = Sheet::sampled(size, spacing, rng, |_| 0.0);
         Self {
-            mesh: Ok(rectangle_mesh(size)),
+            mesh: Ok(rectangle_mesh(size, backing)),
             ..Self::of_sheet(sheet, size, spacing, backing)
         }
     }
@@ -205,7 +205,7 @@ impl Surface {
         let mesh = Mesh {
             vertices: sheet.samples.points.clone(),
             triangles,
-            closed: false,
+            one_sided: backing == Backing::Solid,
         };
         Self {
             samples: sheet.samples,
@@ -253,7 +253,7 @@ impl Surface {
             let first = mesh.vertices.len() as u32;
             mesh.vertices.extend(&more.vertices);
             mesh.triangles.extend(more.triangles.iter().map(|t| t.map(|i| first + i)));
-            mesh.closed &= more.closed;
+            mesh.one_sided &= more.one_sided;
         }
         if let (Ok(parts), Ok(more)) = (&mut self.primitive, &other.primitive) {
             parts.extend(more.iter().cloned());
@@ -305,7 +305,7 @@ impl Surface {
             }
             Method::Trimesh => {
                 let mesh = self.mesh.as_ref().map_err(|why| Stop::Unfit(why))?;
-                let flags = if mesh.closed {
+                let flags = if mesh.one_sided {
                     TriMeshFlags::FIX_INTERNAL_EDGES
                 } else {
                     TriMeshFlags::FIX_INTERNAL_EDGES_TWO_SIDED
@@ -339,7 +339,7 @@ pub(crate) fn slab(middle: Vec2, size: Vec2, spacing: f32, backing: Backing) -> 
 }
 
 /// Two triangles over a rectangle in y = 0, facing up.
-fn rectangle_mesh(size: Vec2) -> Mesh {
+fn rectangle_mesh(size: Vec2, backing: Backing) -> Mesh {
     let corner = |x: f32, z: f32| Vec3::new(x * size.x, 0.0, z * size.y);
     Mesh {
         vertices: vec![
@@ -349,6 +349,6 @@ fn rectangle_mesh(size: Vec2) -> Mesh {
             corner(0.5, -0.5),
         ],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-        closed: false,
+        one_sided: backing == Backing::Solid,
     }
 }

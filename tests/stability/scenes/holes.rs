@@ -50,7 +50,7 @@ fn cases(scale: &Scale) -> Vec<Case> {
 
 /// A floor with a square hole of this width in its middle.
 fn floor_with_hole(width: f32, rng: &mut Rng) -> Surface {
-    let mut floor = Surface::flat(Vec2::splat(EDGE), SPACING, Backing::Solid, rng);
+    let mut floor = Surface::flat(Vec2::splat(EDGE), SPACING, Backing::Film, rng);
     let is_floor = |p: &Vec3| p.x.abs().max(p.z.abs()) > 0.5 * width;
     floor.samples = floor
         .samples
@@ -85,7 +85,7 @@ fn floor_with_hole(width: f32, rng: &mut Rng) -> Surface {
     let mut mesh = Mesh {
         vertices: Vec::new(),
         triangles: Vec::new(),
-        closed: false,
+        one_sided: true,
     };
     for (at, size) in strips {
         let first = mesh.vertices.len() as u32;
