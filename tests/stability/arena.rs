@@ -30,6 +30,15 @@ impl Default for Material {
     }
 }
 
+/// Whether new points are the old ones, moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SamePoints {
+    /// The surface deforms.
+    Yes,
+    /// The surface is sampled anew.
+    No,
+}
+
 /// A body in an [`Arena`].
 #[derive(Clone, Debug)]
 pub(crate) struct Placed {
@@ -119,17 +128,22 @@ impl Arena {
     }
 
     /// Gives a body another surface, as a deforming or streaming one has in every frame: new
-    /// points for a cloud, a new shape for the other methods.
-    pub(crate) fn reshape(&mut self, placed: &Placed, surface: &Surface) -> Result<(), Stop> {
+    /// points for a cloud, a new shape for the other methods. Where the points are the `same`,
+    /// moved, a cloud is told so ([`TldiPipeline::deform`]).
+    pub(crate) fn reshape(
+        &mut self,
+        placed: &Placed,
+        surface: &Surface,
+        same: SamePoints,
+    ) -> Result<(), Stop> {
         if let Some(tldi) = &mut self.tldi {
-            return tldi
-                .set_points(
-                    &mut self.world,
-                    placed.collider,
-                    &surface.samples.points,
-                    surface.given_normals(),
-                )
-                .map_err(failed);
+            let (world, points) = (&mut self.world, &surface.samples.points);
+            let normals = surface.given_normals();
+            return match same {
+                SamePoints::Yes => tldi.deform(world, placed.collider, points, normals),
+                SamePoints::No => tldi.set_points(world, placed.collider, points, normals),
+            }
+            .map_err(failed);
         }
         let collider = &mut self.world.colliders[placed.collider];
         if let (Method::Trimesh, Ok(mesh)) = (self.method, &surface.mesh) {
@@ -160,12 +174,7 @@ impl Arena {
             None => self.world.step(),
         }
         self.steps += 1;
-        if let Some((_, body)) = self
-            .world
-            .bodies
-            .iter()
-            .find(|(_, b)| !b.position().is_finite())
-        {
+        if let Some((_, body)) = self.world.bodies.iter().find(|(_, b)| !b.position().is_finite()) {
             let at = body.translation();
             return Err(failed(format!("a pose is not finite: {at}")));
         }

@@ -7,10 +7,11 @@ use anyhow::bail;
 use rapier3d_tldi::TldiConfig;
 use std::path::PathBuf;
 
-/// Seeds of the long version, where none are asked for.
+/// Seeds of the long and of the short version, where none are asked for.
 const LONG_SEEDS: u64 = 5;
+const SHORT_SEEDS: u64 = 2;
 /// Drops of the short and of the long version, where none are asked for.
-const SHORT_DROPS: usize = 240;
+const SHORT_DROPS: usize = 900;
 const LONG_DROPS: usize = 10_000;
 
 /// Runs scenes that physics engines find hard with point clouds, and the same scenes with rapier's
@@ -26,7 +27,7 @@ pub(crate) struct Args {
     /// Only this method (may be given several times; all without)
     #[arg(long, value_enum)]
     method: Vec<Method>,
-    /// Number of seeds [default: 1, or 5 with --long]
+    /// Number of seeds [default: 2, or 5 with --long]
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
     /// The first seed: equal seeds give equal rows
@@ -35,7 +36,7 @@ pub(crate) struct Args {
     /// More cases, more seeds, 10,000 tunnelling drops
     #[arg(long)]
     long: bool,
-    /// Drops of `tunnelling` over all surfaces [default: 240, or 10,000 with --long]
+    /// Drops of `tunnelling` over all surfaces [default: 900, or 10,000 with --long]
     #[arg(long, value_name = "N")]
     drops: Option<usize>,
     /// Only this one of each row's drops, as a failure names it (use with --case and --trace)
@@ -82,7 +83,7 @@ impl BackendChoice {
 impl Args {
     /// How much to run.
     pub(crate) fn scale(&self) -> Scale {
-        let default_seeds = if self.long { LONG_SEEDS } else { 1 };
+        let default_seeds = if self.long { LONG_SEEDS } else { SHORT_SEEDS };
         let default_drops = if self.long { LONG_DROPS } else { SHORT_DROPS };
         Scale {
             seeds: (0..self.seeds.unwrap_or(default_seeds))
@@ -121,11 +122,7 @@ impl Args {
             .iter()
             .filter(|scene| self.scene.is_empty() || self.scene.iter().any(|n| n == scene.name))
             .flat_map(|scene| (scene.cases)(scale))
-            .filter(|case| {
-                self.case
-                    .as_ref()
-                    .is_none_or(|text| case.name.contains(text))
-            })
+            .filter(|case| self.case.as_ref().is_none_or(|text| case.name.contains(text)))
             .collect();
         if cases.is_empty() {
             bail!("no case is left to run");

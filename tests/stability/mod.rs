@@ -1,7 +1,7 @@
 //! The parts of the suite: how a surface is given to each method, worlds, rows, reports, scenes.
 
-mod arena;
 mod args;
+mod arena;
 mod case;
 mod chart;
 mod host;

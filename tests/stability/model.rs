@@ -1,9 +1,9 @@
 //! Models and scans of the test data, or what is generated (and said) where the data is absent.
 
 use super::surface::{Mesh, Surface};
-use rapier3d::parry::transformation::convex_hull;
 use std::collections::HashMap;
 use std::sync::LazyLock;
+use rapier3d::parry::transformation::convex_hull;
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi_sources::{ReadOptions, read};
 use tldi_tests::{Samples, data_file};
@@ -23,7 +23,7 @@ static BUNNY_MESH: LazyLock<Mesh> = LazyLock::new(|| {
     Mesh {
         vertices: raw.points.iter().map(|p| (*p - middle) * scale).collect(),
         triangles: raw.faces,
-        closed: true,
+        one_sided: true,
     }
 });
 
@@ -68,7 +68,7 @@ fn clustered(mesh: &Mesh, scale: f32, spacing: f32) -> Mesh {
     Mesh {
         vertices,
         triangles,
-        closed: mesh.closed,
+        one_sided: mesh.one_sided,
     }
 }
 
@@ -120,6 +120,6 @@ fn pebble() -> Mesh {
     Mesh {
         vertices,
         triangles,
-        closed: true,
+        one_sided: true,
     }
 }

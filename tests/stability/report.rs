@@ -53,11 +53,7 @@ impl Report {
     /// Names of the scenes that have rows.
     pub(crate) fn scenes(&self) -> Vec<&'static str> {
         let has_rows = |name: &&str| self.rows.iter().any(|row| row.scene == *name);
-        SCENES
-            .iter()
-            .map(|scene| scene.name)
-            .filter(has_rows)
-            .collect()
+        SCENES.iter().map(|scene| scene.name).filter(has_rows).collect()
     }
 
     /// How a method did in a scene.
@@ -75,9 +71,7 @@ impl Report {
 
     /// Failures of ours that are not declared.
     pub(crate) fn undeclared_failures(&self) -> Vec<&Row> {
-        (self.rows.iter())
-            .filter(|row| row.is_undeclared_failure())
-            .collect()
+        (self.rows.iter()).filter(|row| row.is_undeclared_failure()).collect()
     }
 
     /// One line that says when, where and of what.
@@ -140,9 +134,9 @@ impl Report {
             return;
         }
         let _infallible = write!(text, "\n`{method}` {title}:\n\n");
-        for group in
-            rows.chunk_by(|a, b| passed.is_none() && (a.scene, &a.reason) == (b.scene, &b.reason))
-        {
+        for group in rows.chunk_by(|a, b| {
+            passed.is_none() && (a.scene, &a.reason) == (b.scene, &b.reason)
+        }) {
             let row = group[0];
             let reason = row.reason.as_deref().unwrap_or_default();
             let cases = match (passed, group.len()) {

@@ -32,17 +32,19 @@ pub(crate) fn run_all(
     bar.set_style(ProgressStyle::with_template(
         "{bar:40} {pos}/{len} rows, {elapsed}, {msg}",
     )?);
-    let done: Vec<(Row, f64)> = jobs
-        .par_iter()
-        .with_max_len(1)
-        .map(|&(case, method)| {
-            bar.set_message(format!("{} / {}", case.scene, case.name));
-            let start = Instant::now();
-            let row = run_one(case, &Setup { method, ..*setup });
-            bar.inc(1);
-            (row, start.elapsed().as_secs_f64())
-        })
-        .collect();
+    let run = |&(case, method): &(&Case, Method)| {
+        bar.set_message(format!("{} / {}", case.scene, case.name));
+        let start = Instant::now();
+        let row = run_one(case, &Setup { method, ..*setup });
+        bar.inc(1);
+        (row, start.elapsed().as_secs_f64())
+    };
+    // Traces of several worlds would mingle.
+    let done: Vec<(Row, f64)> = if setup.trace {
+        jobs.iter().map(run).collect()
+    } else {
+        jobs.par_iter().with_max_len(1).map(run).collect()
+    };
     bar.finish_and_clear();
     let mut timings = Timings::new();
     for ((case, method), (_, seconds)) in jobs.iter().zip(&done) {

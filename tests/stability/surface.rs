@@ -39,8 +39,8 @@ pub(crate) struct Mesh {
     pub(crate) vertices: Vec<Vec3>,
     /// Indices of corners.
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Whether it encloses a volume.
-    pub(crate) closed: bool,
+    /// Whether bodies come only from outside: what is behind is solid.
+    pub(crate) one_sided: bool,
 }
 
 /// A part of a primitive: where it is in the body's frame, and its shape.
@@ -122,7 +122,7 @@ impl Surface {
             mesh: Ok(Mesh {
                 vertices,
                 triangles,
-                closed: true,
+                one_sided: true,
             }),
             primitive: Ok(vec![(Pose::IDENTITY, primitive)]),
             mass: None,
@@ -149,15 +149,10 @@ impl Surface {
     }
 
     /// A flat rectangle of `size` metres (x, z) in y = 0, facing up.
-    pub(crate) fn flat(
-        size: Vec2,
-        spacing: f32,
-        backing: Backing,
-        rng: &mut fastrand::Rng,
-    ) -> Self {
+    pub(crate) fn flat(size: Vec2, spacing: f32, backing: Backing, rng: &mut fastrand::Rng) -> Self {
         let sheet = Sheet::sampled(size, spacing, rng, |_| 0.0);
         Self {
-            mesh: Ok(rectangle_mesh(size)),
+            mesh: Ok(rectangle_mesh(size, backing)),
             ..Self::of_sheet(sheet, size, spacing, backing)
         }
     }
@@ -210,7 +205,7 @@ impl Surface {
         let mesh = Mesh {
             vertices: sheet.samples.points.clone(),
             triangles,
-            closed: false,
+            one_sided: backing == Backing::Solid,
         };
         Self {
             samples: sheet.samples,
@@ -228,6 +223,42 @@ impl Surface {
     #[must_use]
     pub(crate) fn with_normals(self, normals: Normals) -> Self {
         Self { normals, ..self }
+    }
+
+    /// The same surface in another frame.
+    #[must_use]
+    pub(crate) fn moved(&self, pose: &Pose) -> Self {
+        let mut moved = self.clone();
+        moved.samples = self.samples.moved(pose);
+        if let Ok(mesh) = &mut moved.mesh {
+            for vertex in &mut mesh.vertices {
+                *vertex = *pose * *vertex;
+            }
+        }
+        if let Ok(parts) = &mut moved.primitive {
+            for (part, _) in parts {
+                *part = *pose * *part;
+            }
+        }
+        moved
+    }
+
+    /// Both surfaces as one cloud, one mesh, one set of shapes; radii and normals as those of the
+    /// first.
+    #[must_use]
+    pub(crate) fn joined(mut self, other: &Self) -> Self {
+        self.samples.points.extend(&other.samples.points);
+        self.samples.normals.extend(&other.samples.normals);
+        if let (Ok(mesh), Ok(more)) = (&mut self.mesh, &other.mesh) {
+            let first = mesh.vertices.len() as u32;
+            mesh.vertices.extend(&more.vertices);
+            mesh.triangles.extend(more.triangles.iter().map(|t| t.map(|i| first + i)));
+            mesh.one_sided &= more.one_sided;
+        }
+        if let (Ok(parts), Ok(more)) = (&mut self.primitive, &other.primitive) {
+            parts.extend(more.iter().cloned());
+        }
+        self
     }
 
     /// Radius that stands for the points: the global one, or half a voxel.
@@ -262,9 +293,7 @@ impl Surface {
     pub(crate) fn parts(&self, method: Method) -> Result<Vec<Part>, Stop> {
         match method {
             Method::Tldi => {
-                let cloud = self
-                    .cloud()
-                    .map_err(|error| Stop::Failed(error.to_string()))?;
+                let cloud = self.cloud().map_err(|error| Stop::Failed(error.to_string()))?;
                 let shape = SharedShape::new(PointCloudShape::new(cloud));
                 Ok(vec![(Pose::IDENTITY, shape)])
             }
@@ -276,7 +305,7 @@ impl Surface {
             }
             Method::Trimesh => {
                 let mesh = self.mesh.as_ref().map_err(|why| Stop::Unfit(why))?;
-                let flags = if mesh.closed {
+                let flags = if mesh.one_sided {
                     TriMeshFlags::FIX_INTERNAL_EDGES
                 } else {
                     TriMeshFlags::FIX_INTERNAL_EDGES_TWO_SIDED
@@ -310,7 +339,7 @@ pub(crate) fn slab(middle: Vec2, size: Vec2, spacing: f32, backing: Backing) -> 
 }
 
 /// Two triangles over a rectangle in y = 0, facing up.
-fn rectangle_mesh(size: Vec2) -> Mesh {
+fn rectangle_mesh(size: Vec2, backing: Backing) -> Mesh {
     let corner = |x: f32, z: f32| Vec3::new(x * size.x, 0.0, z * size.y);
     Mesh {
         vertices: vec![
@@ -320,6 +349,6 @@ fn rectangle_mesh(size: Vec2) -> Mesh {
             corner(0.5, -0.5),
         ],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-        closed: false,
+        one_sided: backing == Backing::Solid,
     }
 }

@@ -1,6 +1,6 @@
 //! Bodies at rest on a plane whose samples stay, or are new in every frame.
 
-use crate::suite::arena::{Arena, DT, Material, Placed};
+use crate::suite::arena::{Arena, DT, Material, Placed, SamePoints};
 use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
 use crate::suite::model;
 use crate::suite::surface::{Backing, Normals, Surface};
@@ -147,17 +147,9 @@ fn fixed_samples(
     verdict.at_most("drift_mean_radii", drift, 0.1);
     let turn = end.rotation.angle_between(settled.rotation).to_degrees();
     verdict.at_most("turn_deg", turn, 0.1);
-    verdict.note(
-        "height_error_mean_radii",
-        (end.translation.y - truth.translation.y) / SPACING,
-    );
-    verdict.note(
-        "landing_shift_mean_radii",
-        (end.translation - truth.translation).with_y(0.0).length() / SPACING,
-    );
-    let tilt = (end.rotation * Vec3::Y)
-        .angle_between(truth.rotation * Vec3::Y)
-        .to_degrees();
+    verdict.note("height_error_mean_radii", (end.translation.y - truth.translation.y) / SPACING);
+    verdict.note("landing_shift_mean_radii", (end.translation - truth.translation).with_y(0.0).length() / SPACING);
+    let tilt = (end.rotation * Vec3::Y).angle_between(truth.rotation * Vec3::Y).to_degrees();
     if body == Body::Box {
         verdict.at_most("tilt_deg", tilt, 0.1);
     } else {
@@ -166,7 +158,12 @@ fn fixed_samples(
     Ok(())
 }
 
-fn new_samples(setup: &Setup, verdict: &mut Verdict, body: Body, seed: u64) -> Result<(), Stop> {
+fn new_samples(
+    setup: &Setup,
+    verdict: &mut Verdict,
+    body: Body,
+    seed: u64,
+) -> Result<(), Stop> {
     let mut rng = Rng::with_seed(seed);
     let mut sample = {
         let mut rng = Rng::with_seed(seed ^ 0x5eed);
@@ -177,7 +174,7 @@ fn new_samples(setup: &Setup, verdict: &mut Verdict, body: Body, seed: u64) -> R
     let watched = (5.0 / DT) as usize;
     let mut speeds = Vec::with_capacity(watched);
     for step in 0..steps {
-        arena.reshape(&floor, &sample())?;
+        arena.reshape(&floor, &sample(), SamePoints::No)?;
         arena.step()?;
         if step >= steps - watched {
             speeds.push(f64::from(arena.speed(&placed)));
@@ -185,18 +182,9 @@ fn new_samples(setup: &Setup, verdict: &mut Verdict, body: Body, seed: u64) -> R
     }
     let mean_square = speeds.iter().map(|v| v * v).sum::<f64>() / speeds.len() as f64;
     verdict.at_most("rms_speed_m_s", mean_square.sqrt(), 0.01);
-    verdict.note(
-        "max_speed_m_s",
-        speeds.iter().fold(0.0, |a: f64, b| a.max(*b)),
-    );
+    verdict.note("max_speed_m_s", speeds.iter().fold(0.0, |a: f64, b| a.max(*b)));
     let end = arena.position(&placed);
-    verdict.note(
-        "height_error_mean_radii",
-        (end.y - truth.translation.y) / SPACING,
-    );
-    verdict.note(
-        "drift_mean_radii",
-        (end - truth.translation).with_y(0.0).length() / SPACING,
-    );
+    verdict.note("height_error_mean_radii", (end.y - truth.translation.y) / SPACING);
+    verdict.note("drift_mean_radii", (end - truth.translation).with_y(0.0).length() / SPACING);
     Ok(())
 }

@@ -2,10 +2,10 @@
 
 use crate::suite::arena::{Arena, DT, Material, Placed};
 use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
-use crate::suite::surface::{Backing, Mesh, Normals, Surface, slab};
+use crate::suite::surface::{Backing, Normals, Surface};
 use fastrand::Rng;
 use rapier3d::prelude::*;
-use tldi::glamx::{Pose3, Vec2, Vec3};
+use tldi::glamx::{Quat, Vec2, Vec3};
 
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
@@ -133,35 +133,10 @@ fn one_sheet(
 
 /// Two sheets, facing away from each other, in one cloud: at 0 and at `-APART`.
 fn sheet_pair(rng: &mut Rng) -> Surface {
-    let size = Vec2::splat(EDGE);
-    let mut upper = Surface::flat(size, SPACING, Backing::Film, rng);
-    let lower = Surface::flat(size, SPACING, Backing::Film, rng);
-    let down = Pose3::from_translation(Vec3::NEG_Y * APART);
-    for (p, n) in lower.samples.points.iter().zip(&lower.samples.normals) {
-        upper.samples.points.push(down * *p);
-        upper.samples.normals.push(-*n);
-    }
-    if let (
-        Ok(Mesh {
-            vertices,
-            triangles,
-            ..
-        }),
-        Ok(other),
-    ) = (&mut upper.mesh, &lower.mesh)
-    {
-        let first = vertices.len() as u32;
-        vertices.extend(other.vertices.iter().map(|p| down * *p));
-        triangles.extend(
-            other
-                .triangles
-                .iter()
-                .map(|[a, b, c]| [a + first, c + first, b + first]),
-        );
-    }
-    let (pose, shape) = slab(Vec2::ZERO, size, SPACING, Backing::Film);
-    upper.primitive = Ok(vec![(pose, shape.clone()), (down * pose, shape)]);
-    upper
+    let mut sheet = || Surface::flat(Vec2::splat(EDGE), SPACING, Backing::Film, rng);
+    let (upper, lower) = (sheet(), sheet());
+    let turned = Quat::from_rotation_x(std::f32::consts::PI);
+    upper.joined(&lower.moved(&Pose::from_parts(Vec3::NEG_Y * APART, turned)))
 }
 
 fn two_sheets(

@@ -1,6 +1,6 @@
 //! One drop: its random parameters, its run, and whether the body passed.
 
-use crate::suite::arena::{Arena, DT, GRAVITY, Material, Placed};
+use crate::suite::arena::{Arena, DT, GRAVITY, Material, Placed, SamePoints};
 use crate::suite::case::{Setup, Stop};
 use crate::suite::scan_spots::spots;
 use crate::suite::surface::{Backing, Normals, Surface};
@@ -150,11 +150,7 @@ impl Plan {
             aim,
             start: Vec3::new(aim.x, 0.0, aim.y) - direction * way,
             oriented: rng.bool(),
-            wave_phase: if is_waving {
-                between(0.0, TAU, rng)
-            } else {
-                0.0
-            },
+            wave_phase: if is_waving { between(0.0, TAU, rng) } else { 0.0 },
         }
     }
 
@@ -271,7 +267,7 @@ fn watch(
     for _ in 0..(plan.steps_to_impact() + STEPS_AFTER).min(MOST_STEPS) {
         seconds += DT;
         if let Some(waves) = waves {
-            arena.reshape(waves, &plan.waves(seconds, rng))?;
+            arena.reshape(waves, &plan.waves(seconds, rng), SamePoints::No)?;
         }
         arena.step()?;
         let at = arena.position(body);

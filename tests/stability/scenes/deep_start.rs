@@ -1,0 +1,125 @@
+//! Bodies that start inside a floor or inside each other.
+
+use crate::suite::arena::{Arena, DT, Material};
+use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::surface::Surface;
+use fastrand::Rng;
+use rapier3d::prelude::*;
+use tldi::glamx::Vec3;
+
+/// The scene.
+pub(crate) const SCENE: Scene = Scene {
+    name: "deep-start",
+    about: "Boxes and balls of 0.2 m start 10 to 80 % inside a floor (a box of 1 × 0.6 × 1 m) or \
+            inside each other (there without gravity); r̄ = 2 cm.",
+    rule: "Out of the nearer side within 3 s: on the floor within r̄ of the height at which it rests, \
+           apart from each other to within r̄, and when they first are, more along the line on which \
+           they overlapped than sideways; never faster than 2 m/s.",
+    cases,
+};
+
+const SPACING: f32 = 0.02;
+const HALF: f32 = 0.1;
+const FLOOR_HALF: Vec3 = Vec3::new(0.5, 0.3, 0.5);
+const SECONDS: f32 = 3.0;
+
+fn cases(scale: &Scale) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for &seed in &scale.seeds {
+        for is_ball in [false, true] {
+            for percent in [10, 30, 50, 80] {
+                let body = if is_ball { "ball" } else { "box" };
+                let share = percent as f32 / 100.0;
+                let name = format!("{body} in the floor, {percent} %");
+                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
+                    in_floor(setup, verdict, is_ball, share, seed)
+                }));
+                let name = format!("two {body}es, {percent} %").replace("balles", "balls");
+                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
+                    in_each_other(setup, verdict, is_ball, share, seed)
+                }));
+            }
+        }
+    }
+    cases
+}
+
+fn body(is_ball: bool, rng: &mut Rng) -> Surface {
+    if is_ball {
+        Surface::ball(HALF, SPACING)
+    } else {
+        Surface::cuboid(Vec3::splat(HALF), SPACING, rng)
+    }
+}
+
+fn in_floor(
+    setup: &Setup,
+    verdict: &mut Verdict,
+    is_ball: bool,
+    share: f32,
+    seed: u64,
+) -> Result<(), Stop> {
+    let mut rng = Rng::with_seed(seed);
+    let mut arena = Arena::new(setup)?;
+    let floor = Surface::cuboid(FLOOR_HALF, SPACING, &mut rng);
+    let below = RigidBodyBuilder::fixed().translation(Vec3::NEG_Y * FLOOR_HALF.y);
+    arena.insert(below, &floor, Material::default())?;
+    let depth = 2.0 * HALF * share;
+    let builder = RigidBodyBuilder::dynamic().translation(Vec3::Y * (HALF - depth));
+    let placed = arena.insert(builder, &body(is_ball, &mut rng), Material::default())?;
+    let mut fastest = 0.0_f32;
+    for _ in 0..(SECONDS / DT) as usize {
+        arena.step()?;
+        fastest = fastest.max(arena.speed(&placed));
+    }
+    let at = arena.position(&placed);
+    verdict.near("height_error_mean_radii", (at.y - HALF) / SPACING, 0.0, 1.0);
+    verdict.at_most("fastest_m_s", fastest, 2.0);
+    verdict.note("shift_mean_radii", at.with_y(0.0).length() / SPACING);
+    Ok(())
+}
+
+fn in_each_other(
+    setup: &Setup,
+    verdict: &mut Verdict,
+    is_ball: bool,
+    share: f32,
+    seed: u64,
+) -> Result<(), Stop> {
+    let mut rng = Rng::with_seed(seed);
+    let mut arena = Arena::new(setup)?;
+    arena.world.gravity = Vec3::ZERO;
+    let offset = HALF * (1.0 - share);
+    let mut placed = Vec::new();
+    for side in [-1.0, 1.0] {
+        let builder = RigidBodyBuilder::dynamic().translation(Vec3::X * (side * offset));
+        placed.push(arena.insert(builder, &body(is_ball, &mut rng), Material::default())?);
+    }
+    let mut fastest = 0.0_f32;
+    let mut at_parting: Option<Vec3> = None;
+    for _ in 0..(SECONDS / DT) as usize {
+        arena.step()?;
+        let apart = (arena.position(&placed[1]) - arena.position(&placed[0])).abs();
+        let distance = if is_ball { apart.length() } else { apart.max_element() };
+        if distance >= 2.0 * HALF - SPACING {
+            at_parting.get_or_insert(apart);
+        }
+        fastest = placed.iter().map(|p| arena.speed(p)).fold(fastest, f32::max);
+    }
+    match at_parting {
+        Some(apart) => {
+            verdict.note("parting_along_x_m", apart.x);
+            verdict.note("parting_sideways_m", apart.with_x(0.0).length());
+            verdict.require(apart.x > apart.with_x(0.0).length(), || {
+                format!("they part sideways: {apart:.3}")
+            });
+        }
+        None => {
+            let apart = arena.position(&placed[1]).distance(arena.position(&placed[0]));
+            verdict.note("distance_m", apart);
+            verdict.require(false, || format!("still in each other, {apart:.3} m apart"));
+        }
+    }
+    verdict.at_most("fastest_m_s", fastest, 2.0);
+    Ok(())
+}

@@ -1,0 +1,120 @@
+//! Balls that roll, rods and tops that spin on a plane.
+
+use crate::suite::arena::{Arena, DT, Material};
+use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::surface::{Backing, Surface};
+use fastrand::Rng;
+use rapier3d::prelude::*;
+use tldi::glamx::{Vec2, Vec3};
+
+/// The scene.
+pub(crate) const SCENE: Scene = Scene {
+    name: "roll-spin",
+    about: "A ball of 0.3 m rolls 10 m, a rod of 0.6 m spins flat on the floor at 10 rad/s, and a \
+            round top (a ball) spins upright at 50 rad/s; r̄ = 2 cm.",
+    rule: "Way of the ball in 10 m / v seconds, angle and speed of the spins after 1 s within 5 % of \
+           the primitive's (of the initial spin's where that is larger); the ball's heading within \
+           1°; rod and top stay within r̄ of their place.",
+    cases,
+};
+
+const SPACING: f32 = 0.02;
+const RADIUS: f32 = 0.15;
+const WAY: f32 = 10.0;
+const SPIN_SECONDS: f32 = 1.0;
+/// Half extents of the rod, metres.
+const ROD: Vec3 = Vec3::new(0.3, 0.04, 0.04);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Spinner {
+    Rod,
+    Top,
+}
+
+impl Spinner {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Rod => "rod at 10 rad/s",
+            Self::Top => "top at 50 rad/s",
+        }
+    }
+
+    /// Surface, height of its middle in metres, spin in rad/s.
+    fn parts(self, rng: &mut Rng) -> (Surface, f32, f32) {
+        match self {
+            Self::Rod => (Surface::cuboid(ROD, SPACING, rng), ROD.y, 10.0),
+            Self::Top => (Surface::ball(RADIUS, SPACING), RADIUS, 50.0),
+        }
+    }
+}
+
+fn cases(scale: &Scale) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for &seed in &scale.seeds {
+        for speed in [1.0, 3.0, 6.0] {
+            let name = format!("ball at {speed} m/s");
+            cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
+                roll(setup, verdict, speed, seed)
+            }));
+        }
+        for spinner in [Spinner::Rod, Spinner::Top] {
+            cases.push(Case::new(SCENE.name, spinner.name(), seed, move |setup, verdict| {
+                spin(setup, verdict, spinner, seed)
+            }));
+        }
+    }
+    cases
+}
+
+/// Displacement of a ball that starts rolling at this speed.
+fn way_of_ball(setup: &Setup, speed: f32, seed: u64) -> Result<Vec3, Stop> {
+    let mut rng = Rng::with_seed(seed);
+    let mut arena = Arena::new(setup)?;
+    let size = Vec2::new(WAY + 2.0, 1.2);
+    let floor = Surface::flat(size, SPACING, Backing::Solid, &mut rng);
+    let middle = Vec3::X * (0.5 * size.x - 1.0);
+    arena.insert(RigidBodyBuilder::fixed().translation(middle), &floor, Material::default())?;
+    let body = RigidBodyBuilder::dynamic()
+        .translation(Vec3::Y * RADIUS)
+        .linvel(Vec3::X * speed)
+        .angvel(Vec3::NEG_Z * (speed / RADIUS));
+    let ball = arena.insert(body, &Surface::ball(RADIUS, SPACING), Material::default())?;
+    arena.steps((WAY / speed / DT) as usize)?;
+    Ok(arena.position(&ball).with_y(0.0))
+}
+
+fn roll(setup: &Setup, verdict: &mut Verdict, speed: f32, seed: u64) -> Result<(), Stop> {
+    let truth = f64::from(way_of_ball(&setup.of_primitive(), speed, seed)?.length());
+    let way = way_of_ball(setup, speed, seed)?;
+    verdict.near("way_m", way.length(), truth, 0.05 * truth);
+    verdict.at_most("heading_deg", way.z.atan2(way.x).to_degrees().abs(), 1.0);
+    Ok(())
+}
+
+/// Angle turned about the vertical, spin left, and shift sideways.
+fn spun(setup: &Setup, spinner: Spinner, seed: u64) -> Result<[f32; 3], Stop> {
+    let mut rng = Rng::with_seed(seed);
+    let mut arena = Arena::new(setup)?;
+    let floor = Surface::flat(Vec2::splat(1.0), SPACING, Backing::Solid, &mut rng);
+    arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;
+    let (surface, height, rate) = spinner.parts(&mut rng);
+    let body = RigidBodyBuilder::dynamic().translation(Vec3::Y * height).angvel(Vec3::Y * rate);
+    let body = arena.insert(body, &surface, Material::default())?;
+    let mut angle = 0.0;
+    for _ in 0..(SPIN_SECONDS / DT) as usize {
+        arena.step()?;
+        angle += arena.body(&body).angvel().y * DT;
+    }
+    let shift = arena.position(&body).with_y(0.0).length();
+    Ok([angle, arena.body(&body).angvel().y, shift])
+}
+
+fn spin(setup: &Setup, verdict: &mut Verdict, spinner: Spinner, seed: u64) -> Result<(), Stop> {
+    let [angle, rate, _] = spun(&setup.of_primitive(), spinner, seed)?.map(f64::from);
+    let ours = spun(setup, spinner, seed)?;
+    let initial = f64::from(spinner.parts(&mut Rng::with_seed(seed)).2);
+    verdict.near("angle_rad", ours[0], angle, 0.05 * angle.abs());
+    verdict.near("spin_left_rad_s", ours[1], rate, 0.05 * rate.abs().max(initial));
+    verdict.at_most("shift_mean_radii", ours[2] / SPACING, 1.0);
+    Ok(())
+}

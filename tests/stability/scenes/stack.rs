@@ -1,0 +1,66 @@
+//! A tower of boxes.
+
+use crate::suite::arena::{Arena, DT, Material, Placed};
+use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::surface::{Backing, Normals, Surface};
+use fastrand::Rng;
+use rapier3d::prelude::*;
+use tldi::glamx::{Vec2, Vec3};
+
+/// The scene.
+pub(crate) const SCENE: Scene = Scene {
+    name: "stack",
+    about: "10 boxes of 0.2 m, each a cloud of its own (r̄ = 2 cm), one on the other on a plane.",
+    rule: "Stands for 10 s: the top box drifts ≤ r̄ sideways, and is within 10 r̄ (1 r̄ a box) of its \
+           height.",
+    cases,
+};
+
+const SPACING: f32 = 0.02;
+const HALF: f32 = 0.1;
+const BOXES: usize = 10;
+const SECONDS: f32 = 10.0;
+
+fn cases(scale: &Scale) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for &seed in &scale.seeds {
+        for (normals, kind) in [(Normals::Given, "oriented"), (Normals::Absent, "bare")] {
+            let name = format!("10 boxes, {kind}");
+            cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
+                stack(setup, verdict, normals, seed)
+            }));
+        }
+    }
+    cases
+}
+
+fn stack(setup: &Setup, verdict: &mut Verdict, normals: Normals, seed: u64) -> Result<(), Stop> {
+    let mut rng = Rng::with_seed(seed);
+    let mut arena = Arena::new(setup)?;
+    let floor = Surface::flat(Vec2::splat(1.0), SPACING, Backing::Solid, &mut rng);
+    let floor = floor.with_normals(normals);
+    arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;
+    let mut boxes: Vec<Placed> = Vec::new();
+    for k in 0..BOXES {
+        let surface = Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng).with_normals(normals);
+        let height = HALF * (2 * k + 1) as f32;
+        let body = RigidBodyBuilder::dynamic().translation(Vec3::Y * height);
+        boxes.push(arena.insert(body, &surface, Material::default())?);
+    }
+    let (Some(bottom), Some(top)) = (boxes.first(), boxes.last()) else {
+        return Ok(());
+    };
+    let mut drift = 0.0_f32;
+    for _ in 0..(SECONDS / DT) as usize {
+        arena.step()?;
+        drift = drift.max(arena.position(top).with_y(0.0).length());
+    }
+    let height = arena.position(top).y - HALF * (2 * BOXES - 1) as f32;
+    verdict.at_most("top_drift_mean_radii", drift / SPACING, 1.0);
+    verdict.near("top_height_error_mean_radii", height / SPACING, 0.0, BOXES as f64);
+    verdict.note("bottom_height_error_mean_radii", (arena.position(bottom).y - HALF) / SPACING);
+    verdict.note("end_speed_m_s", arena.speed(top));
+    let awake = boxes.iter().filter(|b| !arena.body(b).is_sleeping()).count();
+    verdict.note("awake", awake as f64);
+    Ok(())
+}
