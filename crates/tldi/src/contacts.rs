@@ -63,6 +63,6 @@ pub struct ContactPatch {
     pub normal: Vec3,
     /// One to [`PATCH_POINTS`] points.
     pub points: arrayvec::ArrayVec<ContactPoint, PATCH_POINTS>,
-    /// Whether the gaps form a bowl with one lowest point, the first: what touches there rolls.
+    /// Whether the gaps form a bowl, whose lowest point is the only one: what touches there rolls.
     pub is_round: bool,
 }

@@ -323,17 +323,25 @@ impl Shape {
         let supports = supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
         let rises = supports.roughness >= LEAST_RISE * params.pixel_size;
         let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
+        if let Some(lowest) = lowest_of_bowl {
+            // Around it the surfaces have other normals: points there would stop what rolls.
+            return ContactPatch {
+                normal: self.normal,
+                points: [lowest].into_iter().collect(),
+                is_round: true,
+            };
+        }
+        let mut patch = ContactPatch {
+            normal: self.normal,
+            points: supports.indices.into_iter().map(|k| points[k]).collect(),
+            is_round: false,
+        };
+        patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
+        let deepest = self.deepest(points, params);
         let unevenness = match rises {
             true => supports.roughness_about_bowl,
             false => supports.roughness,
         };
-        let mut patch = ContactPatch {
-            normal: self.normal,
-            points: supports.indices.into_iter().map(|k| points[k]).collect(),
-            is_round: lowest_of_bowl.is_some(),
-        };
-        patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
-        let deepest = lowest_of_bowl.unwrap_or_else(|| self.deepest(points, params));
         if deepest.gap < patch.points[0].gap - DEEPER * unevenness {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);

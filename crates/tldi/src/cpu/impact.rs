@@ -5,10 +5,11 @@
 //! impact's. No surface is too thin for that, and none too fast: the images hold all that the
 //! motion passes.
 
-use super::columns::dilate;
-use super::cull::{self, Region};
+use super::columns::{Columns, dilate};
+use super::cull::{self, PointRadii, Region};
 use super::pair::{Scratch, is_oriented, ring};
 use super::side::{CloudView, ExactView};
+use super::splat::splat_radius;
 use super::sweep::is_edge_on;
 use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Params, Surface, Tldi, VirtualCamera};
 use glamx::{Pose3, Vec3};
@@ -19,7 +20,7 @@ use glamx::{Pose3, Vec3};
 const RIM: i32 = 3;
 
 /// Pixels around an image that tell its rim from its edge: the rim, and one for the closing.
-const BORDER: i32 = RIM + 1;
+pub(super) const BORDER: i32 = RIM + 1;
 
 /// Band above the least distance, in pixels, whose normals are averaged.
 const NORMAL_BAND: f32 = 0.5;
@@ -73,8 +74,14 @@ impl Scratch {
         self.images_of_motion(query, &camera, length)?;
         let (a, b) = (&self.a.image, &self.b.image);
         if query.core_only {
-            self.core
-                .find(b, &covered_by_bounds(&query.b, &query.a_from_b, &camera));
+            match query.b {
+                Surface::Cloud(cloud) => {
+                    let radius = PointRadii::new(cloud, &self.b.points).mean();
+                    self.core.cover_by_points(b, &self.b.columns, radius);
+                }
+                Surface::Exact(_) => self.core.cover_by_image(b),
+            }
+            self.core.find(b.size[0]);
         }
         self.meetings.clear();
         for pixel in 0..b.pixel_count() {
@@ -138,8 +145,10 @@ impl Scratch {
         if !seen_a.intersects(&met_by_b) {
             return None;
         }
-        // Which layer leads is told by what is before it.
+        // Which layer leads is told by what is before it; what is of the rim, by what is beside it.
         meeting_a.max.z = meeting_a.max.z.max(seen_b.max.z);
+        let beside = (BORDER + 1) as f32 * query.params.pixel_size * Vec3::new(1.0, 1.0, 0.0);
+        (meeting_a.min, meeting_a.max) = (meeting_a.min - beside, meeting_a.max + beside);
         if is_oriented(&query.a) {
             // Whether `b` is inside is told by what is behind it.
             met_by_b.min.z = met_by_b.min.z.min(seen_a.min.z);
@@ -225,38 +234,49 @@ impl Scratch {
     }
 }
 
-/// Least and greatest pixel coordinates that the splats of a surface cover, by its bounds.
-fn covered_by_bounds(
-    surface: &Surface,
-    frame_from_surface: &Pose3,
-    camera: &VirtualCamera,
-) -> [[f32; 2]; 2] {
-    let view_from_surface = camera.view_from_frame * *frame_from_surface;
-    let bounds = surface.bounds().loosened(surface.mean_radius());
-    let seen = bounds.transformed(&view_from_surface);
-    [seen.min, seen.max].map(|corner| camera.pixel_from_view(corner))
-}
-
 impl CoreScratch {
-    /// Finds the pixels of `image` that are not of its rim. Beyond the image, which holds only what
-    /// can be met, it is taken to go on between the pixel coordinates `first` and `last`.
-    fn find(&mut self, image: &Tldi, [first, last]: &[[f32; 2]; 2]) {
+    /// Covers what `image` covers. Beyond it, its border goes on.
+    fn cover_by_image(&mut self, image: &Tldi) {
         let [width, height] = image.size.map(|n| n as i32);
-        let row = (width + 2 * BORDER) as usize;
         self.covered.clear();
         for j in -BORDER..height + BORDER {
             for i in -BORDER..width + BORDER {
-                let inside = (0..width).contains(&i) && (0..height).contains(&j);
-                let covered = match inside {
-                    true => !image.layers_of((j * width + i) as usize).is_empty(),
-                    false => [i, j].into_iter().enumerate().all(|(k, c)| {
-                        let middle = (image.origin[k] + c) as f32 + 0.5;
-                        (first[k]..=last[k]).contains(&middle)
-                    }),
-                };
+                let pixel = j.clamp(0, height - 1) * width + i.clamp(0, width - 1);
+                let covered = !image.layers_of(pixel as usize).is_empty();
                 self.covered.push(u8::from(covered));
             }
         }
+    }
+
+    /// Covers the pixels in and around `image` within `radius` metres of a point.
+    fn cover_by_points(&mut self, image: &Tldi, points: &Columns, radius: f32) {
+        let dims = image.size.map(|n| n as i32 + 2 * BORDER);
+        let first = image.origin.map(|o| (o - BORDER) as f32);
+        let radius_px =
+            splat_radius(radius, image.camera.pixel_size_at(0.0)) / image.camera.pixel_size_at(0.0);
+        self.covered.clear();
+        self.covered.resize((dims[0] * dims[1]) as usize, 0);
+        for k in 0..points.x.len() {
+            let [u, v] = image.camera.pixel_from_view(points.view(k));
+            let (u, v) = (u - first[0], v - first[1]);
+            let range = |c: f32, dim: i32| {
+                let from = (c - radius_px - 0.5).ceil().max(0.0) as i32;
+                from..dim.min((c + radius_px + 0.5).floor() as i32)
+            };
+            for j in range(v, dims[1]) {
+                for i in range(u, dims[0]) {
+                    let (du, dv) = (i as f32 + 0.5 - u, j as f32 + 0.5 - v);
+                    if du * du + dv * dv <= radius_px * radius_px {
+                        self.covered[(j * dims[0] + i) as usize] = 1;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Leaves of what is covered what is not of its rim; the image is `width` pixels wide.
+    fn find(&mut self, width: u32) {
+        let row = width as usize + 2 * BORDER as usize;
         // Closed first: a gap of a pixel in the cover is no rim.
         let (covered, inner, depth) = (&mut self.covered, &mut self.inner, &mut self.depth);
         inner.clone_from(covered);

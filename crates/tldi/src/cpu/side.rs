@@ -3,6 +3,7 @@
 use super::cast::{self, Rays};
 use super::columns::{Columns, Tiles, Touching};
 use super::cull::{CullScratch, PointRadii, Survivors};
+use super::impact::BORDER;
 use super::normals::{self, NormalScratch};
 use super::splat::{DepthScale, Footprint, Fragments, Imaging, SplatPoints};
 use super::sweep;
@@ -51,7 +52,7 @@ pub(super) struct ExactView<'a> {
     pub(super) frame_from_surface: &'a Pose3,
     /// How far beyond the cloud the surface is of interest, metres.
     pub(super) reach: f32,
-    /// Whether it is looked at where the cloud is not.
+    /// Whether it is looked at where the cloud is not, and around.
     pub(super) everywhere: bool,
 }
 
@@ -233,7 +234,10 @@ impl Side {
         hits: &mut Vec<RayHit>,
         image: &mut Tldi,
     ) -> Option<()> {
-        let seen = self.project(view)?;
+        let mut seen = self.project(view)?;
+        if exact.everywhere {
+            seen.rect = seen.rect.grown(BORDER);
+        }
         self.whole_image(view, &seen);
         // Rays must pass through all of the surface, or what is deepest would be missed.
         let extent = exact.surface.bounds().extents().length();

@@ -115,6 +115,14 @@ impl Rect {
         )
     }
 
+    /// The rectangle and `border` pixels on all sides of it.
+    pub(crate) fn grown(&self, border: i32) -> Self {
+        Self {
+            origin: self.origin.map(|o| o - border),
+            size: self.size.map(|n| n + 2 * border as u32),
+        }
+    }
+
     pub(crate) fn pixels(&self) -> usize {
         self.size[0] as usize * self.size[1] as usize
     }
