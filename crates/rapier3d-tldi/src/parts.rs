@@ -133,12 +133,7 @@ pub(crate) fn append_part_pairs<'a>(
             if !within_reach(part1, part2, &a_from_b, prediction) {
                 continue;
             }
-            let radius = [part1, part2]
-                .into_iter()
-                .filter_map(cloud_of)
-                .map(|shape| shape.cloud().mean_radius())
-                .reduce(f32::max);
-            let comparison = radius.map(|radius| {
+            let comparison = config.params([part1, part2], prediction).map(|params| {
                 let a = part1.compute_local_aabb().loosened(prediction);
                 let b = part2.compute_aabb(&a_from_b);
                 let Hint { motion, last_axis } = hint([i, j], pose1, middle_of_meeting(&a, &b));
@@ -150,8 +145,8 @@ pub(crate) fn append_part_pairs<'a>(
                         motion,
                         last_axis,
                     },
-                    params: config.params(radius, prediction),
-                    scatter: config.scatter * radius,
+                    params,
+                    scatter: config.scatter * 0.5 * params.merge_gap,
                     query,
                 }
             });

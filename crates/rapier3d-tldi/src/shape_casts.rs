@@ -5,7 +5,7 @@
 //! met, so that an impact is found too early rather than too late.
 
 use crate::exact::ExactShape;
-use crate::parts::{ShapePair, cloud_of, has_cloud, part, part_count, surface};
+use crate::parts::{ShapePair, has_cloud, part, part_count, surface};
 use crate::prepared::Shared;
 use crate::{TldiConfig, queries};
 use rapier3d::math::{Pose, Vector};
@@ -71,11 +71,7 @@ impl<'a> Moving<'a> {
     }
 
     fn params(&self, config: &TldiConfig) -> Option<Params> {
-        let radii = self.parts.iter().filter_map(|part| cloud_of(*part));
-        let coarsest = radii
-            .map(|shape| shape.cloud().mean_radius())
-            .reduce(f32::max);
-        coarsest.map(|radius| config.params(radius, 0.0))
+        config.params(self.parts, 0.0)
     }
 }
 

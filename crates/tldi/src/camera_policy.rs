@@ -51,9 +51,13 @@ const LEAST_SHARE: f32 = 0.05;
 /// cosine between an axis and the last one.
 const CONCLUSIVE: f32 = 0.3;
 
-/// Weight of the direction to `b` beside the normals of a surface: decides where normals point all
-/// around (balls deep in each other), and turns the axis of a flat contact by 3° at the most.
-const HINT_WEIGHT: f32 = 0.1;
+/// Weight of the direction to `b`, where it plainly lies or comes from there, beside the normals of a
+/// surface: where bodies are deep in each other or their sides are flush, normals point all around.
+/// Turns the axis of a flat contact by 8° at the most.
+const HINT_WEIGHT: f32 = 0.5;
+
+/// Weight of the last axis beside the normals of a surface.
+const MEMORY_WEIGHT: f32 = 0.5;
 
 /// Normals of the near points of one surface.
 #[derive(Clone, Copy)]
@@ -110,12 +114,27 @@ impl Approach {
         }
     }
 
+    /// From `a` towards `b`, unit length or zero.
+    fn direction(&self) -> Vec3 {
+        self.toward_b.normalize_or_zero()
+    }
+
+    /// Half of where the bounds meet, along `axis`, metres.
+    fn half_extent(&self, axis: Vec3) -> f32 {
+        self.half_extents.dot((self.larger_from_a * axis).abs())
+    }
+
+    /// 1 where `b` lies outside of where the bounds meet, or comes from there; less inside.
+    fn plainness(&self) -> f32 {
+        let inside = self.half_extent(self.direction()).max(f32::MIN_POSITIVE);
+        (self.toward_b.length() / inside).min(1.0)
+    }
+
     /// Whether `b` lies on the side of `a` that `axis` points away from, so surely that nothing else
     /// needs to be asked: its middle, or where it came from, is outside of where the bounds meet.
     fn side_by_position(&self, axis: Vec3) -> Option<bool> {
         let along = self.toward_b.dot(axis);
-        let half_extent = self.half_extents.dot((self.larger_from_a * axis).abs());
-        (along.abs() > half_extent).then_some(along < 0.0)
+        (along.abs() > self.half_extent(axis)).then_some(along < 0.0)
     }
 }
 
@@ -162,7 +181,8 @@ fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec
         let rest = |n: Vec3| seen[..views].iter().fold(n, |n, v| n - n.dot(*v) * *v);
         let mut covariance = zone_covariance(sides, &|n| unseen(&n).then(|| rest(n)));
         if views == 0 {
-            covariance += HINT_WEIGHT * outer(approach.toward_b.normalize_or_zero());
+            covariance += HINT_WEIGHT * approach.plainness() * outer(approach.direction());
+            covariance += MEMORY_WEIGHT * outer(approach.last_axis.unwrap_or(Vec3::ZERO));
         }
         let Some(mut axis) = top_eigenvector(&covariance) else {
             break;
@@ -208,7 +228,7 @@ fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3,
     let agrees = conclusive(by_memory)
         .or_else(|| approach.side_by_position(axis))
         .or_else(|| conclusive(by_normals()));
-    let by_position = -axis.dot(approach.toward_b.normalize_or_zero());
+    let by_position = -axis.dot(approach.direction());
     let agrees = agrees.or_else(|| conclusive(by_position));
     if agrees.unwrap_or(by_position >= 0.0) {
         (axis, agrees.is_some())
