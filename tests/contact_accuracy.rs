@@ -1,29 +1,93 @@
-//! The accuracy of contacts against analytic truth.
+//! The accuracy of contacts against analytic truth, at every angle of motion. The chart is drawn by
+//! the binary of the same name.
 
-use tldi_tests::{AccuracyRow, measure_accuracy};
+use std::sync::LazyLock;
+use tldi_tests::{
+    AccuracyRow, ContactPair, DEEP_LIMIT, NORMAL_LIMIT, Regime, SHALLOW_LIMIT, measure_accuracy,
+};
+
+/// An odd number, so that the median is one of them.
+const CASES: usize = 21;
+
+static ROWS: LazyLock<Vec<AccuracyRow>> = LazyLock::new(|| measure_accuracy(CASES, 1, |_| ()));
+
+/// Asserts that the medians of every bin of the rows that `keep` accepts are within the limits: of
+/// the normal in degrees, of the depth in r̄ up to 2 r̄ and in parts of the depth beyond.
+fn check(keep: impl Fn(&AccuracyRow) -> bool, normal: f32, shallow: f32, deep: f32) {
+    let mut failed = Vec::new();
+    let mut count = 0;
+    for row in ROWS.iter().filter(|row| keep(row)) {
+        count += 1;
+        let depth = match row.regime {
+            Regime::Shallow => shallow,
+            Regime::Deep => deep,
+        };
+        if row.normal_median > normal || row.depth_median > depth || row.missed > 0 {
+            failed.push(row.to_string());
+        }
+    }
+    assert!(count > 0);
+    assert!(failed.is_empty(), "\n{}", failed.join("\n"));
+}
+
+fn is_box(row: &AccuracyRow) -> bool {
+    matches!(row.pair, ContactPair::BoxPlane | ContactPair::BoxRamp)
+}
+
+fn is_sphere(row: &AccuracyRow) -> bool {
+    matches!(
+        row.pair,
+        ContactPair::SphereSphere | ContactPair::SpherePlane
+    )
+}
 
 #[test]
-fn contacts_are_accurate_at_every_angle_of_motion() {
-    measure_accuracy(21, 1, |r: &AccuracyRow| {
-        let ok = r.normal_error[0] <= 1.0
-            && r.depth_error[0]
-                <= match r.regime.name() {
-                    "shallow" => 0.1,
-                    _ => 0.05,
-                };
-        eprintln!(
-            "{} {:15} {:8} {:2}0 deg missed {:2} normal med {:7.3} max {:7.2} depth med {:6.3} max {:6.3} bias {:+6.3} {}",
-            if r.with_normals { "given" } else { "none " },
-            r.pair.name(),
-            r.regime.name(),
-            r.angle_bin,
-            r.missed,
-            r.normal_error[0],
-            r.normal_error[1],
-            r.depth_error[0],
-            r.depth_error[1],
-            r.depth_bias,
-            if ok { "" } else { "FAILS" }
-        );
-    });
+fn spheres() {
+    check(is_sphere, NORMAL_LIMIT, SHALLOW_LIMIT, DEEP_LIMIT);
+}
+
+#[test]
+fn box_faces_with_normals() {
+    let keep = |row: &AccuracyRow| is_box(row) && row.with_normals;
+    check(keep, NORMAL_LIMIT, SHALLOW_LIMIT, DEEP_LIMIT);
+}
+
+/// Estimated normals bend at the rim of the face, and the splats there reach too deep: 0.16 r̄ of a
+/// wanted 0.1 r̄.
+#[test]
+fn box_faces_without_normals_reach_too_deep_at_the_rim() {
+    let keep = |row: &AccuracyRow| is_box(row) && !row.with_normals;
+    check(keep, NORMAL_LIMIT, 0.2, DEEP_LIMIT);
+}
+
+/// Pixels as large as the spacing round edges and corners off: these are seen too high, by 0.3 r̄ to
+/// 0.6 r̄ of a wanted 0.1 r̄, and deep by 6 % and 12 % of a wanted 5 %. Deep normals mix in the faces
+/// that are given: 2° of a wanted 1°.
+#[test]
+fn edges_and_corners_are_blunt() {
+    for (pair, shallow, deep) in [
+        (ContactPair::EdgePlane, 0.45, 0.11),
+        (ContactPair::CornerPlane, 0.75, 0.2),
+    ] {
+        for (regime, with_normals, normal) in [
+            (Regime::Shallow, true, 2.0),
+            (Regime::Deep, true, 4.0),
+            (Regime::Shallow, false, NORMAL_LIMIT),
+            (Regime::Deep, false, NORMAL_LIMIT),
+        ] {
+            let keep = |row: &AccuracyRow| {
+                row.pair == pair && row.regime == regime && row.with_normals == with_normals
+            };
+            check(keep, normal, shallow, deep);
+        }
+    }
+}
+
+/// Contacts are on the wrong side only without normals, and where the hint says nothing.
+#[test]
+fn sides() {
+    for row in ROWS.iter() {
+        let hint_tells = row.with_normals || row.angle_bin < 8;
+        assert!(row.normal_max < 90.0 || !hint_tells, "{row}");
+    }
 }

@@ -166,6 +166,22 @@ fn box_on_plane() {
     }
 }
 
+/// The bounds of a floor hold its surface only: a tall box is seen to its bottom far below them.
+#[test]
+fn a_box_deep_in_a_floor() {
+    let mut rng = fastrand::Rng::with_seed(9);
+    let half = Vec3::new(0.1, 0.4, 0.1);
+    let plane = sampled_plane(0.6, R, &mut rng).cloud(R);
+    let boxed = sampled_box(half, R, &mut rng).cloud(R);
+    let depth = 25.0 * R;
+    let on_top = Pose3::new(Vec3::Y * (half.y - depth), Vec3::Y * 0.3);
+    for (a, b, pose) in [(&plane, &boxed, on_top), (&boxed, &plane, on_top.inverse())] {
+        let gap = least_patch_gap(&clouds(a, b, pose));
+        // Faces with exact normals: what is left is the fixed-point step.
+        assert!((gap + depth).abs() < 0.02 * R, "{gap}");
+    }
+}
+
 /// A box in a corner touches floor and wall, each with its own normal: a cube, which one view
 /// between both sees, and a slab, whose narrow side takes a view of its own.
 #[test]

@@ -1,6 +1,8 @@
 //! How well the comparison measures contacts of known normal and depth, by angle of motion.
 
 use crate::{Samples, random_unit, sampled_box, sampled_plane, sampled_ramp, sampled_sphere};
+use serde::Serialize;
+use std::fmt;
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi::{
     Backend, CameraPolicy, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View,
@@ -31,8 +33,17 @@ pub const ANGLE_STEP: usize = 10;
 /// Bins of angles, 0 to 90°.
 pub const ANGLE_BINS: usize = 90 / ANGLE_STEP;
 
+/// Limits of the medians in each bin: of the normal's error in degrees, and of the depth's in r̄ up
+/// to 2 r̄ and in parts of the depth beyond.
+pub const NORMAL_LIMIT: f32 = 1.0;
+/// See [`NORMAL_LIMIT`].
+pub const SHALLOW_LIMIT: f32 = 0.1;
+/// See [`NORMAL_LIMIT`].
+pub const DEEP_LIMIT: f32 = 0.05;
+
 /// A pair of shapes in contact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ContactPair {
     /// A sphere in a sphere.
     SphereSphere,
@@ -73,7 +84,8 @@ impl ContactPair {
 }
 
 /// How deep the surfaces are in each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Regime {
     /// Up to 2 r̄.
     Shallow,
@@ -111,8 +123,8 @@ impl Regime {
     }
 }
 
-/// Errors of the contacts of one pair, in one bin of angles.
-#[derive(Clone, Debug)]
+/// Errors of the contacts of one pair, in one bin of angles. Infinite (`null` as JSON): missed.
+#[derive(Clone, Debug, Serialize)]
 pub struct AccuracyRow {
     /// The shapes.
     pub pair: ContactPair,
@@ -127,13 +139,40 @@ pub struct AccuracyRow {
     pub cases: usize,
     /// Contacts without any patch; their errors count as infinite.
     pub missed: usize,
-    /// Median and greatest angle between measured and true normal, degrees.
-    pub normal_error: [f32; 2],
-    /// Median and greatest absolute error of the deepest point's depth: in r̄ where shallow, in
-    /// parts of the depth where deep.
-    pub depth_error: [f32; 2],
+    /// Median angle between measured and true normal, degrees.
+    pub normal_median: f32,
+    /// Greatest angle between measured and true normal, degrees.
+    pub normal_max: f32,
+    /// Median absolute error of the deepest point's depth: in r̄ where shallow, in parts of the
+    /// depth where deep.
+    pub depth_median: f32,
+    /// Greatest absolute error of the depth.
+    pub depth_max: f32,
     /// Median of the signed error of the depth; positive: too deep.
     pub depth_bias: f32,
+}
+
+impl fmt::Display for AccuracyRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let from = self.angle_bin * ANGLE_STEP;
+        write!(
+            f,
+            "{:7} {:15} {:8} {:2}–{:2}° {:3} missed {:3}, normal {:7.2}° (max {:6.2}°), depth {:6.3} \
+             (max {:6.3}, bias {:+6.3})",
+            if self.with_normals { "normals" } else { "none" },
+            self.pair.name(),
+            self.regime.name(),
+            from,
+            from + ANGLE_STEP,
+            self.cases,
+            self.missed,
+            self.normal_median,
+            self.normal_max,
+            self.depth_median,
+            self.depth_max,
+            self.depth_bias,
+        )
+    }
 }
 
 /// Clouds in a pose to each other, with the truth.
@@ -243,8 +282,12 @@ fn on_a_corner(rng: &mut fastrand::Rng) -> Quat {
     }
 }
 
-/// Measures `cases` contacts for each pair, regime and bin of angles, with and without normals.
-/// `done` is called after each row.
+/// Number of rows that [`measure_accuracy`] gives.
+pub const ACCURACY_ROWS: usize = 2 * ContactPair::ALL.len() * Regime::ALL.len() * ANGLE_BINS;
+
+/// Measures `cases` contacts for each pair, regime and bin of angles, with and without normals:
+/// at random places, rotations and depths, the camera aimed with the angle of the bin between the
+/// hint and the true normal. The deepest patch is judged. `done` is called after each row.
 pub fn measure_accuracy(
     cases: usize,
     seed: u64,
@@ -341,9 +384,10 @@ impl Errors {
             [errors[errors.len() / 2], errors[errors.len() - 1]]
         };
         let cases = self.normal.len();
-        let normal_error = median_and_max(&mut self.normal);
+        let [normal_median, normal_max] = median_and_max(&mut self.normal);
         let [depth_bias, _] = median_and_max(&mut self.depth);
         let mut depth: Vec<f32> = self.depth.iter().map(|error| error.abs()).collect();
+        let [depth_median, depth_max] = median_and_max(&mut depth);
         AccuracyRow {
             pair,
             with_normals,
@@ -351,8 +395,10 @@ impl Errors {
             angle_bin,
             cases,
             missed: self.missed,
-            normal_error,
-            depth_error: median_and_max(&mut depth),
+            normal_median,
+            normal_max,
+            depth_median,
+            depth_max,
             depth_bias,
         }
     }

@@ -8,7 +8,10 @@ mod random;
 mod shapes;
 mod sheets;
 
-pub use accuracy::{ANGLE_BINS, ANGLE_STEP, AccuracyRow, ContactPair, Regime, measure_accuracy};
+pub use accuracy::{
+    ACCURACY_ROWS, ANGLE_BINS, ANGLE_STEP, AccuracyRow, ContactPair, DEEP_LIMIT, NORMAL_LIMIT,
+    Regime, SHALLOW_LIMIT, measure_accuracy,
+};
 pub use data::{data_file, load_cloud};
 pub use oracle::{OracleFragment, oracle_layers};
 pub use pairs::{aimed, compare, compare_clouds, deepest_point};

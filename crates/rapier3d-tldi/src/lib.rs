@@ -54,6 +54,7 @@ mod batching;
 mod candidates;
 mod collider;
 mod config;
+mod debug_render;
 mod dispatcher;
 mod error;
 mod exact;
@@ -73,6 +74,7 @@ mod surface_motion;
 
 pub use collider::cloud_collider;
 pub use config::TldiConfig;
+pub use debug_render::{DEBUG_POINT_LIMIT, TldiDebugRenderMode};
 pub use dispatcher::TldiDispatcher;
 pub use error::TldiError;
 pub use exact::ExactShape;

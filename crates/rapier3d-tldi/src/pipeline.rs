@@ -395,6 +395,11 @@ impl TldiPipeline {
         cloud_pairs(narrow_phase, colliders).flat_map(|pair| contacts_of(pair, colliders))
     }
 
+    /// The settings.
+    pub(crate) fn config(&self) -> &TldiConfig {
+        &self.shared.config
+    }
+
     /// Whether the narrow phase asks this pipeline.
     pub fn is_attached(&self, narrow_phase: &NarrowPhase) -> bool {
         let probe = &self.shared.probe;
