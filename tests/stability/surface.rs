@@ -149,7 +149,12 @@ impl Surface {
     }
 
     /// A flat rectangle of `size` metres (x, z) in y = 0, facing up.
-    pub(crate) fn flat(size: Vec2, spacing: f32, backing: Backing, rng: &mut fastrand::Rng) -> Self {
+    pub(crate) fn flat(
+        size: Vec2,
+        spacing: f32,
+        backing: Backing,
+        rng: &mut fastrand::Rng,
+    ) -> Self {
         let sheet = Sheet::sampled(size, spacing, rng, |_| 0.0);
         Self {
             mesh: Ok(rectangle_mesh(size, backing)),
@@ -252,7 +257,8 @@ impl Surface {
         if let (Ok(mesh), Ok(more)) = (&mut self.mesh, &other.mesh) {
             let first = mesh.vertices.len() as u32;
             mesh.vertices.extend(&more.vertices);
-            mesh.triangles.extend(more.triangles.iter().map(|t| t.map(|i| first + i)));
+            mesh.triangles
+                .extend(more.triangles.iter().map(|t| t.map(|i| first + i)));
             mesh.one_sided &= more.one_sided;
         }
         if let (Ok(parts), Ok(more)) = (&mut self.primitive, &other.primitive) {
@@ -293,7 +299,9 @@ impl Surface {
     pub(crate) fn parts(&self, method: Method) -> Result<Vec<Part>, Stop> {
         match method {
             Method::Tldi => {
-                let cloud = self.cloud().map_err(|error| Stop::Failed(error.to_string()))?;
+                let cloud = self
+                    .cloud()
+                    .map_err(|error| Stop::Failed(error.to_string()))?;
                 let shape = SharedShape::new(PointCloudShape::new(cloud));
                 Ok(vec![(Pose::IDENTITY, shape)])
             }

@@ -34,7 +34,10 @@ fn material() -> Material {
 }
 
 fn cases(scale: &Scale) -> Vec<Case> {
-    let speeds: &[f32] = scale.pick(&[0.0, 1.0, 5.0, 10.0], &[0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0]);
+    let speeds: &[f32] = scale.pick(
+        &[0.0, 1.0, 5.0, 10.0],
+        &[0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0],
+    );
     let mut cases = Vec::new();
     for &seed in &scale.seeds {
         for (noise, kind) in [(0.0, "plane"), (0.25, "noisy plane")] {
@@ -73,8 +76,14 @@ fn measure(setup: &Setup, speed: f32, noise: f32, seed: u64) -> Result<Slide, St
     };
     let mut arena = Arena::new(setup)?;
     let middle = Vec3::X * (0.5 * size.x - 0.5);
-    arena.insert(RigidBodyBuilder::fixed().translation(middle), &floor, material())?;
-    let body = RigidBodyBuilder::dynamic().translation(Vec3::Y * HALF).linvel(Vec3::X * speed);
+    arena.insert(
+        RigidBodyBuilder::fixed().translation(middle),
+        &floor,
+        material(),
+    )?;
+    let body = RigidBodyBuilder::dynamic()
+        .translation(Vec3::Y * HALF)
+        .linvel(Vec3::X * speed);
     let surface = Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng);
     let body = arena.insert(body, &surface, material())?;
     let mut hop = 0.0_f32;
@@ -106,8 +115,16 @@ fn slide(
     } else {
         0.02 * expected
     };
-    verdict.near("stopping_distance_m", ours.way.length(), expected, tolerance);
-    verdict.note("theory_m", f64::from(speed * speed / (2.0 * FRICTION * GRAVITY)));
+    verdict.near(
+        "stopping_distance_m",
+        ours.way.length(),
+        expected,
+        tolerance,
+    );
+    verdict.note(
+        "theory_m",
+        f64::from(speed * speed / (2.0 * FRICTION * GRAVITY)),
+    );
     if speed > 0.0 {
         let heading = ours.way.z.atan2(ours.way.x).to_degrees().abs();
         verdict.at_most("heading_deg", heading, 1.0);

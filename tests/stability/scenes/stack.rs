@@ -57,10 +57,21 @@ fn stack(setup: &Setup, verdict: &mut Verdict, normals: Normals, seed: u64) -> R
     }
     let height = arena.position(top).y - HALF * (2 * BOXES - 1) as f32;
     verdict.at_most("top_drift_mean_radii", drift / SPACING, 1.0);
-    verdict.near("top_height_error_mean_radii", height / SPACING, 0.0, BOXES as f64);
-    verdict.note("bottom_height_error_mean_radii", (arena.position(bottom).y - HALF) / SPACING);
+    verdict.near(
+        "top_height_error_mean_radii",
+        height / SPACING,
+        0.0,
+        BOXES as f64,
+    );
+    verdict.note(
+        "bottom_height_error_mean_radii",
+        (arena.position(bottom).y - HALF) / SPACING,
+    );
     verdict.note("end_speed_m_s", arena.speed(top));
-    let awake = boxes.iter().filter(|b| !arena.body(b).is_sleeping()).count();
+    let awake = boxes
+        .iter()
+        .filter(|b| !arena.body(b).is_sleeping())
+        .count();
     verdict.note("awake", awake as f64);
     Ok(())
 }
