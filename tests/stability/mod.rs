@@ -34,7 +34,7 @@ pub(crate) fn main() -> anyhow::Result<ExitCode> {
     let report = Report::new(started, rows, timings);
     report.write_files(&args)?;
     let mut out = io::stdout().lock();
-    writeln!(out, "{}", report.markdown())?;
+    writeln!(out, "{}", report.summary())?;
     let undeclared = report.undeclared_failures();
     for row in &undeclared {
         writeln!(out, "FAILED: {row}")?;

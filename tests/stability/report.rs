@@ -93,8 +93,27 @@ impl Report {
         )
     }
 
-    /// The table of passes, and every failure with its numbers.
-    pub(crate) fn markdown(&self) -> String {
+    /// The table of passes, and what fails: of ours in full, of others folded.
+    fn markdown(&self) -> String {
+        let mut text = self.summary();
+        for method in self.methods() {
+            let mut rows = String::new();
+            if method != Method::Tldi {
+                self.list(&mut rows, method, "fails", Some(false));
+            }
+            self.list(&mut rows, method, "is not applicable to", None);
+            if !rows.is_empty() {
+                let _infallible = write!(
+                    text,
+                    "\n<details><summary>More about {method}</summary>\n{rows}\n</details>\n"
+                );
+            }
+        }
+        text
+    }
+
+    /// The table of passes, and what of ours fails.
+    pub(crate) fn summary(&self) -> String {
         let methods = self.methods();
         let mut text = format!("{}.\n\n| scene |", self.provenance());
         for method in &methods {
@@ -117,12 +136,7 @@ impl Report {
                 .collect();
             let _infallible = writeln!(text, " {} |", seconds.join(" / "));
         }
-        for method in &methods {
-            self.list(&mut text, *method, "fails", Some(false));
-        }
-        for method in &methods {
-            self.list(&mut text, *method, "is not applicable to", None);
-        }
+        self.list(&mut text, Method::Tldi, "fails", Some(false));
         let passed = self.declared_but_passed();
         if !passed.is_empty() {
             let _infallible = writeln!(

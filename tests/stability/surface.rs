@@ -267,6 +267,35 @@ impl Surface {
         self
     }
 
+    /// How far what the method makes of the surface reaches beyond the points, downwards and
+    /// upwards, metres: voxels do.
+    fn overhang(&self, method: Method) -> [f32; 2] {
+        if method != Method::Voxels {
+            return [0.0; 2];
+        }
+        let heights = self.samples.points.iter().map(|p| p.y);
+        let (low, high) = heights.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), y| {
+            (low.min(y), high.max(y))
+        });
+        let cell = |y: f32| (y / self.voxel_edge + self.voxel_shift).floor() - self.voxel_shift;
+        [
+            low - cell(low) * self.voxel_edge,
+            (cell(high) + 1.0) * self.voxel_edge - high,
+        ]
+    }
+
+    /// How much higher than its true height this body must start on an upright `floor` so that the
+    /// method does not see it start inside: 0 but for voxels.
+    pub(crate) fn lift_on(&self, floor: &Self, method: Method) -> f32 {
+        let lift = self.overhang(method)[0] + floor.overhang(method)[1];
+        // Touching is not inside.
+        if lift > 0.0 {
+            lift + 0.01 * self.voxel_edge
+        } else {
+            0.0
+        }
+    }
+
     /// Radius that stands for the points: the global one, or half a voxel.
     pub(crate) fn mean_radius(&self) -> f32 {
         match self.radius {

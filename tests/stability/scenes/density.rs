@@ -163,7 +163,8 @@ fn rest(setup: &Setup, verdict: &mut Verdict, flaw: Flaw, seed: u64) -> Result<(
         _ => 0.0,
     };
     let surface = Surface::cuboid(Vec3::splat(HALF), BODY_SPACING, &mut rng);
-    let builder = RigidBodyBuilder::dynamic().translation(Vec3::new(x, HALF + 0.02, 0.0));
+    let lift = surface.lift_on(&floor, setup.method);
+    let builder = RigidBodyBuilder::dynamic().translation(Vec3::new(x, HALF + 0.02 + lift, 0.0));
     let body = arena.insert(builder, &surface, Material::default())?;
     arena.steps((SECONDS / DT) as usize)?;
     let pose = *arena.body(&body).position();

@@ -93,7 +93,7 @@ fn sweep(
         Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng)
     };
     let body = RigidBodyBuilder::dynamic()
-        .translation(Vec3::Y * HALF)
+        .translation(Vec3::Y * (HALF + surface.lift_on(&floor, setup.method)))
         .ccd_enabled(true);
     let body = arena.insert(body, &surface, Material::default())?;
     // The wall's lower rim stays clear of the floor.

@@ -106,7 +106,8 @@ fn start(
     let floor = arena.insert(RigidBodyBuilder::fixed(), plane, Material::default())?;
     let surface = body.surface(rng);
     let resting = body.resting_pose(&surface);
-    let lifted = resting.append_translation(LIFT * Vec3::Y);
+    let lift = LIFT + surface.lift_on(plane, setup.method);
+    let lifted = resting.append_translation(lift * Vec3::Y);
     let builder = RigidBodyBuilder::dynamic().pose(lifted);
     let placed = arena.insert(builder, &surface, Material::default())?;
     Ok((arena, [floor, placed], resting))

@@ -81,11 +81,13 @@ fn way_of_ball(setup: &Setup, speed: f32, seed: u64) -> Result<Vec3, Stop> {
         &floor,
         Material::default(),
     )?;
+    let surface = Surface::ball(RADIUS, SPACING);
+    let height = RADIUS + surface.lift_on(&floor, setup.method);
     let body = RigidBodyBuilder::dynamic()
-        .translation(Vec3::Y * RADIUS)
+        .translation(Vec3::Y * height)
         .linvel(Vec3::X * speed)
         .angvel(Vec3::NEG_Z * (speed / RADIUS));
-    let ball = arena.insert(body, &Surface::ball(RADIUS, SPACING), Material::default())?;
+    let ball = arena.insert(body, &surface, Material::default())?;
     arena.steps((WAY / speed / DT) as usize)?;
     Ok(arena.position(&ball).with_y(0.0))
 }
@@ -105,6 +107,7 @@ fn spun(setup: &Setup, spinner: Spinner, seed: u64) -> Result<[f32; 3], Stop> {
     let floor = Surface::flat(Vec2::splat(1.0), SPACING, Backing::Solid, &mut rng);
     arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;
     let (surface, height, rate) = spinner.parts(&mut rng);
+    let height = height + surface.lift_on(&floor, setup.method);
     let body = RigidBodyBuilder::dynamic()
         .translation(Vec3::Y * height)
         .angvel(Vec3::Y * rate);

@@ -96,8 +96,9 @@ fn fall(setup: &Setup, verdict: &mut Verdict, change: Change, seed: u64) -> Resu
     let fixed = RigidBodyBuilder::fixed().translation(origin);
     arena.insert(fixed, &floor.moved(&there), Material::default())?;
     let place = change.poses + Vec3::X * (change.aside * SPACING * s);
-    let start = place + Vec3::Y * ((HALF + FALL) * s);
     let body = Surface::cuboid(Vec3::splat(HALF * s), SPACING * s, &mut rng);
+    let lift = body.lift_on(&floor, setup.method);
+    let start = place + Vec3::Y * ((HALF + FALL) * s + lift);
     let builder = RigidBodyBuilder::dynamic().translation(start);
     let body = arena.insert(builder, &body, Material::default())?;
     let mut asleep_after = None;

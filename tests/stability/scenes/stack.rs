@@ -41,9 +41,15 @@ fn stack(setup: &Setup, verdict: &mut Verdict, normals: Normals, seed: u64) -> R
     let floor = floor.with_normals(normals);
     arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;
     let mut boxes: Vec<Placed> = Vec::new();
+    let mut top_of_stack = 0.0;
     for k in 0..BOXES {
         let surface = Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng).with_normals(normals);
-        let height = HALF * (2 * k + 1) as f32;
+        let lift = match k {
+            0 => surface.lift_on(&floor, setup.method),
+            _ => surface.lift_on(&surface, setup.method),
+        };
+        top_of_stack += lift + 2.0 * HALF;
+        let height = top_of_stack - HALF;
         let body = RigidBodyBuilder::dynamic().translation(Vec3::Y * height);
         boxes.push(arena.insert(body, &surface, Material::default())?);
     }
