@@ -174,7 +174,12 @@ impl Arena {
             None => self.world.step(),
         }
         self.steps += 1;
-        if let Some((_, body)) = self.world.bodies.iter().find(|(_, b)| !b.position().is_finite()) {
+        if let Some((_, body)) = self
+            .world
+            .bodies
+            .iter()
+            .find(|(_, b)| !b.position().is_finite())
+        {
             let at = body.translation();
             return Err(failed(format!("a pose is not finite: {at}")));
         }

@@ -6,6 +6,7 @@ use super::scenes::SCENES;
 use anyhow::bail;
 use rapier3d_tldi::TldiConfig;
 use std::path::PathBuf;
+use tldi::CameraPolicy;
 
 /// Seeds of the long and of the short version, where none are asked for.
 const LONG_SEEDS: u64 = 5;
@@ -54,6 +55,9 @@ pub(crate) struct Args {
     /// Where clouds are compared; auto takes the GPU if there is one, else the CPU
     #[arg(long, value_enum, default_value_t = BackendChoice::Auto)]
     pub(crate) backend: BackendChoice,
+    /// From where pairs of clouds are looked at
+    #[arg(long, value_enum, default_value_t = PolicyChoice::ContactZone)]
+    camera_policy: PolicyChoice,
     /// Write every step of every world to stderr (use with --scene, --case and --method)
     #[arg(long)]
     trace: bool,
@@ -68,6 +72,33 @@ pub(crate) enum BackendChoice {
     Cpu,
     /// A GPU backend.
     Gpu,
+}
+
+/// From where pairs of clouds are looked at.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum PolicyChoice {
+    /// By the normals of the contact zone, with hysteresis, up to three views.
+    ContactZone,
+    /// One view against the motion.
+    Motion,
+    /// One view by the normals of the contact zone, anew in every frame.
+    Covariance,
+    /// One view along the axis in which the bounds overlap least.
+    SmallestExtent,
+    /// One view along the last axis.
+    LastNormal,
+}
+
+impl From<PolicyChoice> for CameraPolicy {
+    fn from(choice: PolicyChoice) -> Self {
+        match choice {
+            PolicyChoice::ContactZone => Self::ContactZone,
+            PolicyChoice::Motion => Self::Motion,
+            PolicyChoice::Covariance => Self::Covariance,
+            PolicyChoice::SmallestExtent => Self::SmallestExtent,
+            PolicyChoice::LastNormal => Self::LastNormal,
+        }
+    }
 }
 
 impl BackendChoice {
@@ -99,7 +130,10 @@ impl Args {
     pub(crate) fn setup(&self) -> Setup {
         Setup {
             method: Method::Tldi,
-            config: TldiConfig::default(),
+            config: TldiConfig {
+                camera_policy: self.camera_policy.into(),
+                ..TldiConfig::default()
+            },
             trace: self.trace,
         }
     }
@@ -122,7 +156,11 @@ impl Args {
             .iter()
             .filter(|scene| self.scene.is_empty() || self.scene.iter().any(|n| n == scene.name))
             .flat_map(|scene| (scene.cases)(scale))
-            .filter(|case| self.case.as_ref().is_none_or(|text| case.name.contains(text)))
+            .filter(|case| {
+                self.case
+                    .as_ref()
+                    .is_none_or(|text| case.name.contains(text))
+            })
             .collect();
         if cases.is_empty() {
             bail!("no case is left to run");

@@ -145,7 +145,13 @@ impl Verdict {
     }
 
     /// Notes a value that must not be farther than `tolerance` from `expected`.
-    pub(crate) fn near(&mut self, name: &str, value: impl Into<f64>, expected: f64, tolerance: f64) {
+    pub(crate) fn near(
+        &mut self,
+        name: &str,
+        value: impl Into<f64>,
+        expected: f64,
+        tolerance: f64,
+    ) {
         let value = self.note(name, value);
         if (value - expected).abs() > tolerance {
             self.failures.push(format!(

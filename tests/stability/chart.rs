@@ -15,12 +15,8 @@ const FONT: &str = "sans-serif";
 /// Writes `stability.svg` and `stability.png`.
 pub(crate) fn draw(report: &Report, folder: &Path) -> anyhow::Result<()> {
     // An error means only that the font is registered already.
-    plotters::style::register_font(
-        FONT,
-        FontStyle::Normal,
-        epaint_default_fonts::UBUNTU_LIGHT,
-    )
-    .map_err(|_| anyhow!("the built-in font cannot be read"))?;
+    plotters::style::register_font(FONT, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
+        .map_err(|_| anyhow!("the built-in font cannot be read"))?;
     let columns = report.methods().len() as i32;
     let rows = report.scenes().len() as i32;
     let size = (

@@ -69,7 +69,10 @@ fn cpu_model() -> String {
     info.lines()
         .find_map(|line| line.strip_prefix("model name"))
         .and_then(|rest| rest.split_once(':'))
-        .map_or_else(|| "unknown processor".into(), |(_, name)| name.trim().into())
+        .map_or_else(
+            || "unknown processor".into(),
+            |(_, name)| name.trim().into(),
+        )
 }
 
 fn commit() -> String {

@@ -1,7 +1,7 @@
 //! The parts of the suite: how a surface is given to each method, worlds, rows, reports, scenes.
 
-mod args;
 mod arena;
+mod args;
 mod case;
 mod chart;
 mod host;
@@ -34,7 +34,7 @@ pub(crate) fn main() -> anyhow::Result<ExitCode> {
     let report = Report::new(started, rows, timings);
     report.write_files(&args)?;
     let mut out = io::stdout().lock();
-    writeln!(out, "{}", report.markdown())?;
+    writeln!(out, "{}", report.summary())?;
     let undeclared = report.undeclared_failures();
     for row in &undeclared {
         writeln!(out, "FAILED: {row}")?;
@@ -44,4 +44,53 @@ pub(crate) fn main() -> anyhow::Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::case::{Case, Scale, Setup};
+    use super::method::Method;
+    use super::runner::run_all;
+    use super::scenes::SCENES;
+    use rapier3d_tldi::TldiConfig;
+    use std::collections::HashSet;
+
+    fn scale() -> Scale {
+        Scale {
+            seeds: vec![3, 4],
+            long: false,
+            drops: 18,
+            only_drop: None,
+        }
+    }
+
+    fn cases_of(scene: &str) -> Vec<Case> {
+        let is_it = |case: &Case| case.scene == scene;
+        let all = SCENES.iter().flat_map(|scene| (scene.cases)(&scale()));
+        all.filter(is_it).collect()
+    }
+
+    #[test]
+    fn rows_have_names_of_their_own() {
+        let mut seen = HashSet::new();
+        for case in SCENES.iter().flat_map(|scene| (scene.cases)(&scale())) {
+            let name = (case.scene, case.name.clone(), case.seed);
+            assert!(seen.insert(name.clone()), "{name:?} occurs twice");
+        }
+    }
+
+    #[test]
+    fn equal_seeds_give_equal_rows() -> anyhow::Result<()> {
+        let setup = Setup {
+            method: Method::Tldi,
+            config: TldiConfig::default(),
+            trace: false,
+        };
+        for scene in ["bounce", "tunnelling"] {
+            let run = || run_all(cases_of(scene), &Method::ALL, &setup);
+            let (first, second) = (run()?.0, run()?.0);
+            assert_eq!(first, second);
+        }
+        Ok(())
+    }
 }

@@ -1,9 +1,9 @@
 //! Models and scans of the test data, or what is generated (and said) where the data is absent.
 
 use super::surface::{Mesh, Surface};
+use rapier3d::parry::transformation::convex_hull;
 use std::collections::HashMap;
 use std::sync::LazyLock;
-use rapier3d::parry::transformation::convex_hull;
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi_sources::{ReadOptions, read};
 use tldi_tests::{Samples, data_file};

@@ -3,11 +3,13 @@
 use super::args::Args;
 use super::chart;
 use super::host::RunInfo;
+use super::known::KNOWN_FAILURES;
 use super::method::Method;
 use super::row::Row;
 use super::runner::Timings;
 use super::scenes::SCENES;
 use anyhow::{Context, bail};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -39,11 +41,6 @@ impl Report {
         Self { run, rows, timings }
     }
 
-    /// When and where the run was made.
-    pub(crate) fn run(&self) -> &RunInfo {
-        &self.run
-    }
-
     /// Methods that have rows, in the order of tables.
     pub(crate) fn methods(&self) -> Vec<Method> {
         let has_rows = |m: &Method| self.rows.iter().any(|row| row.method == m.name());
@@ -53,7 +50,11 @@ impl Report {
     /// Names of the scenes that have rows.
     pub(crate) fn scenes(&self) -> Vec<&'static str> {
         let has_rows = |name: &&str| self.rows.iter().any(|row| row.scene == *name);
-        SCENES.iter().map(|scene| scene.name).filter(has_rows).collect()
+        SCENES
+            .iter()
+            .map(|scene| scene.name)
+            .filter(has_rows)
+            .collect()
     }
 
     /// How a method did in a scene.
@@ -71,7 +72,9 @@ impl Report {
 
     /// Failures of ours that are not declared.
     pub(crate) fn undeclared_failures(&self) -> Vec<&Row> {
-        (self.rows.iter()).filter(|row| row.is_undeclared_failure()).collect()
+        (self.rows.iter())
+            .filter(|row| row.is_undeclared_failure())
+            .collect()
     }
 
     /// One line that says when, where and of what.
@@ -90,8 +93,27 @@ impl Report {
         )
     }
 
-    /// The table of passes, and every failure with its numbers.
-    pub(crate) fn markdown(&self) -> String {
+    /// The table of passes, and what fails: of ours in full, of others folded.
+    fn markdown(&self) -> String {
+        let mut text = self.summary();
+        for method in self.methods() {
+            let mut rows = String::new();
+            if method != Method::Tldi {
+                self.list(&mut rows, method, "fails", Some(false));
+            }
+            self.list(&mut rows, method, "is not applicable to", None);
+            if !rows.is_empty() {
+                let _infallible = write!(
+                    text,
+                    "\n<details><summary>More about {method}</summary>\n{rows}\n</details>\n"
+                );
+            }
+        }
+        text
+    }
+
+    /// The table of passes, and what of ours fails.
+    pub(crate) fn summary(&self) -> String {
         let methods = self.methods();
         let mut text = format!("{}.\n\n| scene |", self.provenance());
         for method in &methods {
@@ -114,41 +136,81 @@ impl Report {
                 .collect();
             let _infallible = writeln!(text, " {} |", seconds.join(" / "));
         }
-        for method in methods {
-            self.list(&mut text, method, "fails", Some(false));
-        }
-        for method in self.methods() {
-            self.list(&mut text, method, "is not applicable to", None);
+        self.list(&mut text, Method::Tldi, "fails", Some(false));
+        let passed = self.declared_but_passed();
+        if !passed.is_empty() {
+            let _infallible = writeln!(
+                text,
+                "\nDeclared as failures of `tldi`, but passed here: {}.",
+                passed.join("; ")
+            );
         }
         text
     }
 
-    /// The rows of a method with this outcome; equal reasons of several seeds are one line.
-    fn list(&self, text: &mut String, method: Method, title: &str, passed: Option<bool>) {
-        let rows: Vec<&Row> = self
-            .rows
+    /// Declared failures none of whose cases failed in this run.
+    fn declared_but_passed(&self) -> Vec<String> {
+        KNOWN_FAILURES
             .iter()
-            .filter(|row| row.method == method.name() && row.passed == passed)
-            .collect();
-        if rows.is_empty() {
+            .filter(|known| {
+                let about_it = |row: &&Row| {
+                    row.method == Method::Tldi.name() && known.is_about(row.scene, &row.case)
+                };
+                let mut rows = self.rows.iter().filter(about_it).peekable();
+                rows.peek().is_some() && rows.all(|row| row.passed == Some(true))
+            })
+            .map(|known| format!("{} / {}", known.scene, known.case_prefix))
+            .collect()
+    }
+
+    /// The cases in which a method had this outcome: one line for all seeds of a case, with the
+    /// reason of the first; one line for all cases of a scene that are not applicable for one
+    /// reason.
+    fn list(&self, text: &mut String, method: Method, title: &str, passed: Option<bool>) {
+        let is_meant = |row: &&Row| row.method == method.name() && row.passed == passed;
+        let mut groups: BTreeMap<(usize, &str), Vec<&Row>> = BTreeMap::new();
+        for row in self.rows.iter().filter(is_meant) {
+            let scene = SCENES.iter().position(|s| s.name == row.scene);
+            let what = match passed {
+                Some(_) => row.case.as_str(),
+                None => row.reason.as_deref().unwrap_or_default(),
+            };
+            let key = (scene.unwrap_or(usize::MAX), what);
+            groups.entry(key).or_default().push(row);
+        }
+        if groups.is_empty() {
             return;
         }
-        let _infallible = write!(text, "\n`{method}` {title}:\n\n");
-        for group in rows.chunk_by(|a, b| {
-            passed.is_none() && (a.scene, &a.reason) == (b.scene, &b.reason)
-        }) {
-            let row = group[0];
+        let _infallible = writeln!(text, "\n`{method}` {title}:\n");
+        for rows in groups.values() {
+            let row = rows[0];
             let reason = row.reason.as_deref().unwrap_or_default();
-            let cases = match (passed, group.len()) {
-                (None, count) => format!("{count} cases, as {}", row.case),
-                (Some(_), _) => format!("{}, seed {}", row.case, row.seed),
+            let cases = match passed {
+                Some(_) => {
+                    let seeds: Vec<String> = rows.iter().map(|row| row.seed.to_string()).collect();
+                    format!("{}, seeds {}", row.case, seeds.join(" "))
+                }
+                None => format!("{} rows, as {}", rows.len(), row.case),
             };
-            let _infallible = write!(text, "- {}: {cases}: {reason}", row.scene);
+            let _infallible = write!(text, "- {} / {cases}: {reason}", row.scene);
             if let Some(cause) = row.known_cause {
-                let _infallible = write!(text, " **Known:** {cause}");
+                let _infallible = write!(text, ". **Known:** {cause}");
             }
             text.push('\n');
         }
+    }
+
+    /// What each scene is, and what passes.
+    fn scenes_text(&self) -> String {
+        let mut text = String::from("| scene | what happens | what passes |\n|---|---|---|\n");
+        for scene in SCENES {
+            let _infallible = writeln!(
+                text,
+                "| {} | {} | {} |",
+                scene.name, scene.about, scene.rule
+            );
+        }
+        text
     }
 
     /// Writes what the command line asks for.
@@ -182,8 +244,11 @@ impl Report {
         else {
             bail!("{} has no place marked {BEGIN} … {END}", file.display());
         };
-        let table = self.markdown();
-        write(file, &format!("{before}{BEGIN}\n{table}{END}{after}"))
+        let (scenes, table) = (self.scenes_text(), self.markdown());
+        write(
+            file,
+            &format!("{before}{BEGIN}\n\n{scenes}\n{table}\n{END}{after}"),
+        )
     }
 }
 

@@ -3,8 +3,8 @@
 use super::surface::{Normals, Radius, Surface};
 use fastrand::Rng;
 use std::sync::LazyLock;
-use tldi::glamx::{Mat3, Quat, SymmetricEigen3, Vec2, Vec3};
 use tldi::PointCloud;
+use tldi::glamx::{Mat3, Quat, SymmetricEigen3, Vec2, Vec3};
 use tldi_sources::{ReadOptions, read};
 use tldi_tests::{Samples, data_file, standard_normal};
 
@@ -64,14 +64,17 @@ fn terrain_points() -> Vec<Vec3> {
     let mut rng = Rng::with_seed(7);
     let mut point = || {
         let p = Vec2::new(rng.f32(), rng.f32()) * 3.0;
-        let bumps = 0.02 * (4.0 * p.x).sin() * (5.0 * p.y).cos() + 0.01 * (9.0 * p.x + 7.0 * p.y).sin();
+        let bumps =
+            0.02 * (4.0 * p.x).sin() * (5.0 * p.y).cos() + 0.01 * (9.0 * p.x + 7.0 * p.y).sin();
         Vec3::new(p.x, bumps + 0.004 * standard_normal(&mut rng), p.y)
     };
     (0..120_000).map(|_| point()).collect()
 }
 
 fn find(points: &[Vec3]) -> Vec<Spot> {
-    let cloud = PointCloud::builder(points).build().expect("a scan is a valid cloud");
+    let cloud = PointCloud::builder(points)
+        .build()
+        .expect("a scan is a valid cloud");
     let mut rng = Rng::with_seed(11);
     let mut spots = Vec::new();
     for _ in 0..400 {
@@ -128,5 +131,9 @@ fn is_covered(points: &[Vec3], most: f32) -> bool {
     places
         .map(|(i, j)| Vec3::new(i as f32, 0.0, j as f32) * most)
         .filter(|place| place.length() < 0.85 * SPOT_RADIUS)
-        .all(|place| in_plane.iter().any(|p| p.distance_squared(place) < most * most))
+        .all(|place| {
+            in_plane
+                .iter()
+                .any(|p| p.distance_squared(place) < most * most)
+        })
 }

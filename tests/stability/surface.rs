@@ -149,7 +149,12 @@ impl Surface {
     }
 
     /// A flat rectangle of `size` metres (x, z) in y = 0, facing up.
-    pub(crate) fn flat(size: Vec2, spacing: f32, backing: Backing, rng: &mut fastrand::Rng) -> Self {
+    pub(crate) fn flat(
+        size: Vec2,
+        spacing: f32,
+        backing: Backing,
+        rng: &mut fastrand::Rng,
+    ) -> Self {
         let sheet = Sheet::sampled(size, spacing, rng, |_| 0.0);
         Self {
             mesh: Ok(rectangle_mesh(size, backing)),
@@ -252,13 +257,43 @@ impl Surface {
         if let (Ok(mesh), Ok(more)) = (&mut self.mesh, &other.mesh) {
             let first = mesh.vertices.len() as u32;
             mesh.vertices.extend(&more.vertices);
-            mesh.triangles.extend(more.triangles.iter().map(|t| t.map(|i| first + i)));
+            mesh.triangles
+                .extend(more.triangles.iter().map(|t| t.map(|i| first + i)));
             mesh.one_sided &= more.one_sided;
         }
         if let (Ok(parts), Ok(more)) = (&mut self.primitive, &other.primitive) {
             parts.extend(more.iter().cloned());
         }
         self
+    }
+
+    /// How far what the method makes of the surface reaches beyond the points, downwards and
+    /// upwards, metres: voxels do.
+    fn overhang(&self, method: Method) -> [f32; 2] {
+        if method != Method::Voxels {
+            return [0.0; 2];
+        }
+        let heights = self.samples.points.iter().map(|p| p.y);
+        let (low, high) = heights.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), y| {
+            (low.min(y), high.max(y))
+        });
+        let cell = |y: f32| (y / self.voxel_edge + self.voxel_shift).floor() - self.voxel_shift;
+        [
+            low - cell(low) * self.voxel_edge,
+            (cell(high) + 1.0) * self.voxel_edge - high,
+        ]
+    }
+
+    /// How much higher than its true height this body must start on an upright `floor` so that the
+    /// method does not see it start inside: 0 but for voxels.
+    pub(crate) fn lift_on(&self, floor: &Self, method: Method) -> f32 {
+        let lift = self.overhang(method)[0] + floor.overhang(method)[1];
+        // Touching is not inside.
+        if lift > 0.0 {
+            lift + 0.01 * self.voxel_edge
+        } else {
+            0.0
+        }
     }
 
     /// Radius that stands for the points: the global one, or half a voxel.
@@ -293,7 +328,9 @@ impl Surface {
     pub(crate) fn parts(&self, method: Method) -> Result<Vec<Part>, Stop> {
         match method {
             Method::Tldi => {
-                let cloud = self.cloud().map_err(|error| Stop::Failed(error.to_string()))?;
+                let cloud = self
+                    .cloud()
+                    .map_err(|error| Stop::Failed(error.to_string()))?;
                 let shape = SharedShape::new(PointCloudShape::new(cloud));
                 Ok(vec![(Pose::IDENTITY, shape)])
             }

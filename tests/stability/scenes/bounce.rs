@@ -54,7 +54,9 @@ fn rebound(setup: &Setup, is_ball: bool, restitution: f32, seed: u64) -> Result<
         Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng)
     };
     let mass = surface.mass.map_or(0.0, |mass| mass.mass());
-    let body = RigidBodyBuilder::dynamic().translation(Vec3::Y * (HALF + FALL)).can_sleep(false);
+    let body = RigidBodyBuilder::dynamic()
+        .translation(Vec3::Y * (HALF + FALL))
+        .can_sleep(false);
     let body = arena.insert(body, &surface, material)?;
     let energy = |arena: &Arena| {
         let rigid = arena.body(&body);
@@ -98,7 +100,12 @@ fn bounce(
     } else {
         (truth - theory).abs()
     };
-    verdict.near("rebound_against_theory_m", height - theory, 0.0, tolerance + lost_by_solver);
+    verdict.near(
+        "rebound_against_theory_m",
+        height - theory,
+        0.0,
+        tolerance + lost_by_solver,
+    );
     verdict.note("primitive_rebound_m", truth);
     verdict.at_most("most_energy_over_initial", energy, 1.01);
     Ok(())

@@ -100,11 +100,18 @@ fn in_each_other(
     for _ in 0..(SECONDS / DT) as usize {
         arena.step()?;
         let apart = (arena.position(&placed[1]) - arena.position(&placed[0])).abs();
-        let distance = if is_ball { apart.length() } else { apart.max_element() };
+        let distance = if is_ball {
+            apart.length()
+        } else {
+            apart.max_element()
+        };
         if distance >= 2.0 * HALF - SPACING {
             at_parting.get_or_insert(apart);
         }
-        fastest = placed.iter().map(|p| arena.speed(p)).fold(fastest, f32::max);
+        fastest = placed
+            .iter()
+            .map(|p| arena.speed(p))
+            .fold(fastest, f32::max);
     }
     match at_parting {
         Some(apart) => {
@@ -115,7 +122,9 @@ fn in_each_other(
             });
         }
         None => {
-            let apart = arena.position(&placed[1]).distance(arena.position(&placed[0]));
+            let apart = arena
+                .position(&placed[1])
+                .distance(arena.position(&placed[0]));
             verdict.note("distance_m", apart);
             verdict.require(false, || format!("still in each other, {apart:.3} m apart"));
         }

@@ -29,7 +29,9 @@ const BODY_SPACING: f32 = 0.01;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Flaw {
     /// 100:1, with the box at this x; the border is at 0.
-    Uneven { x: f32 },
+    Uneven {
+        x: f32,
+    },
     /// Every point so many times.
     Repeated(usize),
     FlyingPixels,
@@ -85,7 +87,11 @@ fn kinect_view(rng: &mut Rng) -> Samples {
 
 fn floor(flaw: Flaw, rng: &mut Rng) -> Surface {
     let size = Vec2::new(0.8, 0.4);
-    let spacing = if flaw == Flaw::KinectNoise { 0.005 } else { COARSE };
+    let spacing = if flaw == Flaw::KinectNoise {
+        0.005
+    } else {
+        COARSE
+    };
     let mut floor = Surface::flat(size, spacing, Backing::Solid, rng);
     floor.radius = Radius::Neighbors;
     floor.normals = Normals::Absent;
@@ -95,7 +101,13 @@ fn floor(flaw: Flaw, rng: &mut Rng) -> Surface {
             let points = (floor.samples.points.iter())
                 .filter(|p| p.x > 0.0)
                 .copied()
-                .chain(dense.samples.points.iter().map(|p| *p - Vec3::X * (0.25 * size.x)));
+                .chain(
+                    dense
+                        .samples
+                        .points
+                        .iter()
+                        .map(|p| *p - Vec3::X * (0.25 * size.x)),
+                );
             floor.samples.points = points.collect();
             floor.samples.normals = vec![Vec3::Y; floor.samples.points.len()];
         }
@@ -151,7 +163,8 @@ fn rest(setup: &Setup, verdict: &mut Verdict, flaw: Flaw, seed: u64) -> Result<(
         _ => 0.0,
     };
     let surface = Surface::cuboid(Vec3::splat(HALF), BODY_SPACING, &mut rng);
-    let builder = RigidBodyBuilder::dynamic().translation(Vec3::new(x, HALF + 0.02, 0.0));
+    let lift = surface.lift_on(&floor, setup.method);
+    let builder = RigidBodyBuilder::dynamic().translation(Vec3::new(x, HALF + 0.02 + lift, 0.0));
     let body = arena.insert(builder, &surface, Material::default())?;
     arena.steps((SECONDS / DT) as usize)?;
     let pose = *arena.body(&body).position();
@@ -162,8 +175,16 @@ fn rest(setup: &Setup, verdict: &mut Verdict, flaw: Flaw, seed: u64) -> Result<(
     }
     verdict.at_most("worst_corner_local_radii", worst, 1.0);
     verdict.note("height_error_m", pose.translation.y - HALF);
-    verdict.note("tilt_deg", (pose.rotation * Vec3::Y).angle_between(Vec3::Y).to_degrees());
+    verdict.note(
+        "tilt_deg",
+        (pose.rotation * Vec3::Y)
+            .angle_between(Vec3::Y)
+            .to_degrees(),
+    );
     verdict.note("end_speed_m_s", arena.speed(&body));
-    verdict.note("asleep", f64::from(u8::from(arena.body(&body).is_sleeping())));
+    verdict.note(
+        "asleep",
+        f64::from(u8::from(arena.body(&body).is_sleeping())),
+    );
     Ok(())
 }

@@ -65,7 +65,12 @@ impl Pair {
                 let (right, right_normal) = slope(FRAC_PI_4);
                 let groove = sheet.moved(&left).joined(&sheet.moved(&right));
                 let normals = vec![left_normal, right_normal];
-                (Surface::ball(HALF, SPACING), groove, SQRT_2 * above, normals)
+                (
+                    Surface::ball(HALF, SPACING),
+                    groove,
+                    SQRT_2 * above,
+                    normals,
+                )
             }
         }
     }
@@ -164,7 +169,11 @@ fn turn(
     });
     verdict.at_most("worst_gap_error_mean_radii", worst_gap, gap_bound);
     verdict.at_most("worst_jump_mean_radii", worst_jump, gap_bound);
-    verdict.at_most("worst_pushing_normal_error_deg", worst_pushing_normal, normal_bound);
+    verdict.at_most(
+        "worst_pushing_normal_error_deg",
+        worst_pushing_normal,
+        normal_bound,
+    );
     verdict.note("worst_normal_error_deg", worst_normal);
     Ok(())
 }

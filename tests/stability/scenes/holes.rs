@@ -41,9 +41,12 @@ fn cases(scale: &Scale) -> Vec<Case> {
                 }
             }
         }
-        cases.push(Case::new(SCENE.name, "shadow", seed, move |setup, verdict| {
-            shadow(setup, verdict, seed)
-        }));
+        cases.push(Case::new(
+            SCENE.name,
+            "shadow",
+            seed,
+            move |setup, verdict| shadow(setup, verdict, seed),
+        ));
     }
     cases
 }
@@ -69,7 +72,10 @@ fn floor_with_hole(width: f32, rng: &mut Rng) -> Surface {
         let along = width * (k as f32 / steps as f32 - 0.5);
         for corner in 0..4 {
             let turn = Quat::from_rotation_y(std::f32::consts::FRAC_PI_2 * corner as f32);
-            floor.samples.points.push(turn * Vec3::new(along, 0.0, 0.5 * width));
+            floor
+                .samples
+                .points
+                .push(turn * Vec3::new(along, 0.0, 0.5 * width));
             floor.samples.normals.push(Vec3::Y);
         }
     }
@@ -90,9 +96,11 @@ fn floor_with_hole(width: f32, rng: &mut Rng) -> Surface {
     for (at, size) in strips {
         let first = mesh.vertices.len() as u32;
         for (x, z) in [(-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5)] {
-            mesh.vertices.push(Vec3::new(at.x + x * size.x, 0.0, at.y + z * size.y));
+            mesh.vertices
+                .push(Vec3::new(at.x + x * size.x, 0.0, at.y + z * size.y));
         }
-        mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        mesh.triangles
+            .extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }
     floor.mesh = Ok(mesh);
     floor.primitive = Ok(strips
@@ -121,7 +129,11 @@ fn fall(
         (surface, Quat::from_rotation_y(TURN))
     };
     let pose = Pose::from_parts(Vec3::Y * (HALF + 0.05), turn);
-    let body = arena.insert(RigidBodyBuilder::dynamic().pose(pose), &surface, Material::default())?;
+    let body = arena.insert(
+        RigidBodyBuilder::dynamic().pose(pose),
+        &surface,
+        Material::default(),
+    )?;
     arena.steps((2.0 / DT) as usize)?;
     let height = verdict.note("height_m", arena.position(&body).y);
     let has_fallen = height < -1.0;
@@ -183,7 +195,12 @@ fn shadow(setup: &Setup, verdict: &mut Verdict, seed: u64) -> Result<(), Stop> {
     let end = arena.position(&ball);
     let fallen = f64::from(start.y - end.y);
     let middle = f64::from(0.5 * (least + most));
-    verdict.near("fallen_m", fallen, middle, 0.01 * middle + f64::from(0.5 * (most - least)));
+    verdict.near(
+        "fallen_m",
+        fallen,
+        middle,
+        0.01 * middle + f64::from(0.5 * (most - least)),
+    );
     let sideways = (end - start).with_y(0.0).length() / SPACING;
     verdict.at_most("sideways_mean_radii", sideways, 1.0);
     Ok(())

@@ -79,7 +79,12 @@ fn sweep(
 ) -> Result<(), Stop> {
     let mut rng = Rng::with_seed(seed);
     let mut arena = Arena::new(setup)?;
-    let floor = Surface::flat(Vec2::new(2.0 * WAY + 3.0, 1.0), SPACING, Backing::Solid, &mut rng);
+    let floor = Surface::flat(
+        Vec2::new(2.0 * WAY + 3.0, 1.0),
+        SPACING,
+        Backing::Solid,
+        &mut rng,
+    );
     let ground = RigidBodyBuilder::fixed().translation(Vec3::X * WAY);
     arena.insert(ground, &floor, Material::default())?;
     let surface = if is_ball {
@@ -87,7 +92,9 @@ fn sweep(
     } else {
         Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng)
     };
-    let body = RigidBodyBuilder::dynamic().translation(Vec3::Y * HALF).ccd_enabled(true);
+    let body = RigidBodyBuilder::dynamic()
+        .translation(Vec3::Y * (HALF + surface.lift_on(&floor, setup.method)))
+        .ccd_enabled(true);
     let body = arena.insert(body, &surface, Material::default())?;
     // The wall's lower rim stays clear of the floor.
     let place = |x: f32| Pose::from_translation(Vec3::new(x, 0.36, 0.0));

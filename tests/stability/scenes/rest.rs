@@ -106,7 +106,8 @@ fn start(
     let floor = arena.insert(RigidBodyBuilder::fixed(), plane, Material::default())?;
     let surface = body.surface(rng);
     let resting = body.resting_pose(&surface);
-    let lifted = resting.append_translation(LIFT * Vec3::Y);
+    let lift = LIFT + surface.lift_on(plane, setup.method);
+    let lifted = resting.append_translation(lift * Vec3::Y);
     let builder = RigidBodyBuilder::dynamic().pose(lifted);
     let placed = arena.insert(builder, &surface, Material::default())?;
     Ok((arena, [floor, placed], resting))
@@ -147,9 +148,17 @@ fn fixed_samples(
     verdict.at_most("drift_mean_radii", drift, 0.1);
     let turn = end.rotation.angle_between(settled.rotation).to_degrees();
     verdict.at_most("turn_deg", turn, 0.1);
-    verdict.note("height_error_mean_radii", (end.translation.y - truth.translation.y) / SPACING);
-    verdict.note("landing_shift_mean_radii", (end.translation - truth.translation).with_y(0.0).length() / SPACING);
-    let tilt = (end.rotation * Vec3::Y).angle_between(truth.rotation * Vec3::Y).to_degrees();
+    verdict.note(
+        "height_error_mean_radii",
+        (end.translation.y - truth.translation.y) / SPACING,
+    );
+    verdict.note(
+        "landing_shift_mean_radii",
+        (end.translation - truth.translation).with_y(0.0).length() / SPACING,
+    );
+    let tilt = (end.rotation * Vec3::Y)
+        .angle_between(truth.rotation * Vec3::Y)
+        .to_degrees();
     if body == Body::Box {
         verdict.at_most("tilt_deg", tilt, 0.1);
     } else {
@@ -158,12 +167,7 @@ fn fixed_samples(
     Ok(())
 }
 
-fn new_samples(
-    setup: &Setup,
-    verdict: &mut Verdict,
-    body: Body,
-    seed: u64,
-) -> Result<(), Stop> {
+fn new_samples(setup: &Setup, verdict: &mut Verdict, body: Body, seed: u64) -> Result<(), Stop> {
     let mut rng = Rng::with_seed(seed);
     let mut sample = {
         let mut rng = Rng::with_seed(seed ^ 0x5eed);
@@ -182,9 +186,18 @@ fn new_samples(
     }
     let mean_square = speeds.iter().map(|v| v * v).sum::<f64>() / speeds.len() as f64;
     verdict.at_most("rms_speed_m_s", mean_square.sqrt(), 0.01);
-    verdict.note("max_speed_m_s", speeds.iter().fold(0.0, |a: f64, b| a.max(*b)));
+    verdict.note(
+        "max_speed_m_s",
+        speeds.iter().fold(0.0, |a: f64, b| a.max(*b)),
+    );
     let end = arena.position(&placed);
-    verdict.note("height_error_mean_radii", (end.y - truth.translation.y) / SPACING);
-    verdict.note("drift_mean_radii", (end - truth.translation).with_y(0.0).length() / SPACING);
+    verdict.note(
+        "height_error_mean_radii",
+        (end.y - truth.translation.y) / SPACING,
+    );
+    verdict.note(
+        "drift_mean_radii",
+        (end - truth.translation).with_y(0.0).length() / SPACING,
+    );
     Ok(())
 }

@@ -58,9 +58,12 @@ fn cases(scale: &Scale) -> Vec<Case> {
             }));
         }
         for spinner in [Spinner::Rod, Spinner::Top] {
-            cases.push(Case::new(SCENE.name, spinner.name(), seed, move |setup, verdict| {
-                spin(setup, verdict, spinner, seed)
-            }));
+            cases.push(Case::new(
+                SCENE.name,
+                spinner.name(),
+                seed,
+                move |setup, verdict| spin(setup, verdict, spinner, seed),
+            ));
         }
     }
     cases
@@ -73,12 +76,18 @@ fn way_of_ball(setup: &Setup, speed: f32, seed: u64) -> Result<Vec3, Stop> {
     let size = Vec2::new(WAY + 2.0, 1.2);
     let floor = Surface::flat(size, SPACING, Backing::Solid, &mut rng);
     let middle = Vec3::X * (0.5 * size.x - 1.0);
-    arena.insert(RigidBodyBuilder::fixed().translation(middle), &floor, Material::default())?;
+    arena.insert(
+        RigidBodyBuilder::fixed().translation(middle),
+        &floor,
+        Material::default(),
+    )?;
+    let surface = Surface::ball(RADIUS, SPACING);
+    let height = RADIUS + surface.lift_on(&floor, setup.method);
     let body = RigidBodyBuilder::dynamic()
-        .translation(Vec3::Y * RADIUS)
+        .translation(Vec3::Y * height)
         .linvel(Vec3::X * speed)
         .angvel(Vec3::NEG_Z * (speed / RADIUS));
-    let ball = arena.insert(body, &Surface::ball(RADIUS, SPACING), Material::default())?;
+    let ball = arena.insert(body, &surface, Material::default())?;
     arena.steps((WAY / speed / DT) as usize)?;
     Ok(arena.position(&ball).with_y(0.0))
 }
@@ -98,7 +107,10 @@ fn spun(setup: &Setup, spinner: Spinner, seed: u64) -> Result<[f32; 3], Stop> {
     let floor = Surface::flat(Vec2::splat(1.0), SPACING, Backing::Solid, &mut rng);
     arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;
     let (surface, height, rate) = spinner.parts(&mut rng);
-    let body = RigidBodyBuilder::dynamic().translation(Vec3::Y * height).angvel(Vec3::Y * rate);
+    let height = height + surface.lift_on(&floor, setup.method);
+    let body = RigidBodyBuilder::dynamic()
+        .translation(Vec3::Y * height)
+        .angvel(Vec3::Y * rate);
     let body = arena.insert(body, &surface, Material::default())?;
     let mut angle = 0.0;
     for _ in 0..(SPIN_SECONDS / DT) as usize {
@@ -114,7 +126,12 @@ fn spin(setup: &Setup, verdict: &mut Verdict, spinner: Spinner, seed: u64) -> Re
     let ours = spun(setup, spinner, seed)?;
     let initial = f64::from(spinner.parts(&mut Rng::with_seed(seed)).2);
     verdict.near("angle_rad", ours[0], angle, 0.05 * angle.abs());
-    verdict.near("spin_left_rad_s", ours[1], rate, 0.05 * rate.abs().max(initial));
+    verdict.near(
+        "spin_left_rad_s",
+        ours[1],
+        rate,
+        0.05 * rate.abs().max(initial),
+    );
     verdict.at_most("shift_mean_radii", ours[2] / SPACING, 1.0);
     Ok(())
 }

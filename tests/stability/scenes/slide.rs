@@ -34,7 +34,10 @@ fn material() -> Material {
 }
 
 fn cases(scale: &Scale) -> Vec<Case> {
-    let speeds: &[f32] = scale.pick(&[0.0, 1.0, 5.0, 10.0], &[0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0]);
+    let speeds: &[f32] = scale.pick(
+        &[0.0, 1.0, 5.0, 10.0],
+        &[0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0],
+    );
     let mut cases = Vec::new();
     for &seed in &scale.seeds {
         for (noise, kind) in [(0.0, "plane"), (0.25, "noisy plane")] {
@@ -55,7 +58,7 @@ fn cases(scale: &Scale) -> Vec<Case> {
     cases
 }
 
-/// Where a sliding box stopped, and how high it went above its resting height, metres.
+/// Where a sliding box stopped, and how high it went above its start, metres.
 struct Slide {
     way: Vec3,
     hop: f32,
@@ -73,15 +76,22 @@ fn measure(setup: &Setup, speed: f32, noise: f32, seed: u64) -> Result<Slide, St
     };
     let mut arena = Arena::new(setup)?;
     let middle = Vec3::X * (0.5 * size.x - 0.5);
-    arena.insert(RigidBodyBuilder::fixed().translation(middle), &floor, material())?;
-    let body = RigidBodyBuilder::dynamic().translation(Vec3::Y * HALF).linvel(Vec3::X * speed);
+    arena.insert(
+        RigidBodyBuilder::fixed().translation(middle),
+        &floor,
+        material(),
+    )?;
     let surface = Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng);
+    let height = HALF + surface.lift_on(&floor, setup.method);
+    let body = RigidBodyBuilder::dynamic()
+        .translation(Vec3::Y * height)
+        .linvel(Vec3::X * speed);
     let body = arena.insert(body, &surface, material())?;
     let mut hop = 0.0_f32;
     let seconds = speed / (FRICTION * GRAVITY);
     for _ in 0..((1.5 * seconds + 1.0) / DT) as usize {
         arena.step()?;
-        hop = hop.max(arena.position(&body).y - HALF);
+        hop = hop.max(arena.position(&body).y - height);
     }
     Ok(Slide {
         way: arena.position(&body).with_y(0.0),
@@ -106,8 +116,16 @@ fn slide(
     } else {
         0.02 * expected
     };
-    verdict.near("stopping_distance_m", ours.way.length(), expected, tolerance);
-    verdict.note("theory_m", f64::from(speed * speed / (2.0 * FRICTION * GRAVITY)));
+    verdict.near(
+        "stopping_distance_m",
+        ours.way.length(),
+        expected,
+        tolerance,
+    );
+    verdict.note(
+        "theory_m",
+        f64::from(speed * speed / (2.0 * FRICTION * GRAVITY)),
+    );
     if speed > 0.0 {
         let heading = ours.way.z.atan2(ours.way.x).to_degrees().abs();
         verdict.at_most("heading_deg", heading, 1.0);
@@ -129,9 +147,9 @@ fn ramp(setup: &Setup, verdict: &mut Verdict, offset_deg: f32, seed: u64) -> Res
     let floor = Surface::flat(size, SPACING, Backing::Solid, &mut rng);
     let pose = Pose::from_parts(downhill * (0.5 * size.x - 0.5), tilt);
     arena.insert(RigidBodyBuilder::fixed().pose(pose), &floor, material())?;
-    let start = tilt * (Vec3::Y * HALF);
-    let builder = RigidBodyBuilder::dynamic().pose(Pose::from_parts(start, tilt));
     let surface = Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng);
+    let start = tilt * Vec3::Y * (HALF + surface.lift_on(&floor, setup.method));
+    let builder = RigidBodyBuilder::dynamic().pose(Pose::from_parts(start, tilt));
     let body = arena.insert(builder, &surface, material())?;
     arena.steps((RAMP_SECONDS / DT) as usize)?;
     let way = (arena.position(&body) - start).dot(downhill);

@@ -41,9 +41,15 @@ fn stack(setup: &Setup, verdict: &mut Verdict, normals: Normals, seed: u64) -> R
     let floor = floor.with_normals(normals);
     arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;
     let mut boxes: Vec<Placed> = Vec::new();
+    let mut top_of_stack = 0.0;
     for k in 0..BOXES {
         let surface = Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng).with_normals(normals);
-        let height = HALF * (2 * k + 1) as f32;
+        let lift = match k {
+            0 => surface.lift_on(&floor, setup.method),
+            _ => surface.lift_on(&surface, setup.method),
+        };
+        top_of_stack += lift + 2.0 * HALF;
+        let height = top_of_stack - HALF;
         let body = RigidBodyBuilder::dynamic().translation(Vec3::Y * height);
         boxes.push(arena.insert(body, &surface, Material::default())?);
     }
@@ -57,10 +63,21 @@ fn stack(setup: &Setup, verdict: &mut Verdict, normals: Normals, seed: u64) -> R
     }
     let height = arena.position(top).y - HALF * (2 * BOXES - 1) as f32;
     verdict.at_most("top_drift_mean_radii", drift / SPACING, 1.0);
-    verdict.near("top_height_error_mean_radii", height / SPACING, 0.0, BOXES as f64);
-    verdict.note("bottom_height_error_mean_radii", (arena.position(bottom).y - HALF) / SPACING);
+    verdict.near(
+        "top_height_error_mean_radii",
+        height / SPACING,
+        0.0,
+        BOXES as f64,
+    );
+    verdict.note(
+        "bottom_height_error_mean_radii",
+        (arena.position(bottom).y - HALF) / SPACING,
+    );
     verdict.note("end_speed_m_s", arena.speed(top));
-    let awake = boxes.iter().filter(|b| !arena.body(b).is_sleeping()).count();
+    let awake = boxes
+        .iter()
+        .filter(|b| !arena.body(b).is_sleeping())
+        .count();
     verdict.note("awake", awake as f64);
     Ok(())
 }

@@ -74,7 +74,7 @@ fn cases(scale: &Scale) -> Vec<Case> {
 }
 
 /// A body that is pulled to `height` from one side (`side` is 1 from above, -1 from below), with
-/// a start `SPACING` away from the sheet, and `speed` towards it.
+/// a start 3 `SPACING` away from the sheet, and `speed` towards it.
 fn insert(
     arena: &mut Arena,
     surface: &Surface,
@@ -82,7 +82,7 @@ fn insert(
     height: f32,
     speed: f32,
 ) -> Result<Placed, Stop> {
-    let start = Vec3::Y * (height + side * (HALF + SPACING));
+    let start = Vec3::Y * (height + side * (HALF + 3.0 * SPACING));
     let body = RigidBodyBuilder::dynamic()
         .translation(start)
         .linvel(Vec3::NEG_Y * (side * speed))

@@ -50,7 +50,9 @@ fn drop_all(
     let count = drops.len();
     for index in drops {
         // Every drop has a seed of its own, so that it can be run alone (`--only-drop`).
-        let row = seed.wrapping_mul(31).wrapping_add(10 * target as u64 + size as u64);
+        let row = seed
+            .wrapping_mul(31)
+            .wrapping_add(10 * target as u64 + size as u64);
         let drop_seed = row.wrapping_mul(1_000_003).wrapping_add(index as u64);
         let (outcome, description) = run_drop(setup, target, size, drop_seed)?;
         match outcome {
@@ -67,7 +69,11 @@ fn drop_all(
     verdict.note("passed_through", failures.len() as f64);
     verdict.require(failures.is_empty(), || {
         let named = &failures[..failures.len().min(NAMED_FAILURES)];
-        format!("{} of {hits} passed through: {}", failures.len(), named.join(", "))
+        format!(
+            "{} of {hits} passed through: {}",
+            failures.len(),
+            named.join(", ")
+        )
     });
     Ok(())
 }

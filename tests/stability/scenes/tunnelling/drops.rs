@@ -108,8 +108,6 @@ struct Plan {
     direction: Vec3,
     spin: Vec3,
     rotation: Quat,
-    /// Aimed at, in the mean plane.
-    aim: Vec2,
     /// Start of the body's middle.
     start: Vec3,
     oriented: bool,
@@ -147,10 +145,13 @@ impl Plan {
             direction,
             spin: random_unit(rng) * between(0.0, TOP_SPIN, rng),
             rotation: Quat::from_axis_angle(random_unit(rng), between(0.0, TAU, rng)),
-            aim,
             start: Vec3::new(aim.x, 0.0, aim.y) - direction * way,
             oriented: rng.bool(),
-            wave_phase: if is_waving { between(0.0, TAU, rng) } else { 0.0 },
+            wave_phase: if is_waving {
+                between(0.0, TAU, rng)
+            } else {
+                0.0
+            },
         }
     }
 
