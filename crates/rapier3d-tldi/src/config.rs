@@ -30,9 +30,10 @@ pub struct TldiConfig {
     pub pixel_scale: f32,
     /// By how much measured gaps scatter from one comparison to the next, in mean radii of the
     /// pair's coarser cloud. A solver that was fed this noise would keep bodies from coming to
-    /// rest, so contacts are kept, riding on their bodies, until the pair has moved by as much
-    /// relative to each other, and a penetration that is measured then pushes only by what it is
-    /// deeper. 0 measures in every step and pushes out all of it.
+    /// rest. So contacts are kept, riding on their bodies, until the pair has moved by as much
+    /// relative to each other; and gaps within the roughness that a contact shows of itself, up to
+    /// twice as much, count as touching, be they open or penetrations. 0 measures in every step and
+    /// pushes out all of it.
     pub scatter: f32,
 }
 

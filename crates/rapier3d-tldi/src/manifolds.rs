@@ -20,6 +20,10 @@ use tldi::{ContactPatch, PairResult};
 /// this angle's cosine (26°): what matters is that the impulse pushes the same way.
 const COS_SAME_NORMAL: f32 = 0.9;
 
+/// Most roughness of a contact that counts as scatter of its measurement, in scatters: rougher ones
+/// are not noisy but uneven.
+const MOST_SCATTERS: f32 = 2.0;
+
 /// Manifolds of the step before and memory for the next, kept by rapier for each pair.
 #[derive(Clone, Default)]
 struct ManifoldWorkspace {
@@ -154,8 +158,8 @@ fn emptied(manifolds: &mut Vec<ContactManifold>, index: usize) -> &mut ContactMa
     manifold
 }
 
-/// Writes the points of `patch`, both sides moved apart by what penetration is within `scatter`,
-/// metres.
+/// Writes the points of `patch`: what is within its roughness, and `scatter` metres, of touching
+/// touches.
 fn write_patch(
     patch: &ContactPatch,
     pair: &PartPair,
@@ -163,10 +167,11 @@ fn write_patch(
     manifold: &mut ContactManifold,
 ) {
     let b_from_a = pair.a_from_b.inverse();
+    let scatter = (MOST_SCATTERS * scatter).min(patch.roughness);
     manifold.local_n1 = patch.normal;
     manifold.local_n2 = b_from_a.rotation * -patch.normal;
     manifold.points.extend(patch.points.iter().map(|point| {
-        let gap = point.gap.max((point.gap + scatter).min(0.0));
+        let gap = (point.gap - scatter).max(0.0) + (point.gap + scatter).min(0.0);
         let apart = 0.5 * (gap - point.gap) * patch.normal;
         TrackedContact::new(
             point.point_a - apart,

@@ -65,4 +65,7 @@ pub struct ContactPatch {
     pub points: arrayvec::ArrayVec<ContactPoint, PATCH_POINTS>,
     /// Whether the gaps form a bowl, whose lowest point is the only one: what touches there rolls.
     pub is_round: bool,
+    /// Standard deviation, in metres, of the gaps about a plane or, where they form one, a bowl: how
+    /// far the measured gap of one point can be trusted.
+    pub roughness: f32,
 }

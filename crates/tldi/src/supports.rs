@@ -64,7 +64,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     let squares = points.iter().map(|p| residual(p).powi(2)).sum::<f32>();
     // A perfectly flat patch has none, by which nothing can be divided.
     let least = least_roughness.max(f32::MIN_POSITIVE);
-    let roughness = (squares / count).sqrt().max(least);
+    let roughness = (squares / count).sqrt();
     let residuals = || points.iter().map(|p| (place(p), residual(p)));
     let (widening, left) = bowl(residuals(), count);
     let lowest = -0.5 * slope / widening;
@@ -84,7 +84,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     });
     let mut best = [(f32::NEG_INFINITY, 0); PATCH_POINTS];
     for (k, point) in points.iter().enumerate() {
-        let (place, low) = (place(point), -residual(point) / roughness);
+        let (place, low) = (place(point), -residual(point) / roughness.max(least));
         let quadrants = [
             Vec2::ONE,
             Vec2::new(-1.0, 1.0),
@@ -107,7 +107,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     Supports {
         indices,
         roughness,
-        roughness_about_bowl: left.clamp(least, roughness),
+        roughness_about_bowl: left.min(roughness),
         lowest_of_bowl,
     }
 }
