@@ -1,5 +1,7 @@
 //! Failures of ours that are known, each with its cause. Everything else that fails is an error.
 
+use std::collections::BTreeMap;
+
 /// A failure of `tldi` that is declared.
 pub(crate) struct KnownFailure {
     /// Name of the scene.
@@ -8,12 +10,26 @@ pub(crate) struct KnownFailure {
     pub(crate) case_prefix: &'static str,
     /// Why it fails, in one sentence.
     pub(crate) cause: &'static str,
+    /// A metric, and how large it may be: what is worse is another failure.
+    at_worst: Option<(&'static str, f64)>,
 }
 
 impl KnownFailure {
     /// Whether it is about this case.
     pub(crate) fn is_about(&self, scene: &str, case: &str) -> bool {
         self.scene == scene && case.starts_with(self.case_prefix)
+    }
+
+    fn covers(&self, metrics: &BTreeMap<String, f64>) -> bool {
+        self.at_worst
+            .is_none_or(|(name, most)| metrics.get(name).is_some_and(|value| *value <= most))
+    }
+
+    const fn no_worse_than(self, metric: &'static str, most: f64) -> Self {
+        Self {
+            at_worst: Some((metric, most)),
+            ..self
+        }
     }
 }
 
@@ -26,68 +42,55 @@ const fn known(
         scene,
         case_prefix,
         cause,
+        at_worst: None,
     }
 }
 
-/// Several rows fail for it.
-const FOUR_LEGS: &str = "A curved surface touches with four points of about equal gap, spread over \
-                         the contact patch, so that a ball stands as on four legs.";
+/// Several rows fail for each of these.
 const UNEVEN_GAPS: &str = "The gaps of one flat contact differ by up to 0.2 r̄ from point to point, \
                            and so do the times at which its points touch.";
 const RESAMPLED: &str =
     "New samples bring new gaps in every frame, which push although nothing moved.";
-const CCD_SLIDES: &str = "The swept shapes touch already, and the sweep takes sliding along for \
-                          approaching: the body is held back in most frames.";
 const NO_VELOCITY: &str = "A wall that is sampled anew has no velocity, and rapier closes \
                            penetrations by 3 m/s at most.";
+const LATE_VELOCITY: &str = "In the first frame of contact the deforming wall pushes with a part of \
+                             its velocity only; the body is then deeper than rapier can close.";
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
                          mean depth.";
 const WRONG_SIDE: &str = "Rarely, the side on which a body is of a noisy sheet without normals is \
                           mistaken while the body is partly in it.";
+const STANDING_SWEEP: &str = "Sweeps take the surface to stand still during a step, but it moves by \
+                              up to half a mean radius and is sampled anew.";
+const BALLS_IN_BALLS: &str = "Contacts between two balls that are more than about 2 r̄ deep in each \
+                              other come and go.";
 
 /// All of them.
 pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
-    known("rest", "ball, ", FOUR_LEGS),
-    known("rest", "box, new samples", RESAMPLED),
-    known("rest", "bunny, new samples", RESAMPLED),
+    known("rest", "ball, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.3),
+    known("rest", "box, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.05),
+    known("rest", "bunny, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.1),
     known("stack", "10 boxes", UNEVEN_GAPS),
-    known("slide", "plane, 5 m/s", CCD_SLIDES),
-    known("slide", "plane, 10 m/s", CCD_SLIDES),
-    known("slide", "noisy plane, 10 m/s", CCD_SLIDES),
-    known("slide", "noisy plane, 1 m/s", UNEVEN_GAPS),
-    known("roll-spin", "ball", FOUR_LEGS),
-    known("roll-spin", "top", FOUR_LEGS),
-    known("bounce", "ball, restitution 1", FOUR_LEGS),
-    known("bounce", "box, restitution", UNEVEN_GAPS),
+    known("slide", "noisy plane, 1 m/s", UNEVEN_GAPS).no_worse_than("heading_deg", 3.0),
+    known("bounce", "box, restitution", UNEVEN_GAPS)
+        .no_worse_than("most_energy_over_initial", 1.01),
     known("thin-sheet", "box on each of two sheets, bare", ONE_LAYER),
     known("thin-sheet", "ball on each of two sheets, bare", ONE_LAYER),
-    known("tunnelling", "scan", WRONG_SIDE),
-    known(
-        "tunnelling",
-        "waves",
-        "Sweeps take the surface to stand still during a step, but it moves by up to a mean radius.",
-    ),
-    known("moving-cloud", "kinematic wall, box, 5 m/s", CCD_SLIDES),
-    known("moving-cloud", "kinematic wall, ball, 5 m/s", CCD_SLIDES),
-    known("moving-cloud", "kinematic wall, ball, 2 m/s", FOUR_LEGS),
+    known("tunnelling", "scan", WRONG_SIDE).no_worse_than("passed_share", 0.04),
+    known("tunnelling", "waves", STANDING_SWEEP).no_worse_than("passed_share", 0.06),
     known(
         "moving-cloud",
-        "deforming wall, box, 5 m/s",
-        "The velocity of the deforming wall does not reach contacts in the first frame of contact, \
-         and the body is then deeper than rapier can close.",
+        "kinematic wall, ball, 5 m/s",
+        "The sweep stops the ball in contact with the wall that pushes it in some frames, and the \
+         wall overtakes it.",
     ),
-    known(
-        "moving-cloud",
-        "deforming wall, ball, 5 m/s",
-        "The velocity of the deforming wall does not reach contacts in the first frame of contact, \
-         and the body is then deeper than rapier can close.",
-    ),
-    known("moving-cloud", "streamed wall", NO_VELOCITY),
-    known(
-        "deep-start",
-        "two balls, 30 %",
-        "No contact is found between two balls 3 r̄ deep in each other (10, 50 and 80 % are).",
-    ),
+    known("moving-cloud", "deforming wall, box, 5 m/s", LATE_VELOCITY),
+    known("moving-cloud", "deforming wall, ball, 5 m/s", LATE_VELOCITY),
+    known("moving-cloud", "streamed wall, box, 2 m/s", NO_VELOCITY),
+    known("moving-cloud", "streamed wall, box, 5 m/s", NO_VELOCITY),
+    known("moving-cloud", "streamed wall, ball, 2 m/s", NO_VELOCITY),
+    known("moving-cloud", "streamed wall, ball, 5 m/s", NO_VELOCITY),
+    known("deep-start", "two balls, 30 %", BALLS_IN_BALLS).no_worse_than("fastest_m_s", 2.0),
+    known("deep-start", "two balls, 80 %", BALLS_IN_BALLS).no_worse_than("fastest_m_s", 2.0),
     known(
         "density",
         "1 % flying pixels",
@@ -95,27 +98,34 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     ),
     known(
         "grazing",
-        "ball in a groove",
-        "Near the bottom of a groove without normals, the estimated ones are means of both sides.",
-    ),
-    known("scale-shift", "box of 100 m", UNEVEN_GAPS),
-    known("scale-shift", "points 1 km", UNEVEN_GAPS),
+        "ball in a groove, bare",
+        "Near the bottom of a groove without normals, the estimated ones are means of both sides; \
+         at one angle of one seed in five a depth of 10 r̄ is made up.",
+    )
+    .no_worse_than("worst_gap_error_mean_radii", 10.0),
+    known("scale-shift", "box of 100 m", UNEVEN_GAPS).no_worse_than("shift_mean_radii", 0.2),
+    known("scale-shift", "points 1 km", UNEVEN_GAPS).no_worse_than("tilt_deg", 0.3),
 ];
 
 /// The declared cause of a failure, if there is one.
-pub(crate) fn known_cause(scene: &str, case: &str) -> Option<&'static str> {
-    let about_it = |known: &&KnownFailure| known.is_about(scene, case);
+pub(crate) fn known_cause(
+    scene: &str,
+    case: &str,
+    metrics: &BTreeMap<String, f64>,
+) -> Option<&'static str> {
+    let explains = |known: &&KnownFailure| known.is_about(scene, case) && known.covers(metrics);
     KNOWN_FAILURES
         .iter()
-        .find(about_it)
+        .find(explains)
         .map(|known| known.cause)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::KNOWN_FAILURES;
+    use super::{KNOWN_FAILURES, known_cause};
     use crate::suite::case::Scale;
     use crate::suite::scenes::SCENES;
+    use std::collections::BTreeMap;
 
     #[test]
     fn every_known_failure_is_about_a_case() {
@@ -130,5 +140,23 @@ mod tests {
             let is_about_one = cases.iter().any(|c| known.is_about(c.scene, &c.name));
             assert!(is_about_one, "{} / {}", known.scene, known.case_prefix);
         }
+    }
+
+    #[test]
+    fn what_is_worse_than_declared_is_another_failure() {
+        let cause = |speed: f64| {
+            let metrics = BTreeMap::from([("rms_speed_m_s".to_owned(), speed)]);
+            known_cause("rest", "box, new samples each frame", &metrics)
+        };
+        assert!(cause(0.02).is_some());
+        assert_eq!(cause(0.2), None);
+        assert_eq!(
+            known_cause("rest", "box, new samples each frame", &BTreeMap::new()),
+            None
+        );
+        assert_eq!(
+            known_cause("rest", "box, oriented plane", &BTreeMap::new()),
+            None
+        );
     }
 }

@@ -57,9 +57,9 @@ mod tests {
 
     fn scale() -> Scale {
         Scale {
-            seeds: vec![3, 4],
+            seeds: vec![3],
             long: false,
-            drops: 18,
+            drops: 9,
             only_drop: None,
         }
     }

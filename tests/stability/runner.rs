@@ -73,6 +73,7 @@ fn run_one(case: &Case, setup: &Setup) -> Row {
         Err(Stop::Failed(error)) => (Some(false), Verdict::default(), Some(error)),
     };
     let is_ours = setup.method == Method::Tldi && passed == Some(false);
+    let known = is_ours.then(|| known_cause(case.scene, &case.name, &verdict.metrics));
     Row {
         scene: case.scene,
         case: case.name.clone(),
@@ -81,8 +82,6 @@ fn run_one(case: &Case, setup: &Setup) -> Row {
         passed,
         metrics: verdict.metrics,
         reason,
-        known_cause: is_ours
-            .then(|| known_cause(case.scene, &case.name))
-            .flatten(),
+        known_cause: known.flatten(),
     }
 }

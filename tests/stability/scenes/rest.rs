@@ -57,6 +57,14 @@ impl Body {
         }
     }
 
+    /// Edge of the plane below, metres; a ball may roll about.
+    fn floor_size(self) -> f32 {
+        match self {
+            Self::Box | Self::Bunny => 0.5,
+            Self::Ball => 0.9,
+        }
+    }
+
     /// The pose in which it lies on y = 0.
     fn resting_pose(self, surface: &Surface) -> Pose {
         match self {
@@ -85,8 +93,8 @@ fn cases(scale: &Scale) -> Vec<Case> {
     cases
 }
 
-fn plane(noise: f32, normals: Normals, rng: &mut Rng) -> Surface {
-    let size = Vec2::splat(0.5);
+fn plane(body: Body, noise: f32, normals: Normals, rng: &mut Rng) -> Surface {
+    let size = Vec2::splat(body.floor_size());
     let plane = if noise > 0.0 {
         Surface::noisy(size, SPACING, noise * SPACING, Backing::Solid, rng)
     } else {
@@ -121,7 +129,7 @@ fn fixed_samples(
     seed: u64,
 ) -> Result<(), Stop> {
     let mut rng = Rng::with_seed(seed);
-    let plane = plane(0.0, normals, &mut rng);
+    let plane = plane(body, 0.0, normals, &mut rng);
     let (mut arena, [_, placed], truth) = start(setup, body, &plane, &mut rng)?;
     let mut asleep_after = None;
     let mut settled = Pose::IDENTITY;
@@ -171,25 +179,28 @@ fn new_samples(setup: &Setup, verdict: &mut Verdict, body: Body, seed: u64) -> R
     let mut rng = Rng::with_seed(seed);
     let mut sample = {
         let mut rng = Rng::with_seed(seed ^ 0x5eed);
-        move || plane(0.25, Normals::Absent, &mut rng)
+        move || plane(body, 0.25, Normals::Absent, &mut rng)
     };
     let (mut arena, [floor, placed], truth) = start(setup, body, &sample(), &mut rng)?;
     let steps = ((SETTLE_SECONDS + REST_SECONDS) / DT) as usize;
     let watched = (5.0 / DT) as usize;
-    let mut speeds = Vec::with_capacity(watched);
-    for step in 0..steps {
+    let mut speeds = Vec::with_capacity(steps);
+    for step in 1..=steps {
         arena.reshape(&floor, &sample(), SamePoints::No)?;
         arena.step()?;
-        if step >= steps - watched {
-            speeds.push(f64::from(arena.speed(&placed)));
+        speeds.push(f64::from(arena.speed(&placed)));
+        let at = arena.position(&placed);
+        if at.x.abs().max(at.z.abs()) > 0.5 * body.floor_size() {
+            let seconds = verdict.note("left_after_s", step as f32 * DT);
+            verdict.require(false, || format!("left the plane after {seconds:.1} s"));
+            break;
         }
     }
+    let speeds = &speeds[speeds.len().saturating_sub(watched)..];
     let mean_square = speeds.iter().map(|v| v * v).sum::<f64>() / speeds.len() as f64;
     verdict.at_most("rms_speed_m_s", mean_square.sqrt(), 0.01);
-    verdict.note(
-        "max_speed_m_s",
-        speeds.iter().fold(0.0, |a: f64, b| a.max(*b)),
-    );
+    let fastest = speeds.iter().fold(0.0, |a: f64, b| a.max(*b));
+    verdict.note("max_speed_m_s", fastest);
     let end = arena.position(&placed);
     verdict.note(
         "height_error_mean_radii",

@@ -67,6 +67,10 @@ fn drop_all(
     verdict.note("drops", count as f64);
     verdict.note("hits", hits);
     verdict.note("passed_through", failures.len() as f64);
+    verdict.note(
+        "passed_share",
+        failures.len() as f64 / f64::from(hits.max(1)),
+    );
     verdict.require(failures.is_empty(), || {
         let named = &failures[..failures.len().min(NAMED_FAILURES)];
         format!(
