@@ -66,7 +66,7 @@ fn box_faces_without_normals_reach_too_deep_at_the_rim() {
 #[test]
 fn edges_and_corners_are_blunt() {
     for (pair, shallow, deep) in [
-        (ContactPair::EdgePlane, 0.45, 0.11),
+        (ContactPair::EdgePlane, 0.55, 0.11),
         (ContactPair::CornerPlane, 0.75, 0.2),
     ] {
         for (regime, with_normals, normal) in [
