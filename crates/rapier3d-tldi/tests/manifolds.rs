@@ -83,6 +83,7 @@ impl Backend for Restless {
                 result.patches.push(ContactPatch {
                     normal,
                     points: chunk.iter().copied().collect(),
+                    ..ContactPatch::default()
                 });
             }
         }
