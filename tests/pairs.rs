@@ -171,7 +171,7 @@ fn box_on_plane() {
 fn a_box_deep_in_a_floor() {
     let mut rng = fastrand::Rng::with_seed(9);
     let half = Vec3::new(0.1, 0.4, 0.1);
-    let plane = sampled_plane(0.6, R, &mut rng).cloud(R);
+    let plane = sampled_plane(0.8, R, &mut rng).cloud(R);
     let boxed = sampled_box(half, R, &mut rng).cloud(R);
     let depth = 25.0 * R;
     let on_top = Pose3::new(Vec3::Y * (half.y - depth), Vec3::Y * 0.3);

@@ -151,8 +151,12 @@ pub(crate) fn contact(
         .flatten();
     Ok(Some(measured.unwrap_or_else(|| {
         let [point1, point2] = found.points;
-        let normal = (point2 - point1).try_normalize().unwrap_or(found.normal);
-        contact_in_frames(&pair, [point1, point2], normal, found.distance, found.parts)
+        let apart = point2 - point1;
+        // Nearest points of surfaces that have passed through each other: as far as they are in.
+        let sign = if found.distance > 0.0 { 1.0 } else { -1.0 };
+        let normal = (sign * apart).try_normalize().unwrap_or(found.normal);
+        let distance = sign * apart.length();
+        contact_in_frames(&pair, [point1, point2], normal, distance, found.parts)
     })))
 }
 
