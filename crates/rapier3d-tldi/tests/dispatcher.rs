@@ -95,28 +95,38 @@ fn both_orders_mirror_each_other() {
     }
 }
 
-/// A penetration within the scatter of measurements touches, a deeper one counts by what it is
-/// deeper, and gaps stay.
+/// What is within the roughness of a rough floor of touching touches, and what is deeper counts by
+/// what it is deeper; smooth surfaces are trusted as they are.
 #[test]
-fn penetrations_count_beyond_the_scatter() {
-    let (floor, body) = (shape(&square(0.6)), shape(&cube(0.1)));
-    let scatter = 0.1 * floor.cloud().mean_radius();
-    for depth in [-0.005, 0.5 * scatter, 2.0 * scatter, 0.02] {
-        let pose = Pose::from_translation(Vector::Y * (0.1 - depth));
-        let gaps = |scatter| {
-            contacts(&dispatcher_with_scatter(scatter), &pose, &floor, &body)
-                .expect("answered")
-                .into_iter()
-                .map(|(middle, _, gap)| (middle, gap))
-        };
-        let mut count = 0;
-        for ((middle, measured), (same_middle, gap)) in gaps(0.0).zip(gaps(0.1)) {
-            let expected = measured.max((measured + scatter).min(0.0));
-            assert!((gap - expected).abs() < 1e-6, "{measured}: {gap}");
-            assert!(middle.distance(same_middle) < 1e-6);
-            count += 1;
+fn gaps_count_beyond_the_roughness() {
+    let mut rng = fastrand::Rng::with_seed(1);
+    let body = shape(&cube(0.2));
+    let mut rough = square(0.6);
+    for point in &mut rough {
+        point.y += 0.5 * SPACING * (rng.f32() - 0.5);
+    }
+    for (floor, least, most) in [(shape(&square(0.6)), 0.0, 0.03), (shape(&rough), 0.05, 0.2)] {
+        for depth in [-0.005, 0.002, 0.008, 0.02] {
+            let pose = Pose::from_translation(Vector::Y * (0.2 - depth));
+            let gaps = |scatter| {
+                contacts(&dispatcher_with_scatter(scatter), &pose, &floor, &body)
+                    .expect("answered")
+                    .into_iter()
+                    .map(|(middle, _, gap)| (middle, gap))
+            };
+            let mut counted = Vec::new();
+            for ((middle, measured), (same_middle, gap)) in gaps(0.0).zip(gaps(0.1)) {
+                assert!(middle.distance(same_middle) < 1e-6);
+                // Never past touching, nor by more than twice the scatter.
+                assert!(gap * measured >= 0.0 && gap.abs() <= measured.abs());
+                let taken = (measured.abs() - gap.abs()) / SPACING;
+                assert!(taken <= most + 1e-4, "{measured}: {gap}");
+                if gap != 0.0 {
+                    counted.push(taken);
+                }
+            }
+            assert!(counted.iter().all(|taken| *taken >= least), "{counted:?}");
         }
-        assert!(count >= 4, "{count} contacts at depth {depth}");
     }
 }
 

@@ -144,7 +144,7 @@ fn deforming_floors_carry_what_stands_on_them() -> TestResult {
             // Where new corners bear the cube in every step it rocks a little; on a floor that sinks
             // it falls in small hops, since rapier ends every step without relative velocity.
             // Friction of 0.5 brings it to the speed within 0.1 s and 25 mm.
-            assert!(behind.length() < SPACING, "{case}");
+            assert!(behind.length() < 1.5 * SPACING, "{case}");
             assert!(slower.with_y(0.0).length() < 0.2, "{case}");
         }
     }

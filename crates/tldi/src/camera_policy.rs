@@ -216,20 +216,20 @@ fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec
 /// The axis or its opposite, such that it points from `b` towards `a`; and whether anything told.
 ///
 /// The side that a body was on it keeps, whatever it looks like now: that is what holds it on a
-/// sheet without an inside. Next comes where it plainly lies; only what is deep in each other asks
-/// for the outside of the surfaces, which for thin ones may be the wrong one.
+/// sheet without an inside. Next come surfaces that both show their outsides to each other, then
+/// where the body plainly lies; one surface alone, which may be thin and passed already, only tells
+/// of what is deep in it.
 fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3, bool) {
-    let by_memory = approach.last_axis.map_or(0.0, |last| axis.dot(last));
-    let by_normals = || {
-        let [a, b] = sides.each_ref().map(|side| mean_along(side, axis));
-        b - a
-    };
     let conclusive = |sign: f32| (sign.abs() >= CONCLUSIVE).then_some(sign > 0.0);
-    let agrees = conclusive(by_memory)
-        .or_else(|| approach.side_by_position(axis))
-        .or_else(|| conclusive(by_normals()));
+    let by_memory = conclusive(approach.last_axis.map_or(0.0, |last| axis.dot(last)));
+    let [of_a, of_b] = sides.each_ref().map(|side| mean_along(side, axis));
+    let by_both = conclusive(of_b).filter(|_| conclusive(of_b) == conclusive(-of_a));
     let by_position = -axis.dot(approach.direction());
-    let agrees = agrees.or_else(|| conclusive(by_position));
+    let agrees = by_memory
+        .or(by_both)
+        .or_else(|| approach.side_by_position(axis))
+        .or_else(|| conclusive(of_b - of_a))
+        .or_else(|| conclusive(by_position));
     if agrees.unwrap_or(by_position >= 0.0) {
         (axis, agrees.is_some())
     } else {
@@ -314,9 +314,11 @@ mod tests {
     fn facing_planes_give_one_axis_from_b_to_a() {
         let (up, down) = (vec![Vec3::Y; 50], vec![-Vec3::Y; 30]);
         let oriented = [zone(&up, true), zone(&down, true)];
-        // Deep in each other, the outside decides; elsewhere where `b` lies.
-        assert_eq!(zone_axes(oriented, &lying(-0.5 * Vec3::Y)), [-Vec3::Y]);
-        assert_eq!(zone_axes(oriented, &lying(-2.0 * Vec3::Y)), [Vec3::Y]);
+        // Two outsides that face each other decide; one alone only where `b` is deep in it.
+        assert_eq!(zone_axes(oriented, &lying(-2.0 * Vec3::Y)), [-Vec3::Y]);
+        let half = [zone(&up, true), zone(&down, false)];
+        assert_eq!(zone_axes(half, &lying(-0.5 * Vec3::Y)), [-Vec3::Y]);
+        assert_eq!(zone_axes(half, &lying(-2.0 * Vec3::Y)), [Vec3::Y]);
         let bare = [zone(&up, false), zone(&down, false)];
         assert_eq!(zone_axes(bare, &lying(-0.5 * Vec3::Y)), [Vec3::Y]);
     }
