@@ -229,10 +229,13 @@ impl Report {
         Ok(())
     }
 
-    /// Rows into the file, and the run's circumstances into a `.run.json` beside it: equal seeds
+    /// Rows into the file, one a line, and the run's circumstances into a `.run.json` beside it: equal seeds
     /// then give equal files of rows.
     fn write_json(&self, file: &Path) -> anyhow::Result<()> {
-        write(file, &(serde_json::to_string_pretty(&self.rows)? + "\n"))?;
+        let rows: Vec<String> = (self.rows.iter())
+            .map(serde_json::to_string)
+            .collect::<Result<_, _>>()?;
+        write(file, &format!("[\n{}\n]\n", rows.join(",\n")))?;
         let run = serde_json::to_string_pretty(&self.run)? + "\n";
         write(&file.with_extension("run.json"), &run)
     }
