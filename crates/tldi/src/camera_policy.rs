@@ -56,6 +56,9 @@ const CONCLUSIVE: f32 = 0.3;
 /// Turns the axis of a flat contact by 8° at the most.
 const HINT_WEIGHT: f32 = 0.5;
 
+/// Least share of that weight.
+const LEAST_PLAIN: f32 = 0.2;
+
 /// Weight of the last axis beside the normals of a surface.
 const MEMORY_WEIGHT: f32 = 0.5;
 
@@ -124,10 +127,11 @@ impl Approach {
         self.half_extents.dot((self.larger_from_a * axis).abs())
     }
 
-    /// 1 where `b` lies outside of where the bounds meet, or comes from there; less inside.
+    /// 1 where `b` lies outside of where the bounds meet, or comes from there; less inside, but
+    /// enough to decide between walls that are alike.
     fn plainness(&self) -> f32 {
         let inside = self.half_extent(self.direction()).max(f32::MIN_POSITIVE);
-        (self.toward_b.length() / inside).min(1.0)
+        (self.toward_b.length() / inside).clamp(LEAST_PLAIN, 1.0)
     }
 
     /// Whether `b` lies on the side of `a` that `axis` points away from, so surely that nothing else

@@ -54,9 +54,6 @@ const DEEPER: f32 = 0.4;
 /// of a small face whose rim is blurred by estimated normals by 0.1.
 const LEAST_RISE: f32 = 0.15;
 
-/// Band above the lowest point of a rough bowl, in its roughnesses, in which surfaces may touch.
-const TOUCHING: f32 = 2.0;
-
 /// Variance (1 − mean length) that a surface's normals are taken to have at least: keeps the
 /// weights of two perfectly flat surfaces finite.
 const LEAST_VARIANCE: f32 = 0.01;
@@ -326,38 +323,25 @@ impl Shape {
         let supports = supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
         let rises = supports.roughness >= LEAST_RISE * params.pixel_size;
         let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
-        let roughness = match rises {
-            true => supports.roughness_about_bowl,
-            false => supports.roughness,
-        };
-        let mut indices = supports.indices;
+        let roughness = supports.roughness_about_bowl;
         if let Some(lowest) = lowest_of_bowl {
-            if roughness < LEAST_ROUGHNESS * params.pixel_size {
-                // Around it the surfaces have other normals: points there would stop what rolls.
-                return ContactPatch {
-                    normal: self.normal,
-                    points: [lowest].into_iter().collect(),
-                    is_round: true,
-                    roughness,
-                };
-            }
-            // A ball on a rough floor touches wherever it may touch as well.
-            points.retain(|point| point.gap <= lowest.gap + TOUCHING * roughness);
-            if points.is_empty() {
-                points.push(lowest);
-            }
-            indices = self::supports(points, self.normal, roughness).indices;
+            // Around it the surfaces have other normals: points there would stop what rolls.
+            return ContactPatch {
+                normal: self.normal,
+                points: [lowest].into_iter().collect(),
+                is_round: true,
+                roughness,
+            };
         }
         let mut patch = ContactPatch {
             normal: self.normal,
-            points: indices.into_iter().map(|k| points[k]).collect(),
+            points: supports.indices.into_iter().map(|k| points[k]).collect(),
             is_round: false,
             roughness,
         };
         patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
         let deepest = self.deepest(points, params);
-        let unevenness = roughness.max(LEAST_ROUGHNESS * params.pixel_size);
-        if deepest.gap < patch.points[0].gap - DEEPER * unevenness {
+        if rises && deepest.gap < patch.points[0].gap - DEEPER * supports.roughness {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
         }

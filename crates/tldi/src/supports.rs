@@ -20,9 +20,13 @@ pub struct Supports {
     pub lowest_of_bowl: Option<ContactPoint>,
 }
 
+/// Most that lowness counts, in roughnesses: what is lower still is an odd one out, and would
+/// otherwise be chosen in all four quadrants.
+const LOWEST: f32 = 2.5;
+
 /// Share of the roughness that a bowl leaves at the most. A small flat face whose rim is bent by
 /// estimated normals is no bowl.
-const UNEXPLAINED: f32 = 0.25;
+const UNEXPLAINED: f32 = 0.1;
 
 /// Farthest that the lowest point of a bowl is from the middle of the points, in standard deviations
 /// along each main axis. In a disc the rim is at 2.
@@ -92,6 +96,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     let mut best = [(f32::NEG_INFINITY, 0); PATCH_POINTS];
     for (k, point) in points.iter().enumerate() {
         let (place, low) = (place(point), -residual(point) / roughness.max(least));
+        let low = low.min(LOWEST);
         let quadrants = [
             Vec2::ONE,
             Vec2::new(-1.0, 1.0),
@@ -231,6 +236,23 @@ mod tests {
         assert!((lowest.middle().x + 2.5).abs() < 0.01, "{lowest:?}");
         assert!(lowest.middle().z.abs() < 0.01, "{lowest:?}");
         assert_eq!(cap(Vec2::new(0.02, 0.0)).lowest_of_bowl, None);
+    }
+
+    /// One point far below all others does not take the place of the corners.
+    #[test]
+    fn an_odd_one_out_leaves_the_corners() {
+        let mut points: Vec<ContactPoint> = (0..81)
+            .map(|k| Vec3::new((k % 9) as f32, 0.0, (k / 9) as f32))
+            .map(|p| ContactPoint {
+                point_a: p,
+                point_b: p,
+                gap: 0.0,
+            })
+            .collect();
+        points[39].gap = -1.0;
+        let mut found = supports(&points, Vec3::Y, 0.01).indices;
+        found.sort();
+        assert_eq!(found[..], [0, 8, 72, 80]);
     }
 
     #[test]

@@ -291,7 +291,10 @@ impl CoreScratch {
         // What is as far inside as it gets there is no rim, however thin.
         let deepest_around = inner;
         deepest_around.clone_from(depth);
-        dilate(deepest_around, &mut self.spare, row, u8::max);
+        // Twice: around a round border it grows by one in two pixels here and there.
+        for _ in 0..2 {
+            dilate(deepest_around, &mut self.spare, row, u8::max);
+        }
         let rim = 1 + RIM as u8;
         for ((covered, depth), around) in covered.iter_mut().zip(depth).zip(deepest_around) {
             *covered &= u8::from(*depth > rim || depth == around);
