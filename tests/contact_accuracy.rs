@@ -2,6 +2,7 @@
 //! the binary of the same name.
 
 use std::sync::LazyLock;
+use tldi::CameraPolicy;
 use tldi_tests::{
     AccuracyRow, ContactPair, DEEP_LIMIT, NORMAL_LIMIT, Regime, SHALLOW_LIMIT, measure_accuracy,
 };
@@ -9,7 +10,8 @@ use tldi_tests::{
 /// An odd number, so that the median is one of them.
 const CASES: usize = 21;
 
-static ROWS: LazyLock<Vec<AccuracyRow>> = LazyLock::new(|| measure_accuracy(CASES, 1, |_| ()));
+static ROWS: LazyLock<Vec<AccuracyRow>> =
+    LazyLock::new(|| measure_accuracy(CASES, 1, CameraPolicy::default(), |_| ()));
 
 /// Asserts that the medians of every bin of the rows that `keep` accepts are within the limits: of
 /// the normal in degrees, of the depth in r̄ up to 2 r̄ and in parts of the depth beyond.

@@ -64,12 +64,12 @@ const PANELS: [Panel; 4] = [
     },
 ];
 
-/// Writes `contact_accuracy.svg` and `contact_accuracy.png`.
-pub(crate) fn draw(rows: &[AccuracyRow], folder: &Path) -> anyhow::Result<()> {
+/// Writes `contact_accuracy.svg` and `contact_accuracy.png`, `suffix` added to their names.
+pub(crate) fn draw(rows: &[AccuracyRow], suffix: &str, folder: &Path) -> anyhow::Result<()> {
     plotters::style::register_font(FONT, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
         .map_err(|_| anyhow!("the built-in font cannot be read"))?;
-    let svg = folder.join("contact_accuracy.svg");
-    let png = folder.join("contact_accuracy.png");
+    let svg = folder.join(format!("contact_accuracy{suffix}.svg"));
+    let png = folder.join(format!("contact_accuracy{suffix}.png"));
     paint(rows, &SVGBackend::new(&svg, SIZE).into_drawing_area())
         .with_context(|| format!("cannot draw {}", svg.display()))?;
     paint(rows, &BitMapBackend::new(&png, SIZE).into_drawing_area())

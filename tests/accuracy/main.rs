@@ -7,7 +7,7 @@ use anyhow::Context;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
-use tldi_tests::{ACCURACY_ROWS, ANGLE_STEP, measure_accuracy};
+use tldi_tests::{ACCURACY_ROWS, ANGLE_STEP, PolicyChoice, measure_accuracy};
 
 /// Measures spheres, boxes and ramps against analytic truth; prints a table and draws a chart.
 #[derive(Parser)]
@@ -15,7 +15,8 @@ struct Args {
     /// Write the rows to this file as JSON
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Write contact_accuracy.svg and contact_accuracy.png into this folder
+    /// Write contact_accuracy.svg and contact_accuracy.png into this folder; the names of other
+    /// camera policies are added
     #[arg(long)]
     out: Option<PathBuf>,
     /// Contacts for each pair, depth range, bin of angles, with and without normals
@@ -24,6 +25,9 @@ struct Args {
     /// Seed of the random places, rotations and depths
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// From where pairs of clouds are looked at
+    #[arg(long, value_enum, default_value_t = PolicyChoice::ContactZone)]
+    camera_policy: PolicyChoice,
 }
 
 #[allow(clippy::print_stdout, reason = "the table is what the program is for")]
@@ -33,10 +37,15 @@ fn main() -> anyhow::Result<()> {
     bar.set_style(ProgressStyle::with_template(
         "{bar:40} {pos}/{len} {msg} {eta}",
     )?);
-    let rows = measure_accuracy(args.cases as usize, args.seed, |row| {
-        bar.set_message(row.pair.name());
-        bar.inc(1);
-    });
+    let rows = measure_accuracy(
+        args.cases as usize,
+        args.seed,
+        args.camera_policy.into(),
+        |row| {
+            bar.set_message(row.pair.name());
+            bar.inc(1);
+        },
+    );
     bar.finish_and_clear();
     for row in &rows {
         println!("{row}");
@@ -54,7 +63,7 @@ fn main() -> anyhow::Result<()> {
     if let Some(folder) = &args.out {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make {}", folder.display()))?;
-        chart::draw(&rows, folder)?;
+        chart::draw(&rows, args.camera_policy.suffix(), folder)?;
     }
     Ok(())
 }

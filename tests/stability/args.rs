@@ -6,7 +6,7 @@ use super::scenes::SCENES;
 use anyhow::bail;
 use rapier3d_tldi::TldiConfig;
 use std::path::PathBuf;
-use tldi::CameraPolicy;
+use tldi_tests::PolicyChoice;
 
 /// Seeds of the long and of the short version, where none are asked for.
 const LONG_SEEDS: u64 = 5;
@@ -72,33 +72,6 @@ pub(crate) enum BackendChoice {
     Cpu,
     /// A GPU backend.
     Gpu,
-}
-
-/// From where pairs of clouds are looked at.
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-enum PolicyChoice {
-    /// By the normals of the contact zone, with hysteresis, up to three views.
-    ContactZone,
-    /// One view against the motion.
-    Motion,
-    /// One view by the normals of the contact zone, anew in every frame.
-    Covariance,
-    /// One view along the axis in which the bounds overlap least.
-    SmallestExtent,
-    /// One view along the last axis.
-    LastNormal,
-}
-
-impl From<PolicyChoice> for CameraPolicy {
-    fn from(choice: PolicyChoice) -> Self {
-        match choice {
-            PolicyChoice::ContactZone => Self::ContactZone,
-            PolicyChoice::Motion => Self::Motion,
-            PolicyChoice::Covariance => Self::Covariance,
-            PolicyChoice::SmallestExtent => Self::SmallestExtent,
-            PolicyChoice::LastNormal => Self::LastNormal,
-        }
-    }
 }
 
 impl BackendChoice {

@@ -61,8 +61,8 @@ const WRONG_SIDE: &str = "Rarely, the side on which a body is of a noisy sheet w
                           mistaken while the body is partly in it.";
 const STANDING_SWEEP: &str = "Sweeps take the surface to stand still during a step, but it moves by \
                               up to half a mean radius and is sampled anew.";
-const BALLS_IN_BALLS: &str = "Contacts between two balls that are more than about 2 r̄ deep in each \
-                              other come and go.";
+const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
+                            it spins off, as the primitive does, and with a little less height.";
 
 /// All of them.
 pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
@@ -72,12 +72,13 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "stack",
         "10 boxes",
-        "Every interface may tilt by what gaps scatter, 0.1 r̄ or half a degree, before it is pushed \
-         back, and some have only three points.",
+        "Not fully explained: interfaces tilt by a degree while the stack settles, and it leans more \
+         and more; rapier's own meshes and voxels fall as well.",
     ),
     known("slide", "noisy plane, 1 m/s", UNEVEN_GAPS).no_worse_than("heading_deg", 3.0),
-    known("bounce", "box, restitution", UNEVEN_GAPS)
-        .no_worse_than("most_energy_over_initial", 1.01),
+    known("slide", "noisy plane, 5 m/s", UNEVEN_GAPS).no_worse_than("hop_mean_radii", 0.7),
+    known("bounce", "box, restitution", SOLVER_SPINS)
+        .no_worse_than("most_energy_over_initial", 1.05),
     known("thin-sheet", "box on each of two sheets, bare", ONE_LAYER),
     known("thin-sheet", "ball on each of two sheets, bare", ONE_LAYER),
     known("tunnelling", "scan", WRONG_SIDE).no_worse_than("passed_share", 0.04),
@@ -94,8 +95,6 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known("moving-cloud", "streamed wall, box, 5 m/s", NO_VELOCITY),
     known("moving-cloud", "streamed wall, ball, 2 m/s", NO_VELOCITY),
     known("moving-cloud", "streamed wall, ball, 5 m/s", NO_VELOCITY),
-    known("deep-start", "two balls, 30 %", BALLS_IN_BALLS).no_worse_than("fastest_m_s", 2.0),
-    known("deep-start", "two balls, 80 %", BALLS_IN_BALLS).no_worse_than("fastest_m_s", 2.0),
     known(
         "density",
         "1 % flying pixels",

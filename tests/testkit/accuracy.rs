@@ -291,6 +291,7 @@ pub const ACCURACY_ROWS: usize = 2 * ContactPair::ALL.len() * Regime::ALL.len() 
 pub fn measure_accuracy(
     cases: usize,
     seed: u64,
+    policy: CameraPolicy,
     mut done: impl FnMut(&AccuracyRow),
 ) -> Vec<AccuracyRow> {
     let mut rng = fastrand::Rng::with_seed(seed);
@@ -307,7 +308,7 @@ pub fn measure_accuracy(
                         let case = clouds.case(pair, depth, &mut rng);
                         let angle =
                             ((angle_bin as f32 + rng.f32()) * ANGLE_STEP as f32).to_radians();
-                        let result = case.compare(angle, &mut rng);
+                        let result = case.compare(angle, policy, &mut rng);
                         errors.push(&case, &result, regime);
                     }
                     let row = errors.row(pair, with_normals, regime, angle_bin);
@@ -322,7 +323,7 @@ pub fn measure_accuracy(
 
 impl Case<'_> {
     /// Compares with a hint `angle` radians from the true normal.
-    fn compare(&self, angle: f32, rng: &mut fastrand::Rng) -> PairResult {
+    fn compare(&self, angle: f32, policy: CameraPolicy, rng: &mut fastrand::Rng) -> PairResult {
         let tangent = loop {
             let across = random_unit(rng).reject_from(self.normal);
             if let Some(tangent) = across.try_normalize() {
@@ -334,7 +335,7 @@ impl Case<'_> {
             b: Surface::Cloud(self.b),
             a_from_b: self.a_from_b,
             view: View::Aim {
-                policy: CameraPolicy::default(),
+                policy,
                 motion: -MOTION * (angle.cos() * self.normal + angle.sin() * tangent),
                 last_axis: None,
             },

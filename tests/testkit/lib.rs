@@ -4,6 +4,7 @@ mod accuracy;
 mod data;
 mod oracle;
 mod pairs;
+mod policy;
 mod random;
 mod shapes;
 mod sheets;
@@ -15,6 +16,7 @@ pub use accuracy::{
 pub use data::{data_file, load_cloud};
 pub use oracle::{OracleFragment, oracle_layers};
 pub use pairs::{aimed, compare, compare_clouds, deepest_point};
+pub use policy::PolicyChoice;
 pub use random::{random_pose, random_unit};
 pub use shapes::{Samples, sampled_box, sampled_plane, sampled_ramp, sampled_sphere};
 pub use sheets::{Sheet, standard_normal};

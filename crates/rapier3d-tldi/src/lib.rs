@@ -42,11 +42,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! # What does not work yet
-//! - Continuous collision detection: fast bodies that are clouds, or that meet clouds, may tunnel.
-//!   Rapier's soft CCD (`RigidBodyBuilder::soft_ccd_prediction`) works.
-//! - Shape casts with clouds are declined ([`TldiDispatcher`], which answers every other query).
-//!   Rapier's character controller asks its own dispatcher and passes through clouds.
+//! # What does not work
+//! - Sweeps of fast bodies (continuous collision detection) take the shapes as they are at the
+//!   beginning of the step, and miss what only a turning on the spot would meet.
+//! - Rapier's character controller asks its own dispatcher and passes through clouds.
 //! - A body wholly inside a cloud's volume, surfaces apart, is not in contact.
 //! - Rapier cannot serialise custom shapes, nor the state of pairs with clouds.
 
