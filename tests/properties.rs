@@ -1,7 +1,7 @@
 //! Properties of whole pairs on random clouds and poses, each with a replayable seed.
 
-use tldi::PointCloud;
 use tldi::glamx::{Pose3, Vec3};
+use tldi::{ContactPixel, PairResult, Params, PatchScratch, PointCloud};
 use tldi_tests::{
     Samples, compare_clouds, deepest_point, random_pose, random_unit, sampled_box, sampled_sphere,
 };
@@ -134,4 +134,42 @@ fn gaps_follow_the_distance() {
         checked += 1;
     }
     assert_eq!(checked, 200);
+}
+
+/// A hundred thousand contact pixels are reduced to the same patches whatever their order.
+#[test]
+fn reduced_alike_in_any_order() {
+    let mut rng = fastrand::Rng::with_seed(5);
+    let pixel = 0.01;
+    let contacts: Vec<ContactPixel> = (0..100_000)
+        .map(|k| {
+            let [i, j] = [k % 400, k / 400];
+            let gap = 0.2 * pixel * (rng.f32() - 0.8);
+            let point = pixel * Vec3::new(i as f32, 0.0, j as f32);
+            ContactPixel {
+                pixel: [i, j],
+                view: u32::from(j > 120),
+                point_a: point,
+                point_b: point + gap * Vec3::Y,
+                normal_a: Vec3::new(0.1 * rng.f32(), 1.0, 0.0).normalize(),
+                normal_b: -Vec3::Y,
+                gap,
+            }
+        })
+        .collect();
+    let reduced = |contacts: Vec<ContactPixel>| {
+        let mut result = PairResult {
+            contacts,
+            ..PairResult::default()
+        };
+        PatchScratch::default().reduce(&mut result, &Params::for_radius(pixel));
+        result
+    };
+    let ordered = reduced(contacts.clone());
+    assert!(!ordered.patches.is_empty());
+    for _ in 0..3 {
+        let mut shuffled = contacts.clone();
+        rng.shuffle(&mut shuffled);
+        assert_eq!(reduced(shuffled), ordered);
+    }
 }

@@ -95,9 +95,17 @@ impl PatchScratch {
     /// Confirms the contact pixels of `result`, settles what they say of `collides` and `gap`, and
     /// fills its patches, deepest first.
     ///
-    /// The contact pixels are ordered by view, row and column, as the stage `compare` leaves them.
-    /// Cost: linear in them but for sorting the groups.
+    /// The contact pixels may come in any order; they are left ordered by view, row, column and
+    /// gap, as the stage `compare` finds them. Cost: linear in them but for sorting the groups, and
+    /// them if need be.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
+        let place = |c: &ContactPixel| (c.view, c.pixel[1], c.pixel[0]);
+        if !result.contacts.is_sorted_by_key(place) {
+            let order = |c: &ContactPixel, d: &ContactPixel| {
+                (place(c).cmp(&place(d))).then(d.gap.total_cmp(&c.gap))
+            };
+            result.contacts.sort_unstable_by(order);
+        }
         self.links.find(&result.contacts, params);
         self.links.confirm(result, params);
         let (contacts, out) = (&result.contacts, &mut result.patches);
