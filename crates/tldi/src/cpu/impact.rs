@@ -15,8 +15,8 @@ use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Params, Surface, Tldi, Vir
 use glamx::{Pose3, Vec3};
 
 /// Width in pixels of the rim that [`ImpactQuery::core_only`] spares: splats stand out by one on
-/// either side, and one is for roughness. What is missed there
-/// penetrates by no more than that one, which contacts push out again.
+/// either side, and one is for roughness. What is missed there penetrates by no more than that one,
+/// which contacts push out again.
 const RIM: i32 = 3;
 
 /// Pixels around an image that tell its rim from its edge: the rim, and one for the closing.

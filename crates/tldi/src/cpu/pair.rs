@@ -22,8 +22,8 @@ use glamx::{Pose3, Vec3};
 /// that cross between neighbouring pixels are at most two merge gaps apart in both.
 const REACH: f32 = 2.0;
 
-/// Depth in pixels to which a body that has sunk into a sheet is looked for. Points that are culled
-/// in vain cost little; the deeper ones of two large clouds would be many.
+/// Depth in pixels to which a body that has sunk below all of a surface is looked for. Points that
+/// are culled in vain cost little; the deeper ones of two large clouds would be many.
 const SUNK: f32 = 16.0;
 
 /// Everything one pair needs while it is compared.
@@ -125,22 +125,16 @@ impl Scratch {
         result.gap = found.gap;
     }
 
-    /// Fills both sides' culled points; returns bounds of them in the frame of `a`, or `None` where a
-    /// cloud has none.
+    /// Fills both sides' culled points; returns the overlap of the bounds in the frame of `a`, or
+    /// `None` where a cloud has no point in it.
     fn cull(&mut self, query: &PairQuery) -> Option<Aabb> {
-        let [bounds_a, bounds_b] = bounds_with_inside(query);
         let ring = |surface| ring(surface, &query.params);
         let margin = query.params.prediction + ring(&query.a).max(ring(&query.b));
-        // What has sunk into a sheet is out of its bounds.
-        let [sunk_a, sunk_b] = sunk(query).map(|depth| margin + depth);
-        let b_in_a = bounds_b.transformed(&query.a_from_b);
-        let overlap_a = bounds_a
+        let [bounds_a, bounds_b] = bounds_with_inside(query);
+        let overlap = bounds_a
             .loosened(margin)
-            .intersection(b_in_a.loosened(sunk_a));
-        let overlap_b = bounds_a
-            .loosened(sunk_b)
-            .intersection(b_in_a.loosened(margin));
-        if overlap_a.intersection(overlap_b).is_empty() {
+            .intersection(bounds_b.transformed(&query.a_from_b).loosened(margin));
+        if overlap.is_empty() {
             return None;
         }
         let b_from_a = query.a_from_b.inverse();
@@ -149,9 +143,9 @@ impl Scratch {
             || {
                 if let Surface::Cloud(cloud) = query.a {
                     let region = Region {
-                        overlap: overlap_a,
+                        overlap,
                         other_from_frame: b_from_a,
-                        other_bounds: bounds_b.loosened(sunk_a),
+                        other_bounds: bounds_b.loosened(margin),
                     };
                     let stride = cull::stride(cloud, query.params.pixel_size);
                     let frame = Pose3::IDENTITY;
@@ -163,9 +157,9 @@ impl Scratch {
             || {
                 if let Surface::Cloud(cloud) = query.b {
                     let region = Region {
-                        overlap: overlap_b,
+                        overlap,
                         other_from_frame: Pose3::IDENTITY,
-                        other_bounds: bounds_a.loosened(sunk_b),
+                        other_bounds: bounds_a.loosened(margin),
                     };
                     let stride = cull::stride(cloud, query.params.pixel_size);
                     let frame = query.a_from_b;
@@ -181,7 +175,7 @@ impl Scratch {
         if lacks(&self.a, &query.a) || lacks(&self.b, &query.b) {
             return None;
         }
-        Some(overlap_a.merged(overlap_b))
+        Some(overlap)
     }
 
     /// Finds the near points of both sides and their normals; `false` where nothing is near.
@@ -333,25 +327,6 @@ impl Scratch {
     }
 }
 
-/// How deep each surface may have sunk out of the other's bounds and is still looked for, metres:
-/// the smaller one up to its middle, but no deeper than [`SUNK`] and what it moved.
-fn sunk(query: &PairQuery) -> [f32; 2] {
-    let motion = match query.view {
-        View::Aim { motion, .. } => motion.length(),
-        View::Fixed(_) => 0.0,
-    };
-    let [extents_a, extents_b] = [query.a, query.b].map(|surface| surface.bounds().extents());
-    let depth = |extents: Vec3| {
-        let to_middle = 0.5 * extents.min_element();
-        to_middle.min(SUNK * query.params.pixel_size + motion)
-    };
-    if extents_b.length_squared() <= extents_a.length_squared() {
-        [0.0, depth(extents_b)]
-    } else {
-        [depth(extents_a), 0.0]
-    }
-}
-
 /// Whether the surface's normals tell its outside.
 pub(super) fn is_oriented(surface: &Surface) -> bool {
     match surface {
@@ -373,16 +348,25 @@ pub(super) fn ring(surface: &Surface, params: &Params) -> f32 {
     }
 }
 
-/// Bounds of both surfaces, each in its own frame; those of the larger one with what of a body that
-/// passes through it is behind: the bounds of a floor hold its surface only, and a body that has
-/// sunk deeper than the margins would lose what is below.
+/// Bounds of both surfaces, each in its own frame; those of the larger one with what of a body may
+/// be behind it, where the bounds of a floor do not reach: all of a body that passes through them,
+/// of others as much as up to their middle, but no more than [`SUNK`] and what they moved.
 fn bounds_with_inside(query: &PairQuery) -> [Aabb; 2] {
     let (a, b) = (query.a.bounds(), query.b.bounds());
+    let moved = match query.view {
+        View::Aim { motion, .. } => motion.length(),
+        View::Fixed(_) => 0.0,
+    };
+    let with_inside = |larger: Aabb, body: Aabb, body_in_larger: Aabb| {
+        let to_middle = 0.5 * body.extents().min_element();
+        let sunk = to_middle.min(SUNK * query.params.pixel_size + moved);
+        larger.reached_through(body_in_larger).loosened(sunk)
+    };
     if a.extents().length() >= b.extents().length() {
-        [a.reached_through(b.transformed(&query.a_from_b)), b]
+        [with_inside(a, b, b.transformed(&query.a_from_b)), b]
     } else {
         let a_in_b = a.transformed(&query.a_from_b.inverse());
-        [a, b.reached_through(a_in_b)]
+        [a, with_inside(b, a, a_in_b)]
     }
 }
 
