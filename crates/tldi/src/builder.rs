@@ -1,6 +1,6 @@
 //! Builds and validates clouds.
 
-use crate::cloud::Spare;
+use crate::cloud::{Spare, next_content_id};
 use crate::gather::{Gathered, block_bounds, non_finite_indices, without};
 use crate::morton::{morton_order, permuted};
 use crate::normals::{fill_from_nearest, normalize, pca_normals};
@@ -306,6 +306,7 @@ impl<'a> CloudBuilder<'a> {
             dropped: dropped.len(),
             non_finite: self.non_finite,
             order,
+            content: next_content_id(),
             spare: Spare::default(),
         })
     }

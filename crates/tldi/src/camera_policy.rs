@@ -62,6 +62,17 @@ const LEAST_PLAIN: f32 = 0.2;
 /// Weight of the last axis beside the normals of a surface.
 const MEMORY_WEIGHT: f32 = 0.5;
 
+/// For [`stage_constants`](crate::plan::stage_constants).
+pub(crate) const CONSTANTS: [(&str, f64); 7] = [
+    ("WELL_SEEN", WELL_SEEN as f64),
+    ("SUPPORTED", SUPPORTED as f64),
+    ("LEAST_SHARE", LEAST_SHARE as f64),
+    ("CONCLUSIVE", CONCLUSIVE as f64),
+    ("HINT_WEIGHT", HINT_WEIGHT as f64),
+    ("MEMORY_WEIGHT", MEMORY_WEIGHT as f64),
+    ("AXIS_HYSTERESIS", AXIS_HYSTERESIS as f64),
+];
+
 /// Normals of the near points of one surface.
 #[derive(Clone, Copy)]
 pub(crate) struct ZoneNormals<'a> {
@@ -71,16 +82,17 @@ pub(crate) struct ZoneNormals<'a> {
 }
 
 /// What else than the normals decides the axis; in the frame of `a`.
-pub(crate) struct Approach {
+#[derive(Clone, Copy, Debug)]
+pub struct Approach {
     /// From the frame of `a` into that of the larger surface.
-    larger_from_a: Quat,
+    pub larger_from_a: Quat,
     /// Half the extents of the region where the bounds meet, in the frame of the larger surface,
     /// metres.
-    half_extents: Vec3,
+    pub half_extents: Vec3,
     /// From where the bounds meet to where `b` lies, metres.
-    toward_b: Vec3,
+    pub toward_b: Vec3,
     /// The main axis of the frame before.
-    last_axis: Option<Vec3>,
+    pub last_axis: Option<Vec3>,
 }
 
 impl Approach {
@@ -127,9 +139,9 @@ impl Approach {
         self.half_extents.dot((self.larger_from_a * axis).abs())
     }
 
-    /// 1 where `b` lies outside of where the bounds meet, or comes from there; less inside, but
+    /// Weight of the direction to `b`: 1 where it lies outside of where the bounds meet, or comes from there; less inside, but
     /// enough to decide between walls that are alike.
-    fn plainness(&self) -> f32 {
+    pub fn plainness(&self) -> f32 {
         let inside = self.half_extent(self.direction()).max(f32::MIN_POSITIVE);
         (self.toward_b.length() / inside).clamp(LEAST_PLAIN, 1.0)
     }

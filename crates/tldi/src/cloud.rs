@@ -8,6 +8,7 @@ use crate::radii::{check_coordinates, check_radii, mean_and_max};
 use crate::{Aabb, CloudBuilder, CloudError, NonFinite, Positions};
 use glamx::Vec3;
 use std::borrow::Cow;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Points per block: [`PointCloud::blocks`] bounds that many consecutive points each.
 pub const BLOCK: usize = 256;
@@ -52,6 +53,7 @@ pub struct PointCloud<'a> {
     pub(crate) dropped: usize,
     pub(crate) non_finite: NonFinite,
     pub(crate) order: Option<Vec<u32>>,
+    pub(crate) content: u64,
     pub(crate) spare: Spare,
 }
 
@@ -153,6 +155,13 @@ impl<'a> PointCloud<'a> {
     /// Non-finite points that were dropped from those last given.
     pub fn dropped(&self) -> usize {
         self.dropped
+    }
+
+    /// Number of the content: clouds of this process with the same number have the same points,
+    /// radii and normals, so that what was derived from one of them (a copy on a device) holds for
+    /// the others. New points or radii change it; clones share it.
+    pub fn content_id(&self) -> u64 {
+        self.content
     }
 
     /// After [`CloudBuilder::spatial_order`], the index that each point would have without it (the
@@ -284,6 +293,7 @@ impl<'a> PointCloud<'a> {
         self.colors.take_if(|_| !same_points);
         self.bounds = bounds;
         self.dropped = gathered.dropped.len();
+        self.content = next_content_id();
         Ok(())
     }
 
@@ -303,6 +313,7 @@ impl<'a> PointCloud<'a> {
         check_coordinates(self.coordinates(), self.bounds, &radii, given_index)?;
         (self.mean_radius, self.max_radius) = mean_and_max(&radii);
         self.radii = radii;
+        self.content = next_content_id();
         Ok(())
     }
 
@@ -326,9 +337,16 @@ impl<'a> PointCloud<'a> {
             dropped: self.dropped,
             non_finite: self.non_finite,
             order: self.order,
+            content: self.content,
             spare: self.spare,
         }
     }
+}
+
+/// A number that no cloud had before.
+pub(crate) fn next_content_id() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 /// Makes `new` current and keeps the memory of the former content, if it was owned.

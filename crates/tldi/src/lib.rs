@@ -23,6 +23,7 @@ mod normals;
 pub mod paper;
 mod params;
 mod patches;
+pub mod plan;
 mod radii;
 mod supports;
 mod surface;

@@ -14,6 +14,9 @@ use glamx::{Mat3, Vec3};
 /// Least edge of a tile in pixels: smaller ones cost more than they leave out.
 const LEAST_TILE: i32 = 2;
 
+/// For [`stage_constants`](crate::plan::stage_constants).
+pub(crate) const CONSTANTS: [(&str, f64); 1] = [("LEAST_TILE", LEAST_TILE as f64)];
+
 /// Tile of points that are out of view.
 const OUT_OF_VIEW: u32 = u32::MAX;
 

@@ -225,6 +225,9 @@ fn contact_pixels([a, b]: [Column; 2], at: &PixelView, params: &Params, result: 
 /// body stands beside has points in the body's columns, but does not face its bottom.
 const FACING: f32 = 0.5;
 
+/// For [`stage_constants`](crate::plan::stage_constants).
+pub(crate) const CONSTANTS: [(&str, f64); 1] = [("FACING", FACING as f64)];
+
 /// Whether two layers face each other and the view, as surfaces do that push bodies apart.
 fn opposed(entry: &Layer, exit: &Layer) -> bool {
     let (n, m) = (

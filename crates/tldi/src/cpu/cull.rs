@@ -3,7 +3,7 @@
 //!
 //! One pass over the cloud, skipping blocks of [`BLOCK`] points whose bounds miss the overlap: the
 //! floor of the whole pipeline is this stage's reading of the coordinates. Of a cloud much finer
-//! than the pixels only every n-th point is taken ([`stride`]): more would not be seen.
+//! than the pixels only every n-th point is taken ([`stride`](crate::plan::stride)): more would not be seen.
 
 use super::lanes::multiversioned;
 use crate::{Aabb, BLOCK, PointCloud, Radii};
@@ -89,18 +89,6 @@ fn bits(flags: &[u8; 64]) -> u64 {
     })
 }
 
-/// Points that are kept per pixel of a surface seen face on: enough for the mean of a layer.
-const POINTS_PER_PIXEL: f32 = 8.0;
-
-/// Every how many points of a cloud are enough for pixels of this size, metres.
-///
-/// With radii of 0.65 × the distance of the 7th neighbour there are 0.94 (pixel / r̄)² points to a
-/// pixel.
-pub(crate) fn stride(cloud: &PointCloud, pixel_size: f32) -> usize {
-    let per_pixel = 0.94 * (pixel_size / cloud.mean_radius()).powi(2);
-    ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
-}
-
 /// Radii in metres of the culled points, scaled so that they cover the surface even where only
 /// every n-th point is left.
 #[derive(Clone, Copy)]
@@ -154,14 +142,16 @@ pub(crate) struct CullScratch {
     tasks: Vec<Survivors>,
 }
 
-/// What is kept: a box in the frame of the query and one in the frame of the other surface.
-pub(crate) struct Region {
-    /// Overlap of both bounds in the frame of the query.
-    pub(crate) overlap: Aabb,
+/// Which points of a cloud are kept: a box in the frame of the query and one in the frame of the
+/// other surface.
+#[derive(Clone, Debug)]
+pub struct Region {
+    /// Overlap of both bounds in the frame of the query, metres.
+    pub overlap: Aabb,
     /// From the frame of the query into the frame of the other surface.
-    pub(crate) other_from_frame: Pose3,
+    pub other_from_frame: Pose3,
     /// The other surface's bounds in its own frame, loosened: as good as an oriented box.
-    pub(crate) other_bounds: Aabb,
+    pub other_bounds: Aabb,
 }
 
 /// Fills `out` with every `stride`-th point of `cloud` inside `region`, in the order of the cloud.

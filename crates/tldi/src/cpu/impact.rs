@@ -7,10 +7,11 @@
 
 use super::columns::{Columns, dilate};
 use super::cull::{self, PointRadii, Region};
-use super::pair::{Scratch, is_oriented, ring};
+use super::pair::{Scratch, is_oriented};
 use super::side::{CloudView, ExactView};
 use super::splat::splat_radius;
 use super::sweep::is_edge_on;
+use crate::plan::{ring, stride};
 use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Params, Surface, Tldi, VirtualCamera};
 use glamx::{Pose3, Vec3};
 
@@ -170,7 +171,7 @@ impl Scratch {
                 other_from_frame: view_from_a,
                 other_bounds: region,
             };
-            let stride = cull::stride(cloud, query.params.pixel_size);
+            let stride = stride(cloud, query.params.pixel_size);
             cull::cull(
                 cloud,
                 &frame,

@@ -6,17 +6,17 @@
 //! makes their inner loops SIMD. `impact` compares the images of a motion.
 
 mod cast;
-mod columns;
-mod compare;
-mod cull;
+pub(crate) mod columns;
+pub(crate) mod compare;
+pub(crate) mod cull;
 mod impact;
 mod lanes;
-mod normals;
+pub(crate) mod normals;
 mod pair;
 mod side;
-mod splat;
+pub(crate) mod splat;
 mod sweep;
-mod zone;
+pub(crate) mod zone;
 
 use crate::{
     Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,

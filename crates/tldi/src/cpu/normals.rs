@@ -11,7 +11,7 @@ use glamx::{DMat3, DVec3, Vec3};
 
 /// Radius of the neighbourhood whose covariance gives the normal, in mean radii of the points.
 /// With 0.65 × the 7th neighbour's distance it holds about 25 neighbours on a surface.
-pub(super) const SUPPORT: f32 = 3.0;
+pub(crate) const SUPPORT: f32 = 3.0;
 
 /// Most cells per point: on a surface of 4 million points there are as many. Sparser ones get
 /// larger cells, which only makes for more candidates.
@@ -30,6 +30,13 @@ const BATCH: usize = 64;
 /// Share of the squared variance that the two larger axes of a neighbourhood must have for a
 /// normal in single precision: below it the points are on a line or coincide.
 const LEAST_PLANAR: f32 = 1e-4;
+
+/// For [`stage_constants`](crate::plan::stage_constants).
+pub(crate) const CONSTANTS: [(&str, f64); 3] = [
+    ("SUPPORT", SUPPORT as f64),
+    ("MAX_CANDIDATES", MAX_CANDIDATES as f64),
+    ("LEAST_PLANAR", LEAST_PLANAR as f64),
+];
 
 /// Memory of the stage, kept from call to call.
 #[derive(Default)]

@@ -2,29 +2,17 @@
 
 use super::columns::{Tiles, Touching};
 use super::compare::{self, Middles, Seen};
-use super::cull::{self, Region};
+use super::cull;
 use super::impact::{CoreScratch, Meeting};
-use super::normals;
 use super::side::{CloudView, ExactView, Side};
 use super::splat::{DepthScale, Imaging};
-use super::zone::{self, ZoneScratch};
-use crate::camera_policy::{Approach, MAX_VIEWS, ZoneNormals, aim, seen_from_behind};
+use super::zone::{self, ZoneGrid, ZoneScratch};
+use crate::camera_policy::{MAX_VIEWS, ZoneNormals, aim, seen_from_behind};
 use crate::patches::PatchScratch;
-use crate::{
-    Aabb, PairQuery, PairResult, Params, RayHit, Surface, Variant, View, VirtualCamera, paper,
-};
+use crate::plan::{PairPlan, SidePlan, stride};
+use crate::{PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
-
-/// Columns in which the surfaces are farther apart along the view than this many merge gaps, or
-/// prediction distances, are not modelled. A contact at the prediction distance is as far along
-/// the view where its normal is 60° off (beyond, depths along the view tell no distance); surfaces
-/// that cross between neighbouring pixels are at most two merge gaps apart in both.
-const REACH: f32 = 2.0;
-
-/// Depth in pixels to which a body that has sunk below all of a surface is looked for. Points that
-/// are culled in vain cost little; the deeper ones of two large clouds would be many.
-const SUNK: f32 = 16.0;
 
 /// Everything one pair needs while it is compared.
 #[derive(Default)]
@@ -48,31 +36,20 @@ impl Scratch {
             self.compare_paper(query, &camera, result);
             return;
         }
-        let Some(overlap) = self.cull(query) else {
+        let Some(plan) = PairPlan::new(query) else {
             return;
         };
-        if !self.zone(query, &overlap) {
+        if !self.cull(query, &plan) || !self.zone(query, &plan) {
             return;
         }
         match query.view {
             View::Fixed(camera) => {
                 result.axes.push(camera.axis());
-                self.look(query, &camera, 0, result);
+                self.look(query, &plan, &camera, 0, result);
             }
-            View::Aim {
-                policy,
-                motion,
-                last_axis,
-            } => {
-                let (bounds_a, bounds_b) = (query.a.bounds(), query.b.bounds());
-                let approach =
-                    Approach::new(&bounds_a, &bounds_b, &query.a_from_b, motion, last_axis);
-                aim(
-                    policy,
-                    self.zone_normals(query),
-                    &approach,
-                    &mut result.axes,
-                );
+            View::Aim { policy, .. } => {
+                let normals = self.zone_normals(query);
+                aim(policy, normals, &plan.approach, &mut result.axes);
                 if query.params.variant() == Variant::Paper {
                     let camera = VirtualCamera::along(result.axes[0], query.params.pixel_size);
                     self.compare_paper(query, &camera, result);
@@ -80,7 +57,7 @@ impl Scratch {
                 }
                 for view in 0..result.axes.len() {
                     let camera = VirtualCamera::along(result.axes[view], query.params.pixel_size);
-                    self.look(query, &camera, view, result);
+                    self.look(query, &plan, &camera, view, result);
                 }
             }
         }
@@ -125,69 +102,36 @@ impl Scratch {
         result.gap = found.gap;
     }
 
-    /// Fills both sides' culled points; returns the overlap of the bounds in the frame of `a`, or
-    /// `None` where a cloud has no point in it.
-    fn cull(&mut self, query: &PairQuery) -> Option<Aabb> {
-        let ring = |surface| ring(surface, &query.params);
-        let margin = query.params.prediction + ring(&query.a).max(ring(&query.b));
-        let [bounds_a, bounds_b] = bounds_with_inside(query);
-        let overlap = bounds_a
-            .loosened(margin)
-            .intersection(bounds_b.transformed(&query.a_from_b).loosened(margin));
-        if overlap.is_empty() {
-            return None;
-        }
-        let b_from_a = query.a_from_b.inverse();
-        let (a, b) = (&mut self.a, &mut self.b);
-        rayon::join(
-            || {
-                if let Surface::Cloud(cloud) = query.a {
-                    let region = Region {
-                        overlap,
-                        other_from_frame: b_from_a,
-                        other_bounds: bounds_b.loosened(margin),
-                    };
-                    let stride = cull::stride(cloud, query.params.pixel_size);
-                    let frame = Pose3::IDENTITY;
-                    cull::cull(cloud, &frame, &region, stride, &mut a.cull, &mut a.points);
-                } else {
-                    a.points.clear();
-                }
-            },
-            || {
-                if let Surface::Cloud(cloud) = query.b {
-                    let region = Region {
-                        overlap,
-                        other_from_frame: Pose3::IDENTITY,
-                        other_bounds: bounds_a.loosened(margin),
-                    };
-                    let stride = cull::stride(cloud, query.params.pixel_size);
-                    let frame = query.a_from_b;
-                    cull::cull(cloud, &frame, &region, stride, &mut b.cull, &mut b.points);
-                } else {
-                    b.points.clear();
-                }
-            },
-        );
-        let lacks = |side: &Side, surface: &Surface| {
-            matches!(surface, Surface::Cloud(_)) && side.points.is_empty()
+    /// Fills both sides' culled points; `false` where a cloud has no point in reach.
+    fn cull(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
+        let cull = |side: &mut Side, surface: Surface, plan: &SidePlan| {
+            if let Surface::Cloud(cloud) = surface {
+                let stride = stride(cloud, query.params.pixel_size);
+                let frame = &plan.frame_from_surface;
+                let Side { cull, points, .. } = side;
+                cull::cull(cloud, frame, &plan.region, stride, cull, points);
+                !points.is_empty()
+            } else {
+                side.points.clear();
+                true
+            }
         };
-        if lacks(&self.a, &query.a) || lacks(&self.b, &query.b) {
-            return None;
-        }
-        Some(overlap)
+        let (a, b) = (&mut self.a, &mut self.b);
+        let [plan_a, plan_b] = &plan.sides;
+        let (is_near_a, is_near_b) =
+            rayon::join(|| cull(a, query.a, plan_a), || cull(b, query.b, plan_b));
+        is_near_a && is_near_b
     }
 
     /// Finds the near points of both sides and their normals; `false` where nothing is near.
-    fn zone(&mut self, query: &PairQuery, overlap: &Aabb) -> bool {
-        let reach = query.params.prediction + query.a.mean_radius() + query.b.mean_radius();
+    fn zone(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
+        let reach = plan.zone_reach;
         match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
                 zone::zone(
                     &self.a.points,
                     &self.b.points,
-                    overlap,
-                    reach,
+                    &ZoneGrid::new(&plan.overlap, reach),
                     &mut self.zone,
                     &mut self.a.near,
                     &mut self.b.near,
@@ -229,6 +173,7 @@ impl Scratch {
     fn look(
         &mut self,
         query: &PairQuery,
+        plan: &PairPlan,
         camera: &VirtualCamera,
         view: usize,
         result: &mut PairResult,
@@ -251,8 +196,8 @@ impl Scratch {
         let hits = &mut self.hits;
         let looked = match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
-                let reach = REACH * params.merge_gap.max(params.prediction);
-                self.look_at_clouds(&view_of(a, a_from_a), &view_of(b, a_from_b), reach)
+                let (a, b) = (view_of(a, a_from_a), view_of(b, a_from_b));
+                self.look_at_clouds(&a, &b, plan.column_reach)
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
                 let exact = exact_view(surface, a_from_b, self.a.deepest);
@@ -269,6 +214,7 @@ impl Scratch {
         if looked.is_none() {
             return;
         }
+        let depth = |side: &SidePlan| side.middle.map(|middle| camera.view_from_point(middle).z);
         let axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
         compare::compare(
             &self.a.image,
@@ -276,7 +222,10 @@ impl Scratch {
             &axes,
             view,
             &Seen {
-                middles: middles(query, camera),
+                middles: Middles {
+                    a: depth(&plan.sides[0]),
+                    b: depth(&plan.sides[1]),
+                },
                 from_behind: seen_from_behind(camera.axis(), &self.zone_normals(query)),
             },
             &query.params,
@@ -332,59 +281,5 @@ pub(super) fn is_oriented(surface: &Surface) -> bool {
     match surface {
         Surface::Cloud(cloud) => cloud.normals().is_some() && cloud.normals_oriented(),
         Surface::Exact(surface) => surface.is_closed(),
-    }
-}
-
-/// By how much more than what can touch is culled, metres: splats reach a radius beyond their
-/// points, on both sides; normals that are estimated here need their neighbours, or they would err
-/// at the rim.
-pub(super) fn ring(surface: &Surface, params: &Params) -> f32 {
-    match surface {
-        Surface::Cloud(cloud) if cloud.normals().is_none() => {
-            let stride = cull::stride(cloud, params.pixel_size) as f32;
-            (2.0 + normals::SUPPORT * stride.sqrt()) * cloud.mean_radius()
-        }
-        surface => 2.0 * surface.mean_radius(),
-    }
-}
-
-/// Bounds of both surfaces, each in its own frame; those of the larger one with what of a body may
-/// be behind it, where the bounds of a floor do not reach: all of a body that passes through them,
-/// of others as much as up to their middle, but no more than [`SUNK`] and what they moved.
-fn bounds_with_inside(query: &PairQuery) -> [Aabb; 2] {
-    let (a, b) = (query.a.bounds(), query.b.bounds());
-    let moved = match query.view {
-        View::Aim { motion, .. } => motion.length(),
-        View::Fixed(_) => 0.0,
-    };
-    let with_inside = |larger: Aabb, body: Aabb, body_in_larger: Aabb| {
-        let to_middle = 0.5 * body.extents().min_element();
-        let sunk = to_middle.min(SUNK * query.params.pixel_size + moved);
-        larger.reached_through(body_in_larger).loosened(sunk)
-    };
-    if a.extents().length() >= b.extents().length() {
-        [with_inside(a, b, b.transformed(&query.a_from_b)), b]
-    } else {
-        let a_in_b = a.transformed(&query.a_from_b.inverse());
-        [a, with_inside(b, a, a_in_b)]
-    }
-}
-
-/// See [`Middles`].
-fn middles(query: &PairQuery, camera: &VirtualCamera) -> Middles {
-    let (bounds_a, bounds_b) = (query.a.bounds(), query.b.bounds());
-    let (size_a, size_b) = (bounds_a.extents().length(), bounds_b.extents().length());
-    let depth = |center: Vec3| Some(camera.view_from_point(center).z);
-    Middles {
-        a: if size_a <= size_b {
-            depth(bounds_a.center())
-        } else {
-            None
-        },
-        b: if size_b <= size_a {
-            depth(query.a_from_b * bounds_b.center())
-        } else {
-            None
-        },
     }
 }

@@ -7,12 +7,9 @@ use super::impact::BORDER;
 use super::normals::{self, NormalScratch};
 use super::splat::{DepthScale, Footprint, Fragments, Imaging, SplatPoints};
 use super::sweep;
+use crate::plan::{AIM_SAMPLES, is_aim_sample};
 use crate::{Params, PointCloud, RayHit, RaySurface, Tldi, VirtualCamera};
 use glamx::{Mat3, Pose3, Vec3};
-
-/// Most near points of a cloud whose normals aim the camera, or that are projected onto an exact
-/// surface to aim it; more do not sharpen the mean of their normals.
-const AIM_SAMPLES: usize = 512;
 
 /// What one side holds, kept from call to call.
 #[derive(Default)]
@@ -65,19 +62,20 @@ impl CloudView<'_> {
 impl Side {
     /// Fills `near_normals` from an even selection of the near points.
     pub(super) fn sample_normals(&mut self, cloud: &PointCloud, frame_from_cloud: &Pose3) {
-        let step = self.near.len().div_ceil(AIM_SAMPLES).max(1);
+        let step = self.near.len().div_ceil(AIM_SAMPLES) as u32;
         if let Some(given) = cloud.normals() {
             let rotation = Mat3::from_quat(frame_from_cloud.rotation);
-            let sampled = self.near.iter().step_by(step);
-            let given = sampled.map(|&i| given[self.points.index[i as usize] as usize]);
+            let indices = self.near.iter().map(|&i| self.points.index[i as usize]);
+            let sampled = indices.filter(|&index| is_aim_sample(index, step));
             self.near_normals.clear();
-            self.near_normals.extend(given.map(|n| rotation * n));
+            self.near_normals
+                .extend(sampled.map(|index| rotation * given[index as usize]));
             return;
         }
         normals::estimate(
             &self.near,
             |i| self.points.point(i as usize),
-            |k| k % step == 0,
+            |k| is_aim_sample(self.points.index[self.near[k] as usize], step),
             normals::SUPPORT * PointRadii::new(cloud, &self.points).mean(),
             &mut self.normals,
             &mut self.kept,

@@ -39,6 +39,16 @@ const DEPTH_BITS: u32 = 30;
 /// Largest depth in steps: 2 to that power less what an `f32` is precise to there.
 const MAX_DEPTH: f32 = ((1 << DEPTH_BITS) - 64) as f32;
 
+/// For [`stage_constants`](crate::plan::stage_constants).
+pub(crate) const CONSTANTS: [(&str, f64); 6] = [
+    ("LEAST_RADIUS_PX", LEAST_RADIUS_PX as f64),
+    ("EDGE_ON", EDGE_ON as f64),
+    ("NORMAL_STEPS", NORMAL_STEPS as f64),
+    ("MAX_WEIGHT", MAX_WEIGHT as f64),
+    ("DEPTH_BITS", DEPTH_BITS as f64),
+    ("MAX_DEPTH", MAX_DEPTH as f64),
+];
+
 /// One splat in one pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Fragment {
@@ -64,22 +74,29 @@ impl Fragment {
 
 /// Fixed-point depths.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct DepthScale {
+pub struct DepthScale {
     /// Depth of step 0, in metres.
-    pub(crate) zero: f32,
+    pub zero: f32,
     /// Metres per step.
-    pub(crate) step: f32,
-    inv_step: f32,
+    pub step: f32,
+    /// Steps per metre.
+    pub inv_step: f32,
 }
 
 impl DepthScale {
-    pub(crate) fn new(zero: f32, params: &Params) -> Self {
+    /// The scale that counts from `zero` metres.
+    pub fn new(zero: f32, params: &Params) -> Self {
         let step = params.merge_gap / DEPTH_STEPS;
         Self {
             zero,
             step,
             inv_step: 1.0 / step,
         }
+    }
+
+    /// Depths in one layer that follow each other are at most this many steps apart.
+    pub fn merge_steps(&self, params: &Params) -> u32 {
+        (params.merge_gap / self.step) as u32
     }
 
     pub(crate) fn metres(&self, steps: f32) -> f32 {

@@ -18,7 +18,7 @@ pub(crate) fn sweep(
     out: &mut Tldi,
 ) {
     let scale = &imaging.scale;
-    let gap_steps = (imaging.params.merge_gap / scale.step) as u32;
+    let gap_steps = scale.merge_steps(imaging.params);
     let same_layer =
         |f: &Fragment, g: &Fragment| f.class() == g.class() && g.depth() - f.depth() <= gap_steps;
     for pixel in 0..fragments.pixels() {

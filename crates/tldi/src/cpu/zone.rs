@@ -22,16 +22,22 @@ pub(crate) struct ZoneScratch {
     cells_b: Vec<u32>,
 }
 
-struct Grid {
-    min: Vec3,
-    inv_cell: f32,
-    /// Cells along x, y, z; rows along x are padded to whole words.
-    dims: [usize; 3],
+/// Cells of at least the zone's reach over the overlap of both bounds.
+#[derive(Clone, Copy, Debug)]
+pub struct ZoneGrid {
+    /// Corner of the first cell, metres.
+    pub min: Vec3,
+    /// Cells per metre.
+    pub inv_cell: f32,
+    /// Cells along x, y, z.
+    pub dims: [usize; 3],
+    /// Words of 64 bits that a row along x takes here.
     row_words: usize,
 }
 
-impl Grid {
-    fn new(bounds: &Aabb, reach: f32) -> Self {
+impl ZoneGrid {
+    /// Cells of `reach` metres, or larger where `bounds` would have too many.
+    pub fn new(bounds: &Aabb, reach: f32) -> Self {
         let extents = bounds.extents().max(Vec3::ZERO);
         let mut cell = reach;
         let count = |cell: f32| {
@@ -109,14 +115,14 @@ fn select(cells: &[u32], bits: &[u64], near: &mut Vec<u32>) {
     near.truncate(count);
 }
 
-fn locate(points: &Survivors, grid: &Grid, cells: &mut Vec<u32>) {
+fn locate(points: &Survivors, grid: &ZoneGrid, cells: &mut Vec<u32>) {
     cells.resize(points.len(), 0);
     locate_cells(grid, &points.x, &points.y, &points.z, cells);
 }
 
 multiversioned! {
 /// Bit of the cell of each point; points outside the grid count to the nearest cell.
-fn locate_cells(grid: &Grid, x: &[f32], y: &[f32], z: &[f32], cells: &mut [u32]) {
+fn locate_cells(grid: &ZoneGrid, x: &[f32], y: &[f32], z: &[f32], cells: &mut [u32]) {
     let n = x.len().min(y.len()).min(z.len()).min(cells.len());
     let (x, y, z, cells) = (&x[..n], &y[..n], &z[..n], &mut cells[..n]);
     let [lx, ly, lz] = grid.dims.map(|n| (n - 1) as f32);
@@ -132,26 +138,24 @@ fn locate_cells(grid: &Grid, x: &[f32], y: &[f32], z: &[f32], cells: &mut [u32])
 }
 
 /// Fills `near_a` and `near_b` with the indices of the culled points that have a point of the
-/// other cloud within `reach` metres. A few farther ones (up to two cell diagonals) are included;
+/// other cloud within the grid's reach. A few farther ones (up to two cell diagonals) are included;
 /// none nearer is missed.
 pub(crate) fn zone(
     a: &Survivors,
     b: &Survivors,
-    bounds: &Aabb,
-    reach: f32,
+    grid: &ZoneGrid,
     scratch: &mut ZoneScratch,
     near_a: &mut Vec<u32>,
     near_b: &mut Vec<u32>,
 ) {
-    let grid = Grid::new(bounds, reach);
     let ZoneScratch {
         bits,
         dilated,
         cells_a,
         cells_b,
     } = scratch;
-    locate(a, &grid, cells_a);
-    locate(b, &grid, cells_b);
+    locate(a, grid, cells_a);
+    locate(b, grid, cells_b);
     grid.mark(cells_a, bits);
     grid.dilate(bits, dilated);
     select(cells_b, bits, near_b);
@@ -192,8 +196,7 @@ mod tests {
             zone(
                 &a,
                 &b,
-                &bounds,
-                reach,
+                &ZoneGrid::new(&bounds, reach),
                 &mut ZoneScratch::default(),
                 &mut near_a,
                 &mut near_b,

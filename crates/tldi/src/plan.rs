@@ -1,0 +1,195 @@
+//! What is known of a pair before any of its points is looked at; and the numbers that decide the
+//! stages. All backends start from here.
+
+use crate::camera_policy;
+use crate::cpu::{columns, compare, normals, splat};
+use crate::{Aabb, BLOCK, PairQuery, Params, PointCloud, Surface, View};
+use glamx::{Pose3, Vec3};
+
+pub use crate::camera_policy::Approach;
+pub use crate::cpu::cull::Region;
+pub use crate::cpu::splat::DepthScale;
+pub use crate::cpu::zone::ZoneGrid;
+
+/// Columns in which the surfaces are farther apart along the view than this many merge gaps, or
+/// prediction distances, are not modelled. A contact at the prediction distance is as far along
+/// the view where its normal is 60° off (beyond, depths along the view tell no distance); surfaces
+/// that cross between neighbouring pixels are at most two merge gaps apart in both.
+const REACH: f32 = 2.0;
+
+/// Depth in pixels to which a body that has sunk below all of a surface is looked for. Points that
+/// are culled in vain cost little; the deeper ones of two large clouds would be many.
+const SUNK: f32 = 16.0;
+
+/// Points that are kept per pixel of a surface seen face on: enough for the mean of a layer.
+const POINTS_PER_PIXEL: f32 = 8.0;
+
+/// Most near points of a cloud whose normals aim the camera, or that are projected onto an exact
+/// surface to aim it; more do not sharpen the mean of their normals.
+pub const AIM_SAMPLES: usize = 512;
+
+/// Whether the normal at a near point is one of those that aim the camera: about every `step`-th is,
+/// chosen by the point's index in its cloud, in whatever order the points are found.
+pub fn is_aim_sample(index: u32, step: u32) -> bool {
+    // A mixing of the bits without structure, so that none of a grid of points meets it.
+    let mut hash = (index ^ (index >> 16)).wrapping_mul(0x7feb_352d);
+    hash = (hash ^ (hash >> 15)).wrapping_mul(0x846c_a68b);
+    (hash ^ (hash >> 16)).is_multiple_of(step.max(1))
+}
+
+/// What a pair's stages `cull`, `zone` and `aim` need beside the points.
+#[derive(Clone, Debug)]
+pub struct PairPlan {
+    /// Where the points of both sides can touch, in the frame of the first surface.
+    pub overlap: Aabb,
+    /// What is kept of each side.
+    pub sides: [SidePlan; 2],
+    /// Distance in metres up to which points of both sides are near each other.
+    pub zone_reach: f32,
+    /// Distance in metres along a view up to which the surfaces of a column can matter to each
+    /// other.
+    pub column_reach: f32,
+    /// What is known of where the second surface lies and comes from.
+    pub approach: Approach,
+}
+
+/// One side of a [`PairPlan`].
+#[derive(Clone, Debug)]
+pub struct SidePlan {
+    /// From the frame of the surface into that of the query.
+    pub frame_from_surface: Pose3,
+    /// Which of its points are kept.
+    pub region: Region,
+    /// Middle of its bounds in the frame of the query, if it is not the larger one of the pair: the
+    /// body, where normals do not tell the inside, reaches at least that far.
+    pub middle: Option<Vec3>,
+}
+
+impl PairPlan {
+    /// The plan of a pair; `None` where the bounds say that nothing can touch. Cost: O(1).
+    ///
+    /// ```
+    /// use tldi::plan::PairPlan;
+    /// use tldi::{PairQuery, Params, PointCloud, Surface, View};
+    /// use tldi::glamx::{Pose3, Vec3};
+    ///
+    /// let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.5).build()?;
+    /// let query = |distance| PairQuery {
+    ///     a: Surface::Cloud(&cloud),
+    ///     b: Surface::Cloud(&cloud),
+    ///     a_from_b: Pose3::translation(distance, 0.0, 0.0),
+    ///     view: View::aimed(),
+    ///     params: Params::for_radius(0.5),
+    /// };
+    /// assert!(PairPlan::new(&query(1.0)).is_some());
+    /// assert!(PairPlan::new(&query(10.0)).is_none());
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    pub fn new(query: &PairQuery) -> Option<Self> {
+        let ring = |surface| ring(surface, &query.params);
+        let margin = query.params.prediction + ring(&query.a).max(ring(&query.b));
+        let [bounds_a, bounds_b] = bounds_with_inside(query);
+        let overlap = bounds_a
+            .loosened(margin)
+            .intersection(bounds_b.transformed(&query.a_from_b).loosened(margin));
+        if overlap.is_empty() {
+            return None;
+        }
+        let [middle_a, middle_b] = middles(query);
+        let side = |frame_from_surface, other_from_frame, other_bounds: Aabb, middle| SidePlan {
+            frame_from_surface,
+            region: Region {
+                overlap,
+                other_from_frame,
+                other_bounds: other_bounds.loosened(margin),
+            },
+            middle,
+        };
+        let b_from_a = query.a_from_b.inverse();
+        Some(Self {
+            overlap,
+            sides: [
+                side(Pose3::IDENTITY, b_from_a, bounds_b, middle_a),
+                side(query.a_from_b, Pose3::IDENTITY, bounds_a, middle_b),
+            ],
+            zone_reach: query.params.prediction + query.a.mean_radius() + query.b.mean_radius(),
+            column_reach: REACH * query.params.merge_gap.max(query.params.prediction),
+            approach: {
+                let (motion, last_axis) = match query.view {
+                    View::Fixed(_) => (Vec3::ZERO, None),
+                    View::Aim {
+                        motion, last_axis, ..
+                    } => (motion, last_axis),
+                };
+                let (a, b) = (query.a.bounds(), query.b.bounds());
+                Approach::new(&a, &b, &query.a_from_b, motion, last_axis)
+            },
+        })
+    }
+}
+
+/// Every how many points of a cloud are enough for pixels of this size, metres.
+///
+/// With radii of 0.65 × the distance of the 7th neighbour there are 0.94 (pixel / r̄)² points to a
+/// pixel.
+pub fn stride(cloud: &PointCloud, pixel_size: f32) -> usize {
+    let per_pixel = 0.94 * (pixel_size / cloud.mean_radius()).powi(2);
+    ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
+}
+
+/// By how much more than what can touch is culled, metres: splats reach a radius beyond their
+/// points, on both sides; normals that are estimated here need their neighbours, or they would err
+/// at the rim.
+pub(crate) fn ring(surface: &Surface, params: &Params) -> f32 {
+    match surface {
+        Surface::Cloud(cloud) if cloud.normals().is_none() => {
+            let stride = stride(cloud, params.pixel_size) as f32;
+            (2.0 + normals::SUPPORT * stride.sqrt()) * cloud.mean_radius()
+        }
+        surface => 2.0 * surface.mean_radius(),
+    }
+}
+
+/// Bounds of both surfaces, each in its own frame; those of the larger one with what of a body may
+/// be behind it, where the bounds of a floor do not reach: all of a body that passes through them,
+/// of others as much as up to their middle, but no more than [`SUNK`] and what they moved.
+fn bounds_with_inside(query: &PairQuery) -> [Aabb; 2] {
+    let (a, b) = (query.a.bounds(), query.b.bounds());
+    let moved = match query.view {
+        View::Aim { motion, .. } => motion.length(),
+        View::Fixed(_) => 0.0,
+    };
+    let with_inside = |larger: Aabb, body: Aabb, body_in_larger: Aabb| {
+        let to_middle = 0.5 * body.extents().min_element();
+        let sunk = to_middle.min(SUNK * query.params.pixel_size + moved);
+        larger.reached_through(body_in_larger).loosened(sunk)
+    };
+    if a.extents().length() >= b.extents().length() {
+        [with_inside(a, b, b.transformed(&query.a_from_b)), b]
+    } else {
+        let a_in_b = a.transformed(&query.a_from_b.inverse());
+        [a, with_inside(b, a, a_in_b)]
+    }
+}
+
+/// See [`SidePlan::middle`].
+fn middles(query: &PairQuery) -> [Option<Vec3>; 2] {
+    let (a, b) = (query.a.bounds(), query.b.bounds());
+    let (size_a, size_b) = (a.extents().length(), b.extents().length());
+    [
+        (size_a <= size_b).then(|| a.center()),
+        (size_b <= size_a).then(|| query.a_from_b * b.center()),
+    ]
+}
+
+/// The numbers of the stages, by the names of the override constants that a GPU backend's shaders
+/// declare for them.
+pub fn stage_constants() -> Vec<(&'static str, f64)> {
+    let mut all = vec![("BLOCK", BLOCK as f64), ("AIM_SAMPLES", AIM_SAMPLES as f64)];
+    all.extend(normals::CONSTANTS);
+    all.extend(splat::CONSTANTS);
+    all.extend(columns::CONSTANTS);
+    all.extend(compare::CONSTANTS);
+    all.extend(camera_policy::CONSTANTS);
+    all
+}
