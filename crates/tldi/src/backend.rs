@@ -89,6 +89,9 @@ pub enum BackendError {
         /// What is not supported, and what to do instead.
         reason: &'static str,
     },
+    /// A device failed. What it says, and of which device.
+    #[error("{0}")]
+    Device(String),
 }
 
 /// Compares batches of pairs. All implementations give the same results (integer stages equal
@@ -96,6 +99,11 @@ pub enum BackendError {
 pub trait Backend: Send {
     /// Short name for reports: "cpu", …
     fn name(&self) -> &str;
+
+    /// Name of the device that compares, where it is not the CPU.
+    fn adapter(&self) -> Option<&str> {
+        None
+    }
 
     /// Compares every pair of the batch; `results` gets one entry a pair, in order. Entries that
     /// are already there are reused, so that a warm caller allocates nothing.

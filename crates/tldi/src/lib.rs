@@ -25,6 +25,7 @@ mod params;
 mod patches;
 pub mod plan;
 mod radii;
+mod supported;
 mod supports;
 mod surface;
 #[allow(clippy::module_inception, reason = "the image is the crate's namesake")]

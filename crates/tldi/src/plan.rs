@@ -8,6 +8,7 @@ use glamx::{Pose3, Vec3};
 
 pub use crate::camera_policy::Approach;
 pub use crate::cpu::cull::Region;
+pub use crate::cpu::normals::SUPPORT;
 pub use crate::cpu::splat::DepthScale;
 pub use crate::cpu::zone::ZoneGrid;
 

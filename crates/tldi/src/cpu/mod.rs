@@ -18,9 +18,10 @@ pub(crate) mod splat;
 mod sweep;
 pub(crate) mod zone;
 
+use crate::supported::{supported_params, supported_surfaces};
 use crate::{
     Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,
-    Projection, Surface, Tldi, Variant, View, VirtualCamera, paper,
+    Tldi, Variant, VirtualCamera, paper,
 };
 use cull::Region;
 use glamx::{Pose3, Vec3};
@@ -139,7 +140,9 @@ impl Backend for CpuBackend {
     ) -> Result<(), BackendError> {
         results.resize_with(batch.len(), PairResult::default);
         for (pair, query) in batch.iter().enumerate() {
-            supported(query).map_err(|reason| BackendError::Unsupported { pair, reason })?;
+            query
+                .check()
+                .map_err(|reason| BackendError::Unsupported { pair, reason })?;
         }
         let this = &*self;
         batch
@@ -151,79 +154,6 @@ impl Backend for CpuBackend {
             });
         Ok(())
     }
-}
-
-fn supported(query: &PairQuery) -> Result<(), &'static str> {
-    supported_surfaces(query.a, query.b)?;
-    supported_params(&query.params)?;
-    let exact = has_exact(query.a, query.b);
-    if exact && query.params.variant() == Variant::Paper {
-        return Err("the paper's variant compares clouds only: use Variant::Oriented");
-    }
-    if let View::Fixed(camera) = query.view
-        && exact
-        && matches!(camera.projection, Projection::Perspective { .. })
-    {
-        return Err("exact surfaces need an orthographic camera");
-    }
-    if let View::Fixed(camera) = query.view
-        && camera.size.is_none()
-        && matches!(camera.projection, Projection::Perspective { .. })
-    {
-        return Err("a perspective camera needs an image of fixed size");
-    }
-    if query.params.variant() == Variant::Paper && most_pixels(query) > paper::MAX_PIXELS as f64 {
-        return Err(
-            "the paper's image may have more than 2^28 pixels: use a larger pixel_size, \
-             a smaller image or smaller clouds",
-        );
-    }
-    Ok(())
-}
-
-fn has_exact(a: Surface, b: Surface) -> bool {
-    matches!(a, Surface::Exact(_)) || matches!(b, Surface::Exact(_))
-}
-
-fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static str> {
-    match (a, b) {
-        (Surface::Exact(_), Surface::Exact(_)) => {
-            Err("both surfaces are exact: leave this pair to the physics engine")
-        }
-        _ => Ok(()),
-    }
-}
-
-fn supported_params(p: &Params) -> Result<(), &'static str> {
-    if p.pixel_size > 0.0 && p.merge_gap > 0.0 && p.prediction >= 0.0 {
-        Ok(())
-    } else {
-        Err("pixel_size and merge_gap must be positive, prediction not negative")
-    }
-}
-
-/// At least the number of pixels that the paper's image of either cloud has.
-fn most_pixels(query: &PairQuery) -> f64 {
-    let fixed = match query.view {
-        View::Fixed(camera) => camera.size,
-        View::Aim { .. } => None,
-    };
-    if let Some([width, height]) = fixed {
-        return f64::from(width) * f64::from(height);
-    }
-    let pixel_size = match query.view {
-        View::Fixed(camera) => camera.pixel_size_at(0.0),
-        View::Aim { .. } => query.params.pixel_size,
-    };
-    let pixels = |surface: &Surface| match surface {
-        // As seen from any side, and two pixels for rounding outward.
-        Surface::Cloud(cloud) => {
-            let size = cloud.bounds().extents().length() + 2.0 * cloud.max_radius();
-            (f64::from(size) / f64::from(pixel_size) + 2.0).powi(2)
-        }
-        Surface::Exact(_) => 0.0,
-    };
-    pixels(&query.a).max(pixels(&query.b))
 }
 
 /// The image of one cloud, all layers, with either variant.

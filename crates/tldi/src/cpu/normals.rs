@@ -11,7 +11,7 @@ use glamx::{DMat3, DVec3, Vec3};
 
 /// Radius of the neighbourhood whose covariance gives the normal, in mean radii of the points.
 /// With 0.65 × the 7th neighbour's distance it holds about 25 neighbours on a surface.
-pub(crate) const SUPPORT: f32 = 3.0;
+pub const SUPPORT: f32 = 3.0;
 
 /// Most cells per point: on a surface of 4 million points there are as many. Sparser ones get
 /// larger cells, which only makes for more candidates.

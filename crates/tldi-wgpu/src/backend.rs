@@ -1,0 +1,609 @@
+//! One batch: upload, dispatch, read back; grown and redone where a buffer was too small.
+
+use crate::buffers::Growable;
+use crate::layout::{
+    BatchData, CONTACT_WORDS, COUNTERS, FRAGMENT_BYTES, GROUP, LAYER_BYTES, PAIR_WORDS, PairData,
+    SAMPLE_SLOTS, SIDE_WORDS, SPLAT_BYTES, SURVIVOR_BYTES, SideData, VIEW_BYTES, VIEW_WORDS,
+    is_for_device,
+};
+use crate::pipelines::{Pipeline, pipelines};
+use crate::readback::{Counters, Readback};
+use crate::resident::Resident;
+use crate::timer::Timer;
+use crate::{Gpu, GpuError, StageTime};
+use tldi::plan::PairPlan;
+use tldi::{
+    BLOCK, Backend, BackendError, CpuBackend, PairQuery, PairResult, PatchScratch, Surface,
+};
+use wgpu::BufferUsages;
+
+/// Times that a batch is redone with larger buffers before that counts as a fault: every time at
+/// least one of seven has doubled.
+const MOST_TRIES: usize = 64;
+
+/// Workgroups along x of a dispatch.
+const MAX_GROUPS: u32 = 65_535;
+
+/// Compares batches on a GPU.
+///
+/// What it does not take is compared on the CPU meanwhile, with the same results: pairs with an
+/// exact surface, [`Variant::Paper`](tldi::Variant::Paper), perspective cameras; and pairs of
+/// which a pixel has more than 1024 fragments. A batch costs one submission and one readback,
+/// whatever the number of pairs, and uploads of clouds with new content.
+///
+/// ```
+/// use tldi::{Backend, PairQuery, Params, PointCloud, Surface, View};
+/// use tldi::glamx::{Pose3, Vec3};
+/// use tldi_wgpu::{AdapterChoice, Gpu, WgpuBackend};
+///
+/// let mut backend = match Gpu::open(AdapterChoice::Any).and_then(WgpuBackend::new) {
+///     Ok(backend) => backend,
+///     Err(error) => return Ok(eprintln!("SKIPPED: {error}")),
+/// };
+/// let points: Vec<Vec3> = (0..441)
+///     .map(|i| Vec3::new((i % 21) as f32 * 0.05, 0.0, (i / 21) as f32 * 0.05))
+///     .collect();
+/// let sheet = PointCloud::builder(&points).radius(0.05).build()?;
+/// let mut results = Vec::new();
+/// backend.compare(
+///     &[PairQuery {
+///         a: Surface::Cloud(&sheet),
+///         b: Surface::Cloud(&sheet),
+///         a_from_b: Pose3::translation(0.0, 0.02, 0.0),
+///         view: View::aimed(),
+///         params: Params::for_radius(0.05),
+///     }],
+///     &mut results,
+/// )?;
+/// assert!((results[0].gap.unwrap() - 0.02).abs() < 1e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct WgpuBackend {
+    gpu: Gpu,
+    pipelines: Vec<Pipeline>,
+    resident: Resident,
+    buffers: Buffers,
+    capacities: Capacities,
+    /// What the bind groups were made of.
+    bound: Vec<Option<wgpu::Buffer>>,
+    bind_groups: Vec<wgpu::BindGroup>,
+    upload: Upload,
+    patches: PatchScratch,
+    cpu: CpuBackend,
+    timer: Option<Timer>,
+    times: Vec<StageTime>,
+}
+
+/// Elements that the buffers hold. Grown to what a batch needed.
+#[derive(Clone, Copy, Debug)]
+struct Capacities {
+    counted: Counters,
+}
+
+impl Default for Capacities {
+    fn default() -> Self {
+        Self {
+            counted: Counters {
+                survivors: 1 << 15,
+                tiles: 1 << 14,
+                pixels: 1 << 15,
+                splats: 1 << 15,
+                fragments: 1 << 18,
+                layers: 1 << 16,
+                contacts: 1 << 11,
+            },
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Buffers {
+    batch: Growable,
+    pairs: Growable,
+    sides: Growable,
+    items: Growable,
+    survivors: Growable,
+    views: Growable,
+    work: Growable,
+    entries: Growable,
+    samples: Growable,
+    splats: Growable,
+    fragments: Growable,
+    layers: Growable,
+    found: Growable,
+    groups: Growable,
+    splat_groups: Growable,
+    readback: Growable,
+}
+
+impl Default for Buffers {
+    fn default() -> Self {
+        let (storage, to) = (BufferUsages::STORAGE, BufferUsages::COPY_DST);
+        let from = BufferUsages::COPY_SRC;
+        Self {
+            batch: Growable::new("batch", BufferUsages::UNIFORM | to),
+            pairs: Growable::new("pairs", storage | to),
+            sides: Growable::new("sides", storage | to),
+            items: Growable::new("items", storage | to),
+            survivors: Growable::new("survivors", storage),
+            views: Growable::new("views", storage | to),
+            work: Growable::new("work", storage | to | from),
+            entries: Growable::new("entries", storage),
+            samples: Growable::new("samples", storage),
+            splats: Growable::new("splats", storage),
+            fragments: Growable::new("fragments", storage),
+            layers: Growable::new("layers", storage),
+            found: Growable::new("found", storage | to | from),
+            groups: Growable::new("groups", storage | BufferUsages::INDIRECT),
+            splat_groups: Growable::new("splat groups", storage | BufferUsages::INDIRECT),
+            readback: Growable::new("readback", BufferUsages::MAP_READ | to),
+        }
+    }
+}
+
+/// What a batch uploads.
+#[derive(Debug, Default)]
+struct Upload {
+    /// Index in the batch of each pair on the device.
+    pairs_of: Vec<usize>,
+    pairs: Vec<PairData>,
+    sides: Vec<SideData>,
+    /// Side and first point of each block that may have points in reach.
+    items: Vec<[u32; 2]>,
+    zone_words: u32,
+    cells: u32,
+}
+
+impl WgpuBackend {
+    /// A backend on a device. Compiles the stages.
+    ///
+    /// # Errors
+    /// [`GpuError::Failed`] where the device refuses a stage, [`GpuError::TooLarge`] where it
+    /// allows no buffers.
+    pub fn new(gpu: Gpu) -> Result<Self, GpuError> {
+        let pipelines = pipelines(&gpu);
+        let resident = Resident::new(&gpu)?;
+        gpu.check()?;
+        Ok(Self {
+            gpu,
+            pipelines,
+            resident,
+            buffers: Buffers::default(),
+            capacities: Capacities::default(),
+            bound: Vec::new(),
+            bind_groups: Vec::new(),
+            upload: Upload::default(),
+            patches: PatchScratch::default(),
+            cpu: CpuBackend::new(),
+            timer: None,
+            times: Vec::new(),
+        })
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Measures the stages from now on; `false` where the device has no timestamps. Every stage is
+    /// then a pass of its own, which costs a little.
+    pub fn measure_stages(&mut self) -> bool {
+        self.timer = Timer::new(&self.gpu, self.pipelines.len());
+        self.timer.is_some()
+    }
+
+    /// Time of each stage in the last batch; empty where none is measured.
+    pub fn stage_times(&self) -> &[StageTime] {
+        &self.times
+    }
+
+    /// Everything but what is left to the CPU.
+    fn compare_on_device(
+        &mut self,
+        batch: &[PairQuery<'_>],
+        results: &mut [PairResult],
+        left_to_cpu: &mut Vec<usize>,
+    ) -> Result<(), GpuError> {
+        self.gpu.check()?;
+        self.resident.begin();
+        self.gather(batch)?;
+        if self.upload.items.is_empty() {
+            return self.compare_on_cpu(batch, results, left_to_cpu);
+        }
+        for _ in 0..MOST_TRIES {
+            self.submit()?;
+            self.compare_on_cpu(batch, results, left_to_cpu)?;
+            let needed = self.read_back(batch, results, left_to_cpu)?;
+            if self.capacities.counted.holds(&needed) {
+                return self.compare_on_cpu(batch, results, left_to_cpu);
+            }
+            self.capacities.counted.grow(&needed);
+        }
+        Err(GpuError::Failed {
+            adapter: self.gpu.adapter().to_owned(),
+            reason: "its counters never settled".to_owned(),
+        })
+    }
+
+    /// Compares what is left to the CPU, and leaves nothing.
+    fn compare_on_cpu(
+        &mut self,
+        batch: &[PairQuery<'_>],
+        results: &mut [PairResult],
+        left_to_cpu: &mut Vec<usize>,
+    ) -> Result<(), GpuError> {
+        if left_to_cpu.is_empty() {
+            return Ok(());
+        }
+        let queries: Vec<PairQuery> = left_to_cpu.iter().map(|&pair| batch[pair]).collect();
+        let mut compared: Vec<PairResult> = Vec::new();
+        self.cpu
+            .compare(&queries, &mut compared)
+            .map_err(|source| GpuError::Failed {
+                adapter: "cpu".to_owned(),
+                reason: source.to_string(),
+            })?;
+        for (pair, result) in left_to_cpu.drain(..).zip(compared) {
+            results[pair] = result;
+        }
+        Ok(())
+    }
+
+    /// Fills what is uploaded, but for the sizes of the batch.
+    fn gather(&mut self, batch: &[PairQuery<'_>]) -> Result<(), GpuError> {
+        let upload = &mut self.upload;
+        upload.pairs_of.clear();
+        upload.pairs.clear();
+        upload.sides.clear();
+        upload.items.clear();
+        upload.zone_words = 0;
+        upload.cells = 0;
+        for (pair, query) in batch.iter().enumerate() {
+            let (Surface::Cloud(a), Surface::Cloud(b)) = (query.a, query.b) else {
+                continue;
+            };
+            if !is_for_device(query) {
+                continue;
+            }
+            let Some(plan) = PairPlan::new(query) else {
+                continue;
+            };
+            let first_item = upload.items.len();
+            for (k, cloud) in [a, b].into_iter().enumerate() {
+                let side = &plan.sides[k];
+                let index = (2 * upload.pairs.len() + k) as u32;
+                let is_in_reach = |block: &tldi::Aabb| {
+                    block
+                        .transformed(&side.frame_from_surface)
+                        .intersects(&side.region.overlap)
+                };
+                let blocks = cloud.blocks().iter().enumerate();
+                let reached = blocks.filter(|(_, block)| is_in_reach(block));
+                let before = upload.items.len();
+                upload
+                    .items
+                    .extend(reached.map(|(block, _)| [index, (block * BLOCK) as u32]));
+                if upload.items.len() == before {
+                    upload.items.truncate(first_item);
+                    break;
+                }
+            }
+            if upload.items.len() == first_item {
+                continue;
+            }
+            let data = PairData::new(query, &plan, upload.zone_words);
+            upload.zone_words += 2 * data.zone_words;
+            for (cloud, side) in [a, b].into_iter().zip(&plan.sides) {
+                let place = self.resident.place(&self.gpu, cloud)?;
+                let side = SideData::new(cloud, side, &query.params, place, upload.cells);
+                upload.cells += side.cells();
+                upload.sides.push(side);
+            }
+            upload.pairs.push(data);
+            upload.pairs_of.push(pair);
+        }
+        Ok(())
+    }
+
+    /// Sizes of the batch and where the parts of the arena are.
+    fn batch_data(&self) -> BatchData {
+        let (upload, capacities) = (&self.upload, &self.capacities.counted);
+        let pairs = upload.pairs.len() as u32;
+        let sides_at = COUNTERS;
+        let views_at = sides_at + 2 * pairs * SIDE_WORDS;
+        let zone_at = views_at + 3 * pairs * VIEW_WORDS;
+        let cells_at = zone_at + upload.zone_words;
+        let tiles_at = cells_at + 2 * upload.cells;
+        BatchData {
+            pairs,
+            items: upload.items.len() as u32,
+            survivors: capacities.survivors,
+            tiles: capacities.tiles,
+            pixels: capacities.pixels,
+            splats: capacities.splats,
+            fragments: capacities.fragments,
+            layers: capacities.layers,
+            contacts: capacities.contacts,
+            cells: upload.cells,
+            sides_at,
+            views_at,
+            zone_at,
+            cells_at,
+            tiles_at,
+            pixels_at: tiles_at + 3 * capacities.tiles,
+        }
+    }
+
+    /// Uploads and submits the batch.
+    fn submit(&mut self) -> Result<(), GpuError> {
+        let data = self.batch_data();
+        self.prepare_buffers(&data)?;
+        self.bind();
+        let Self {
+            gpu,
+            pipelines,
+            buffers,
+            bind_groups,
+            timer,
+            ..
+        } = self;
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        // Only what is counted must be zero: the counters up to the ends of pixels, the views, and
+        // what is read back of the pairs.
+        let counted = 4 * u64::from(data.pixels_at + 2 * data.pixels);
+        let pairs_found = 4 * u64::from(data.pairs * PAIR_WORDS);
+        for (buffer, bytes) in [
+            (&buffers.work, counted),
+            (&buffers.views, 3 * u64::from(data.pairs) * VIEW_BYTES),
+            (&buffers.found, pairs_found),
+        ] {
+            if let Some(buffer) = buffer.get() {
+                encoder.clear_buffer(buffer, 0, Some(bytes));
+            }
+        }
+        let direct = |count: u32| [count.min(MAX_GROUPS), count.div_ceil(MAX_GROUPS), 1];
+        let by_survivor = direct(data.items.min(data.survivors.div_ceil(GROUP)));
+        let dispatch = |pass: &mut wgpu::ComputePass, k: usize| {
+            let Pipeline {
+                stage, pipeline, ..
+            } = &pipelines[k];
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &bind_groups[k], &[]);
+            let mut indirect = |groups: &Growable, words: u64| {
+                if let Some(groups) = groups.get() {
+                    pass.dispatch_workgroups_indirect(groups, 4 * words);
+                }
+            };
+            match stage.name {
+                "columns_touch" => return indirect(&buffers.groups, 0),
+                "alloc" | "sweep" => return indirect(&buffers.groups, 3),
+                "compare" => return indirect(&buffers.groups, 6),
+                "splat" => return indirect(&buffers.splat_groups, 0),
+                _ => {}
+            }
+            let [x, y, z] = match stage.name {
+                "cull" => direct(data.items),
+                "normals_alloc" => direct(data.cells.div_ceil(GROUP)),
+                "aim" => direct(data.pairs),
+                "columns_tiles" | "columns_pixels" => [1, 1, 1],
+                _ => by_survivor,
+            };
+            pass.dispatch_workgroups(x, y, z);
+        };
+        let needed = |k: &usize| {
+            // Without bare clouds there is nothing to sort.
+            data.cells > 0 || !pipelines[*k].stage.name.starts_with("normals")
+        };
+        let stages = (0..pipelines.len()).filter(needed);
+        match timer {
+            None => {
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                stages.for_each(|k| dispatch(&mut pass, k));
+            }
+            Some(timer) => {
+                timer.begin();
+                for k in stages {
+                    let mut pass = timer.pass(&mut encoder, pipelines[k].stage.name);
+                    dispatch(&mut pass, k);
+                }
+                timer.resolve(&mut encoder);
+            }
+        }
+        let contacts = 4 * u64::from(data.contacts * CONTACT_WORDS);
+        if let (Some(work), Some(found), Some(readback)) = (
+            buffers.work.get(),
+            buffers.found.get(),
+            buffers.readback.get(),
+        ) {
+            let counters = 4 * u64::from(COUNTERS);
+            encoder.copy_buffer_to_buffer(work, 0, readback, 0, counters);
+            encoder.copy_buffer_to_buffer(found, 0, readback, counters, pairs_found + contacts);
+        }
+        gpu.queue.submit([encoder.finish()]);
+        gpu.check()
+    }
+
+    /// Grows the buffers to the batch and writes what is uploaded.
+    fn prepare_buffers(&mut self, data: &BatchData) -> Result<(), GpuError> {
+        let (gpu, b, upload) = (&self.gpu, &mut self.buffers, &self.upload);
+        b.batch.write(gpu, std::slice::from_ref(data))?;
+        b.pairs.write(gpu, &upload.pairs)?;
+        b.sides.write(gpu, &upload.sides)?;
+        b.items.write(gpu, &upload.items)?;
+        let pairs = u64::from(data.pairs);
+        let found = 4 * (u64::from(PAIR_WORDS) * pairs + u64::from(CONTACT_WORDS * data.contacts));
+        let bare = if data.cells > 0 { data.survivors } else { 1 };
+        for (buffer, bytes) in [
+            (&mut b.survivors, SURVIVOR_BYTES * u64::from(data.survivors)),
+            (&mut b.views, 3 * VIEW_BYTES * pairs),
+            (
+                &mut b.work,
+                4 * u64::from(data.pixels_at) + 16 * u64::from(data.pixels),
+            ),
+            (&mut b.entries, 4 * u64::from(bare)),
+            (&mut b.samples, 2 * 16 * SAMPLE_SLOTS * pairs),
+            (&mut b.splats, SPLAT_BYTES * u64::from(data.splats)),
+            (&mut b.fragments, FRAGMENT_BYTES * u64::from(data.fragments)),
+            (&mut b.layers, LAYER_BYTES * u64::from(data.layers)),
+            (&mut b.found, found),
+            (&mut b.groups, 64),
+            (&mut b.splat_groups, 64),
+            (&mut b.readback, 4 * u64::from(COUNTERS) + found),
+        ] {
+            buffer.ensure(gpu, bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Makes the bind groups, if a buffer is new.
+    fn bind(&mut self) {
+        let b = &self.buffers;
+        let grown = |buffer: &Growable| buffer.get().cloned();
+        let bound = vec![
+            grown(&b.batch),
+            grown(&b.pairs),
+            grown(&b.sides),
+            grown(&b.items),
+            Some(self.resident.points().clone()),
+            Some(self.resident.normals().clone()),
+            grown(&b.survivors),
+            grown(&b.views),
+            grown(&b.work),
+            grown(&b.entries),
+            grown(&b.samples),
+            grown(&b.splats),
+            grown(&b.fragments),
+            grown(&b.layers),
+            grown(&b.found),
+            grown(&b.groups),
+            grown(&b.splat_groups),
+        ];
+        if bound == self.bound {
+            return;
+        }
+        self.bind_groups.clear();
+        for Pipeline { stage, layout, .. } in &self.pipelines {
+            let entries: Vec<_> = (stage.bindings.iter())
+                .filter_map(|&binding| {
+                    Some(wgpu::BindGroupEntry {
+                        binding,
+                        resource: bound[binding as usize].as_ref()?.as_entire_binding(),
+                    })
+                })
+                .collect();
+            self.bind_groups.push(
+                self.gpu
+                    .device
+                    .create_bind_group(&wgpu::BindGroupDescriptor {
+                        label: Some(stage.name),
+                        layout,
+                        entries: &entries,
+                    }),
+            );
+        }
+        self.bound = bound;
+    }
+
+    /// Waits for the batch; fills the results if the buffers held it, and returns what it needed.
+    fn read_back(
+        &mut self,
+        batch: &[PairQuery<'_>],
+        results: &mut [PairResult],
+        left_to_cpu: &mut Vec<usize>,
+    ) -> Result<Counters, GpuError> {
+        let failed = |reason: String| GpuError::Failed {
+            adapter: self.gpu.adapter().to_owned(),
+            reason,
+        };
+        let Some(buffer) = self.buffers.readback.get() else {
+            return Err(failed("nothing was submitted".to_owned()));
+        };
+        let mapped = std::sync::Arc::new(std::sync::Mutex::new(None));
+        let outcome = std::sync::Arc::clone(&mapped);
+        let slice = buffer.slice(..);
+        slice.map_async(wgpu::MapMode::Read, move |result| {
+            *outcome
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner) = Some(result);
+        });
+        self.gpu
+            .device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|e| failed(e.to_string()))?;
+        self.gpu.check()?;
+        let outcome = mapped
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)
+            .take();
+        match outcome {
+            Some(Ok(())) => {}
+            Some(Err(e)) => return Err(failed(e.to_string())),
+            None => return Err(failed("the readback was not answered".to_owned())),
+        }
+        let view = slice
+            .get_mapped_range()
+            .map_err(|e| failed(e.to_string()))?;
+        let words: &[u32] = bytemuck::cast_slice(&view);
+        let readback = Readback::new(words, self.upload.pairs.len());
+        let needed = readback.counters();
+        if self.capacities.counted.holds(&needed) {
+            for (k, &pair) in self.upload.pairs_of.iter().enumerate() {
+                if readback.is_crowded(k) {
+                    left_to_cpu.push(pair);
+                } else {
+                    readback.fill(k, &batch[pair], &mut results[pair]);
+                }
+            }
+            readback.fill_contacts(&self.upload.pairs_of, batch, results);
+        }
+        drop(view);
+        buffer.unmap();
+        if self.capacities.counted.holds(&needed) {
+            for &pair in &self.upload.pairs_of {
+                self.patches.reduce(&mut results[pair], &batch[pair].params);
+            }
+        }
+        self.times.clear();
+        if let Some(timer) = &mut self.timer {
+            timer.read(&self.gpu, &mut self.times)?;
+        }
+        Ok(needed)
+    }
+}
+
+impl std::fmt::Debug for WgpuBackend {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("WgpuBackend")
+            .field("adapter", &self.gpu.adapter())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Backend for WgpuBackend {
+    fn name(&self) -> &str {
+        "gpu"
+    }
+
+    fn adapter(&self) -> Option<&str> {
+        Some(self.gpu.adapter())
+    }
+
+    fn compare(
+        &mut self,
+        batch: &[PairQuery<'_>],
+        results: &mut Vec<PairResult>,
+    ) -> Result<(), BackendError> {
+        results.resize_with(batch.len(), PairResult::default);
+        results.iter_mut().for_each(PairResult::clear);
+        let mut left_to_cpu = Vec::new();
+        for (pair, query) in batch.iter().enumerate() {
+            query
+                .check()
+                .map_err(|reason| BackendError::Unsupported { pair, reason })?;
+            if !is_for_device(query) {
+                left_to_cpu.push(pair);
+            }
+        }
+        Ok(self.compare_on_device(batch, results, &mut left_to_cpu)?)
+    }
+}

@@ -1,0 +1,87 @@
+//! Buffers that are reused from step to step and grow by doubling.
+
+use crate::{Gpu, GpuError};
+use wgpu::BufferUsages;
+
+/// A buffer that grows.
+#[derive(Debug)]
+pub(crate) struct Growable {
+    name: &'static str,
+    usage: BufferUsages,
+    buffer: Option<wgpu::Buffer>,
+}
+
+impl Growable {
+    pub(crate) fn new(name: &'static str, usage: BufferUsages) -> Self {
+        Self {
+            name,
+            usage,
+            buffer: None,
+        }
+    }
+
+    /// The buffer, of at least `bytes` bytes; its content is lost where it grows.
+    pub(crate) fn ensure(&mut self, gpu: &Gpu, bytes: u64) -> Result<&wgpu::Buffer, GpuError> {
+        if self.buffer.as_ref().is_none_or(|b| b.size() < bytes) {
+            self.buffer = Some(create(gpu, self.name, self.usage, bytes)?);
+        }
+        // It was made above, if it was not there.
+        self.buffer.as_ref().ok_or(GpuError::TooLarge {
+            buffer: self.name,
+            needed: bytes,
+            allowed: 0,
+        })
+    }
+
+    /// The buffer, where it was ensured.
+    pub(crate) fn get(&self) -> Option<&wgpu::Buffer> {
+        self.buffer.as_ref()
+    }
+
+    /// Writes `data` to the start.
+    pub(crate) fn write<T: bytemuck::NoUninit>(
+        &mut self,
+        gpu: &Gpu,
+        data: &[T],
+    ) -> Result<(), GpuError> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let buffer = self.ensure(gpu, bytes.len() as u64)?;
+        gpu.queue.write_buffer(buffer, 0, bytes);
+        Ok(())
+    }
+}
+
+/// A new buffer of at least `bytes` bytes, rounded up to a power of two.
+pub(crate) fn create(
+    gpu: &Gpu,
+    name: &'static str,
+    usage: BufferUsages,
+    bytes: u64,
+) -> Result<wgpu::Buffer, GpuError> {
+    let limits = gpu.device.limits();
+    let allowed = limits
+        .max_buffer_size
+        .min(limits.max_storage_buffer_binding_size);
+    let size = bytes.next_power_of_two().clamp(256, allowed.max(256));
+    if size < bytes {
+        return Err(GpuError::TooLarge {
+            buffer: name,
+            needed: bytes,
+            allowed,
+        });
+    }
+    let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(name),
+        size,
+        usage,
+        mapped_at_creation: false,
+    });
+    match pollster::block_on(scope.pop()) {
+        Some(error) => Err(GpuError::Failed {
+            adapter: gpu.adapter().to_owned(),
+            reason: format!("no memory for {size} bytes of `{name}`: {error}"),
+        }),
+        None => Ok(buffer),
+    }
+}

@@ -1,0 +1,124 @@
+//! The device: chosen once, shared with whoever brings their own.
+
+use crate::GpuError;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Which adapters will do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum AdapterChoice {
+    /// Hardware only. A software adapter is slower than the CPU backend.
+    #[default]
+    Hardware,
+    /// The best there is, be it a driver that computes on the CPU: for tests.
+    Any,
+}
+
+/// A device and its queue, and what went wrong with them.
+#[derive(Clone, Debug)]
+pub struct Gpu {
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    adapter: Arc<str>,
+    failure: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    /// Opens the best adapter.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] where there is none of the kind asked for, [`GpuError::NoDevice`]
+    /// where its driver refuses.
+    pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        // Not GL: its drivers miscompiled loops without an error.
+        descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+        let instance = wgpu::Instance::new(descriptor);
+        let options = wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..Default::default()
+        };
+        let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(|source| {
+            GpuError::NoAdapter {
+                reason: source.to_string(),
+            }
+        })?;
+        let info = adapter.get_info();
+        if choice == AdapterChoice::Hardware && info.device_type == wgpu::DeviceType::Cpu {
+            return Err(GpuError::NoAdapter {
+                reason: format!("`{}` computes on the CPU", info.name),
+            });
+        }
+        let offered = adapter.limits();
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("tldi"),
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            // More than the default only where it is offered: larger clouds.
+            required_limits: wgpu::Limits {
+                max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+                max_buffer_size: offered.max_buffer_size,
+                ..wgpu::Limits::default()
+            },
+            ..Default::default()
+        }))
+        .map_err(|source| GpuError::NoDevice {
+            adapter: info.name.clone(),
+            reason: source.to_string(),
+        })?;
+        Ok(Self::shared(device, queue))
+    }
+
+    /// Takes a device that the caller has: clouds that already live in its buffers need no copy to
+    /// the host. Errors of the device that nothing else catches are handled here from now on.
+    pub fn shared(device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let adapter = device.adapter_info().name.into();
+        let failure = Arc::new(Mutex::new(None));
+        let note = |failure: &Arc<Mutex<Option<String>>>, what: String| {
+            let mut failure = failure.lock().unwrap_or_else(PoisonError::into_inner);
+            failure.get_or_insert(what);
+        };
+        let of_error = Arc::clone(&failure);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            note(&of_error, error.to_string());
+        }));
+        let of_loss = Arc::clone(&failure);
+        device.set_device_lost_callback(move |reason, message| {
+            note(
+                &of_loss,
+                format!("the device was lost ({reason:?}): {message}"),
+            );
+        });
+        Self {
+            device,
+            queue,
+            adapter,
+            failure,
+        }
+    }
+
+    /// Name of the adapter.
+    pub fn adapter(&self) -> &str {
+        &self.adapter
+    }
+
+    /// The device.
+    pub fn device(&self) -> &wgpu::Device {
+        &self.device
+    }
+
+    /// The queue.
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.queue
+    }
+
+    /// What went wrong since the device was opened.
+    pub(crate) fn check(&self) -> Result<(), GpuError> {
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*failure {
+            Some(reason) => Err(GpuError::Failed {
+                adapter: self.adapter.to_string(),
+                reason: reason.clone(),
+            }),
+            None => Ok(()),
+        }
+    }
+}

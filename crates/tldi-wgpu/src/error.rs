@@ -1,0 +1,52 @@
+//! What can go wrong with a GPU.
+
+use thiserror::Error;
+use tldi::BackendError;
+
+/// Why there is no GPU, or why it did not finish a batch.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum GpuError {
+    /// No adapter of the kind that was asked for.
+    #[error(
+        "no GPU: {reason}; install its driver, or use the CPU backend (`TLDI_BACKEND=gpu` takes a software driver too)"
+    )]
+    NoAdapter {
+        /// What the system says.
+        reason: String,
+    },
+    /// The adapter's driver gives no device.
+    #[error("the GPU `{adapter}` cannot be used: {reason}")]
+    NoDevice {
+        /// Name of the adapter.
+        adapter: String,
+        /// What its driver says.
+        reason: String,
+    },
+    /// The device failed or was lost. Nothing that was given to it comes back.
+    #[error("the GPU `{adapter}` failed: {reason}")]
+    Failed {
+        /// Name of the adapter.
+        adapter: String,
+        /// What its driver says.
+        reason: String,
+    },
+    /// A buffer would be larger than the device, or the caller's budget, allows.
+    #[error(
+        "the GPU's buffer `{buffer}` needs {needed} bytes, {allowed} are allowed: use larger pixels, smaller clouds or fewer pairs a step"
+    )]
+    TooLarge {
+        /// What it holds.
+        buffer: &'static str,
+        /// Bytes.
+        needed: u64,
+        /// Bytes.
+        allowed: u64,
+    },
+}
+
+impl From<GpuError> for BackendError {
+    fn from(error: GpuError) -> Self {
+        Self::Device(error.to_string())
+    }
+}

@@ -1,0 +1,22 @@
+//! The GPU backend of [`tldi`]: the TLDIs of all pairs of a step are built, compared and reduced to
+//! contact pixels on the GPU, in one submission and one readback.
+//!
+//! Stages have the names of the CPU backend's, which is the reference: integers are equal, floats
+//! within what rounding of products and sums makes of them. Clouds stay on the device until their
+//! points change; a rigid motion is a pose and no upload.
+
+mod backend;
+mod buffers;
+mod device;
+mod error;
+mod layout;
+mod pipelines;
+mod readback;
+mod resident;
+mod timer;
+
+pub use backend::WgpuBackend;
+pub use device::{AdapterChoice, Gpu};
+pub use error::GpuError;
+pub use timer::StageTime;
+pub use wgpu;

@@ -1,0 +1,170 @@
+//! What a batch found, as it is read back.
+
+use crate::layout::{CONTACT_WORDS, COUNTERS, PAIR_WORDS};
+use tldi::glamx::Vec3;
+use tldi::{ContactPixel, PairQuery, PairResult, View, VirtualCamera};
+
+/// Elements that a batch needs of each buffer whose size is not known before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Counters {
+    pub(crate) survivors: u32,
+    pub(crate) tiles: u32,
+    pub(crate) pixels: u32,
+    pub(crate) splats: u32,
+    pub(crate) fragments: u32,
+    pub(crate) layers: u32,
+    pub(crate) contacts: u32,
+}
+
+impl Counters {
+    fn to_array(self) -> [u32; 7] {
+        let Self {
+            survivors,
+            tiles,
+            pixels,
+            splats,
+            fragments,
+            layers,
+            contacts,
+        } = self;
+        [
+            survivors, tiles, pixels, splats, fragments, layers, contacts,
+        ]
+    }
+
+    fn from_array(all: [u32; 7]) -> Self {
+        let [
+            survivors,
+            tiles,
+            pixels,
+            splats,
+            fragments,
+            layers,
+            contacts,
+        ] = all;
+        Self {
+            survivors,
+            tiles,
+            pixels,
+            splats,
+            fragments,
+            layers,
+            contacts,
+        }
+    }
+
+    /// Whether buffers of this size are large enough.
+    pub(crate) fn holds(&self, needed: &Self) -> bool {
+        let needed = needed.to_array();
+        self.to_array()
+            .into_iter()
+            .zip(needed)
+            .all(|(own, n)| n <= own)
+    }
+
+    /// Grows what is too small, by doubling.
+    pub(crate) fn grow(&mut self, needed: &Self) {
+        let (own, needed) = (self.to_array(), needed.to_array());
+        let grown = |k: usize| match needed[k] > own[k] {
+            true => needed[k].checked_next_power_of_two().unwrap_or(u32::MAX),
+            false => own[k],
+        };
+        *self = Self::from_array(std::array::from_fn(grown));
+    }
+}
+
+/// The words that were read back: counters, pairs, contacts.
+pub(crate) struct Readback<'a> {
+    counters: &'a [u32],
+    pairs: &'a [[u32; PAIR_WORDS as usize]],
+    contacts: &'a [[u32; CONTACT_WORDS as usize]],
+}
+
+const COLLIDES: usize = 0;
+const GAP: usize = 1;
+const CROWDED: usize = 2;
+const VIEWS: usize = 3;
+const AXES: usize = 4;
+
+impl<'a> Readback<'a> {
+    pub(crate) fn new(words: &'a [u32], pairs: usize) -> Self {
+        let (counters, rest) = words.split_at(COUNTERS as usize);
+        let (pairs, contacts) = rest.split_at(pairs * PAIR_WORDS as usize);
+        Self {
+            counters,
+            pairs: pairs.as_chunks().0,
+            contacts: contacts.as_chunks().0,
+        }
+    }
+
+    pub(crate) fn counters(&self) -> Counters {
+        Counters::from_array(std::array::from_fn(|k| self.counters[k]))
+    }
+
+    /// Whether the `k`-th pair on the device has a pixel with too many fragments.
+    pub(crate) fn is_crowded(&self, k: usize) -> bool {
+        self.pairs[k][CROWDED] != 0
+    }
+
+    /// Fills all but the contacts of the `k`-th pair on the device.
+    pub(crate) fn fill(&self, k: usize, query: &PairQuery, result: &mut PairResult) {
+        let words = &self.pairs[k];
+        result.collides = words[COLLIDES] != 0;
+        result.gap = (words[GAP] != 0).then(|| -unordered(words[GAP]));
+        result.axes.clear();
+        let axes = words[AXES..].as_chunks::<3>().0;
+        let views = axes.iter().take(words[VIEWS] as usize);
+        result.axes.extend(views.map(|axis| match query.view {
+            View::Fixed(camera) => camera.axis(),
+            View::Aim { .. } => Vec3::from_array(axis.map(f32::from_bits)),
+        }));
+        result.contacts.clear();
+    }
+
+    /// Adds the contacts of all pairs but crowded ones to their results.
+    pub(crate) fn fill_contacts(
+        &self,
+        pairs_of: &[usize],
+        batch: &[PairQuery],
+        results: &mut [PairResult],
+    ) {
+        let count = self.counters().contacts as usize;
+        for words in &self.contacts[..count] {
+            let (k, view) = ((words[0] / 3) as usize, words[0] % 3);
+            if self.is_crowded(k) {
+                continue;
+            }
+            let query = &batch[pairs_of[k]];
+            let result = &mut results[pairs_of[k]];
+            let camera = match query.view {
+                View::Fixed(camera) => camera,
+                View::Aim { .. } => {
+                    VirtualCamera::along(result.axes[view as usize], query.params.pixel_size)
+                }
+            };
+            let number = |at: usize| f32::from_bits(words[at]);
+            let vector = |at: usize| Vec3::new(number(at), number(at + 1), number(at + 2));
+            let pixel = [words[1] as i32, words[2] as i32];
+            let [u, v] = pixel.map(|c| c as f32 + 0.5);
+            let frame_from_view = camera.view_from_frame.rotation.inverse();
+            result.contacts.push(ContactPixel {
+                pixel,
+                view,
+                point_a: camera.point_at(u, v, number(4)),
+                point_b: camera.point_at(u, v, number(5)),
+                normal_a: frame_from_view * vector(7),
+                normal_b: frame_from_view * vector(10),
+                gap: number(6),
+            });
+        }
+    }
+}
+
+/// The inverse of `ordered` in WGSL.
+fn unordered(key: u32) -> f32 {
+    f32::from_bits(if key >= 1 << 31 {
+        key & !(1 << 31)
+    } else {
+        !key
+    })
+}

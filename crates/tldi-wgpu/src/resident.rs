@@ -1,0 +1,204 @@
+//! Clouds on the device: uploaded when their content is new, and kept while they are used.
+
+use crate::buffers::create;
+use crate::{Gpu, GpuError};
+use std::collections::HashMap;
+use tldi::{PointCloud, Radii};
+use wgpu::BufferUsages;
+
+/// Batches after which a cloud that is not used gives its place to others.
+const KEPT_BATCHES: u64 = 2;
+
+/// A pool of equal elements on the device, in which ranges are taken and given back.
+#[derive(Debug)]
+struct Pool {
+    name: &'static str,
+    element_bytes: u64,
+    buffer: wgpu::Buffer,
+    /// Free ranges (first, length) in ascending order, none next to another.
+    free: Vec<(u32, u32)>,
+    capacity: u32,
+}
+
+const USAGE: BufferUsages = BufferUsages::STORAGE
+    .union(BufferUsages::COPY_DST)
+    .union(BufferUsages::COPY_SRC);
+
+impl Pool {
+    fn new(gpu: &Gpu, name: &'static str, element_bytes: u64) -> Result<Self, GpuError> {
+        let buffer = create(gpu, name, USAGE, 1024 * element_bytes)?;
+        let capacity = (buffer.size() / element_bytes) as u32;
+        Ok(Self {
+            name,
+            element_bytes,
+            buffer,
+            free: vec![(0, capacity)],
+            capacity,
+        })
+    }
+
+    fn take(&mut self, count: u32) -> Option<u32> {
+        let at = self.free.iter().position(|(_, length)| *length >= count)?;
+        let (first, length) = self.free[at];
+        if length == count {
+            self.free.remove(at);
+        } else {
+            self.free[at] = (first + count, length - count);
+        }
+        Some(first)
+    }
+
+    fn give_back(&mut self, first: u32, count: u32) {
+        let at = self.free.partition_point(|(start, _)| *start < first);
+        self.free.insert(at, (first, count));
+        if at + 1 < self.free.len() && first + count == self.free[at + 1].0 {
+            self.free[at].1 += self.free[at + 1].1;
+            self.free.remove(at + 1);
+        }
+        if at > 0 && self.free[at - 1].0 + self.free[at - 1].1 == first {
+            self.free[at - 1].1 += self.free[at].1;
+            self.free.remove(at);
+        }
+    }
+
+    /// Makes room for `count` more elements in a row; what is there stays where it is.
+    fn grow(&mut self, gpu: &Gpu, count: u32) -> Result<(), GpuError> {
+        let elements = u64::from(self.capacity) + u64::from(count);
+        let buffer = create(gpu, self.name, USAGE, elements * self.element_bytes)?;
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&self.buffer, 0, &buffer, 0, self.buffer.size());
+        gpu.queue.submit([encoder.finish()]);
+        let capacity = (buffer.size() / self.element_bytes).min(u64::from(u32::MAX)) as u32;
+        let former = std::mem::replace(&mut self.capacity, capacity);
+        self.buffer = buffer;
+        self.give_back(former, capacity - former);
+        Ok(())
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Slot {
+    points: (u32, u32),
+    normals: Option<u32>,
+    used: u64,
+}
+
+/// The clouds on the device.
+#[derive(Debug)]
+pub(crate) struct Resident {
+    points: Pool,
+    normals: Pool,
+    slots: HashMap<u64, Slot>,
+    batch: u64,
+    staging: Vec<f32>,
+}
+
+impl Resident {
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
+        Ok(Self {
+            points: Pool::new(gpu, "points", 16)?,
+            normals: Pool::new(gpu, "normals", 12)?,
+            slots: HashMap::new(),
+            batch: 0,
+            staging: Vec::new(),
+        })
+    }
+
+    /// Begins a batch: what it does not use may give its place to others later.
+    pub(crate) fn begin(&mut self) {
+        self.batch += 1;
+    }
+
+    pub(crate) fn points(&self) -> &wgpu::Buffer {
+        &self.points.buffer
+    }
+
+    pub(crate) fn normals(&self) -> &wgpu::Buffer {
+        &self.normals.buffer
+    }
+
+    /// First point and first normal of a cloud; uploads it if its content is new.
+    pub(crate) fn place(&mut self, gpu: &Gpu, cloud: &PointCloud) -> Result<[u32; 2], GpuError> {
+        let id = cloud.content_id();
+        if let Some(slot) = self.slots.get_mut(&id) {
+            slot.used = self.batch;
+            return Ok([slot.points.0, slot.normals.unwrap_or(0)]);
+        }
+        let count = cloud.len() as u32;
+        let first = self.room(gpu, count, |all| &mut all.points)?;
+        let normals = match cloud.normals() {
+            Some(normals) => {
+                let first = self.room(gpu, count, |all| &mut all.normals)?;
+                self.staging.clear();
+                self.staging
+                    .extend(normals.iter().flat_map(|n| n.to_array()));
+                let bytes = bytemuck::cast_slice(&self.staging);
+                gpu.queue
+                    .write_buffer(&self.normals.buffer, 12 * u64::from(first), bytes);
+                Some(first)
+            }
+            None => None,
+        };
+        let radius = |i: usize| match cloud.radii() {
+            Radii::Global(r) => *r,
+            Radii::PerPoint(r) => r[i],
+        };
+        let [x, y, z] = cloud.coordinates();
+        self.staging.clear();
+        self.staging
+            .extend((0..cloud.len()).flat_map(|i| [x[i], y[i], z[i], radius(i)]));
+        let bytes = bytemuck::cast_slice(&self.staging);
+        gpu.queue
+            .write_buffer(&self.points.buffer, 16 * u64::from(first), bytes);
+        let slot = Slot {
+            points: (first, count),
+            normals,
+            used: self.batch,
+        };
+        self.slots.insert(id, slot);
+        Ok([first, normals.unwrap_or(0)])
+    }
+
+    /// A range of `count` elements: free, else of clouds that are no longer used, else new.
+    fn room(
+        &mut self,
+        gpu: &Gpu,
+        count: u32,
+        pool: impl Fn(&mut Self) -> &mut Pool,
+    ) -> Result<u32, GpuError> {
+        if let Some(first) = pool(self).take(count) {
+            return Ok(first);
+        }
+        self.forget_unused();
+        if let Some(first) = pool(self).take(count) {
+            return Ok(first);
+        }
+        pool(self).grow(gpu, count)?;
+        let pool = pool(self);
+        pool.take(count).ok_or(GpuError::TooLarge {
+            buffer: pool.name,
+            needed: u64::from(count) * pool.element_bytes,
+            allowed: pool.buffer.size(),
+        })
+    }
+
+    fn forget_unused(&mut self) {
+        let Self {
+            points,
+            normals,
+            slots,
+            batch,
+            ..
+        } = self;
+        slots.retain(|_, slot| {
+            let is_kept = slot.used + KEPT_BATCHES > *batch;
+            if !is_kept {
+                points.give_back(slot.points.0, slot.points.1);
+                if let Some(first) = slot.normals {
+                    normals.give_back(first, slot.points.1);
+                }
+            }
+            is_kept
+        });
+    }
+}

@@ -1,0 +1,89 @@
+// Stage `cull`: the points of one cloud inside the overlap of both bounds, in the frame of the
+// query; and the cells of the zone's grid that hold them. A workgroup takes one block of one side.
+
+@group(0) @binding(1) var<storage, read> pairs: array<Pair>;
+@group(0) @binding(2) var<storage, read> sides: array<Side>;
+// Side, and first point in its cloud.
+@group(0) @binding(3) var<storage, read> items: array<vec2u>;
+@group(0) @binding(4) var<storage, read> points: array<vec4f>;
+@group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
+@group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
+
+var<workgroup> kept: atomic<u32>;
+var<workgroup> radii: atomic<u32>;
+var<workgroup> first: u32;
+
+fn is_within(p: vec3f, low: vec3f, high: vec3f) -> bool {
+    return all(p >= low) && all(p <= high);
+}
+
+@compute @workgroup_size(256)
+fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let item_index = group_index(group);
+    let exists = item_index < batch.items;
+    let item = items[min(item_index, batch.items - 1u)];
+    let side_index = item.x;
+    let pair_index = side_index / 2u;
+    let stride = sides[side_index].stride;
+    let offset = lane * stride;
+    let index = item.y + offset;
+    var is_kept = exists && offset < BLOCK && index < sides[side_index].len;
+    var position = vec3f();
+    var radius = 0.0;
+    if is_kept {
+        let point = points[sides[side_index].first_point + index];
+        radius = point.w;
+        position = moved(
+            sides[side_index].frame_from_cloud_x,
+            sides[side_index].frame_from_cloud_y,
+            sides[side_index].frame_from_cloud_z,
+            point.xyz,
+        );
+        let in_other = moved(
+            sides[side_index].other_from_frame_x,
+            sides[side_index].other_from_frame_y,
+            sides[side_index].other_from_frame_z,
+            position,
+        );
+        is_kept = is_within(position, pairs[pair_index].overlap_min, pairs[pair_index].overlap_max)
+            && is_within(in_other, sides[side_index].other_min, sides[side_index].other_max);
+    }
+    var own = 0u;
+    if is_kept {
+        own = atomicAdd(&kept, 1u);
+        if (sides[side_index].flags & RADII_DIFFER) != 0u {
+            atomicAdd(&radii, u32(radius / sides[side_index].max_radius * RADIUS_STEPS));
+        }
+    }
+    workgroupBarrier();
+    if lane == 0u {
+        let count = atomicLoad(&kept);
+        let sum = atomicLoad(&radii);
+        let state = batch.sides_at + side_index * SIDE_WORDS;
+        if count > 0u {
+            first = atomicAdd(&work[SURVIVORS], count);
+            atomicAdd(&work[state + KEPT_COUNT], count);
+        }
+        if sum > 0u {
+            atomicAdd(&work[state + RADIUS_LOW], sum & 0xffffu);
+            atomicAdd(&work[state + RADIUS_HIGH], sum >> 16u);
+        }
+    }
+    workgroupBarrier();
+    let slot = first + own;
+    if !is_kept || slot >= batch.survivors {
+        return;
+    }
+    let scaled = radius * sides[side_index].radius_scale;
+    survivors[slot] = Survivor(position, scaled, side_index, index, NONE, 0u);
+    // The cell of the zone's grid; points outside count to the nearest one.
+    let dims = pairs[pair_index].zone_dims;
+    let at = (position - pairs[pair_index].overlap_min) * pairs[pair_index].zone_inv_cell;
+    let cx = truncated(at.x, f32(dims.x - 1u));
+    let cy = truncated(at.y, f32(dims.y - 1u));
+    let cz = truncated(at.z, f32(dims.z - 1u));
+    let row = (cz * dims.y + cy) * pairs[pair_index].zone_row_words;
+    let of_side = (side_index % 2u) * pairs[pair_index].zone_words;
+    let word = batch.zone_at + pairs[pair_index].zone_first + of_side + row + cx / 32u;
+    atomicOr(&work[word], 1u << (cx % 32u));
+}

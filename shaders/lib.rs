@@ -1,0 +1,104 @@
+//! The stages of the GPU backend in WGSL, under the names of the CPU backend's stages.
+//!
+//! One file a stage; what they share is in `shared/` and put in front. Their constants are
+//! overrides, filled by `tldi-wgpu` from the numbers of the CPU's stages.
+
+/// One compute stage: an entry point of a shader.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage {
+    /// Name of the stage and of its entry point.
+    pub name: &'static str,
+    /// WGSL, complete.
+    pub source: &'static str,
+    /// Bindings of group 0 that the entry point uses.
+    pub bindings: &'static [u32],
+}
+
+macro_rules! shader {
+    ($($file:literal),+) => {
+        concat!($(include_str!($file)),+)
+    };
+}
+
+const CULL: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "cull.wgsl");
+const ZONE: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "zone.wgsl");
+const NORMALS: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "normals.wgsl");
+const SAMPLE: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/eigen.wgsl",
+    "shared/bare_normal.wgsl",
+    "sample.wgsl"
+);
+const AIM: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/eigen.wgsl",
+    "aim.wgsl"
+);
+const COLUMNS: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "columns.wgsl");
+const MARK: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/eigen.wgsl",
+    "shared/bare_normal.wgsl",
+    "shared/pixels.wgsl",
+    "mark.wgsl"
+);
+const ALLOC: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/pixels.wgsl",
+    "alloc.wgsl"
+);
+const SPLAT: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/pixels.wgsl",
+    "splat.wgsl"
+);
+const SWEEP: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/pixels.wgsl",
+    "sweep.wgsl"
+);
+const COMPARE: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/pixels.wgsl",
+    "compare.wgsl"
+);
+
+const fn stage(name: &'static str, source: &'static str, bindings: &'static [u32]) -> Stage {
+    Stage {
+        name,
+        source,
+        bindings,
+    }
+}
+
+/// The stages of a batch, in their order.
+///
+/// ```
+/// let names: Vec<_> = tldi_shaders::STAGES.iter().map(|stage| stage.name).collect();
+/// assert_eq!((names[0], names[names.len() - 1]), ("cull", "compare"));
+/// ```
+pub const STAGES: &[Stage] = &[
+    stage("cull", CULL, &[0, 1, 2, 3, 4, 6, 8]),
+    stage("zone", ZONE, &[0, 1, 2, 6, 8]),
+    stage("normals_alloc", NORMALS, &[0, 8]),
+    stage("normals_sort", NORMALS, &[0, 6, 8, 9]),
+    stage("sample", SAMPLE, &[0, 1, 2, 5, 6, 8, 9, 10]),
+    stage("aim", AIM, &[0, 1, 2, 7, 8, 10, 14]),
+    stage("columns_bounds", COLUMNS, &[0, 6, 7, 8]),
+    stage("columns_tiles", COLUMNS, &[0, 1, 2, 7, 8, 15]),
+    stage("columns_depths", COLUMNS, &[0, 1, 2, 6, 7, 8]),
+    stage("columns_touch", COLUMNS, &[0, 1, 7, 8]),
+    stage("columns_pixels", COLUMNS, &[0, 7, 8, 15]),
+    stage("mark", MARK, &[0, 1, 2, 5, 6, 7, 8, 9, 11]),
+    stage("alloc", ALLOC, &[0, 8, 16]),
+    stage("splat", SPLAT, &[0, 7, 8, 11, 12]),
+    stage("sweep", SWEEP, &[0, 1, 2, 7, 8, 11, 12, 13, 14]),
+    stage("compare", COMPARE, &[0, 1, 7, 8, 13, 14]),
+];

@@ -1,0 +1,40 @@
+// Stage `aim`, first half: normals of an even selection of the near points of each side.
+
+@group(0) @binding(1) var<storage, read> pairs: array<Pair>;
+@group(0) @binding(2) var<storage, read> sides: array<Side>;
+@group(0) @binding(5) var<storage, read> normals: array<f32>;
+@group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
+@group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
+@group(0) @binding(9) var<storage, read_write> entries: array<u32>;
+@group(0) @binding(10) var<storage, read_write> samples: array<vec4f>;
+
+@compute @workgroup_size(256)
+fn sample(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let i = group_index(group) * GROUP + lane;
+    if i >= min(atomicLoad(&work[SURVIVORS]), batch.survivors) || survivors[i].is_near == 0u {
+        return;
+    }
+    let side = survivors[i].side;
+    let state = batch.sides_at + side * SIDE_WORDS;
+    let near_count = atomicLoad(&work[state + NEAR_COUNT]);
+    let step = max((near_count + AIM_SAMPLES - 1u) / AIM_SAMPLES, 1u);
+    if hash(survivors[i].index) % step != 0u {
+        return;
+    }
+    var normal = vec3f();
+    if (sides[side].flags & HAS_NORMALS) != 0u {
+        let at = 3u * (sides[side].first_normal + survivors[i].index);
+        normal = turned(
+            sides[side].frame_from_cloud_x,
+            sides[side].frame_from_cloud_y,
+            sides[side].frame_from_cloud_z,
+            vec3f(normals[at], normals[at + 1u], normals[at + 2u]),
+        );
+    } else {
+        normal = bare_normal(side, survivors[i].position, true);
+    }
+    let slot = atomicAdd(&work[state + SAMPLE_COUNT], 1u);
+    if slot < SAMPLE_SLOTS {
+        samples[side * SAMPLE_SLOTS + slot] = vec4f(normal, 0.0);
+    }
+}

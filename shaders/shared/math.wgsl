@@ -1,0 +1,57 @@
+// Order-preserving numbers, rigid motions, hashes.
+
+// A number whose order as an unsigned integer is that of `x`. Zero is below all of them.
+fn ordered(x: f32) -> u32 {
+    let bits = bitcast<u32>(x);
+    return select(bits | 0x80000000u, ~bits, bits >= 0x80000000u);
+}
+
+fn unordered(key: u32) -> f32 {
+    return bitcast<f32>(select(~key, key & 0x7fffffffu, key >= 0x80000000u));
+}
+
+// The integer part of `value` within 0 to `most`; 0 for what is not a number.
+fn truncated(value: f32, most: f32) -> u32 {
+    let positive = select(0.0, value, value > 0.0);
+    return u32(select(most, positive, positive < most));
+}
+
+fn moved(x: vec4f, y: vec4f, z: vec4f, p: vec3f) -> vec3f {
+    return vec3f(
+        x.x * p.x + x.y * p.y + x.z * p.z + x.w,
+        y.x * p.x + y.y * p.y + y.z * p.z + y.w,
+        z.x * p.x + z.y * p.y + z.z * p.z + z.w,
+    );
+}
+
+fn turned(x: vec4f, y: vec4f, z: vec4f, v: vec3f) -> vec3f {
+    return vec3f(dot(x.xyz, v), dot(y.xyz, v), dot(z.xyz, v));
+}
+
+// See `tldi::plan::is_aim_sample`.
+fn hash(index: u32) -> u32 {
+    var h = (index ^ (index >> 16u)) * 0x7feb352du;
+    h = (h ^ (h >> 15u)) * 0x846ca68bu;
+    return h ^ (h >> 16u);
+}
+
+fn group_index(group: vec3u) -> u32 {
+    return group.y * MAX_GROUPS + group.x;
+}
+
+// `v` as a unit vector, or `other` where it is none.
+fn unit_or(v: vec3f, other: vec3f) -> vec3f {
+    let length_squared = dot(v, v);
+    if length_squared > 0.0 && length_squared < INFINITE {
+        return v * inverseSqrt(length_squared);
+    }
+    return other;
+}
+
+fn splat_radius(radius: f32, pixel_size: f32) -> f32 {
+    return max(radius, LEAST_RADIUS_PX * pixel_size);
+}
+
+fn is_edge_on(normal: vec3f) -> bool {
+    return abs(normal.z) < EDGE_ON;
+}

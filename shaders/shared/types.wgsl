@@ -1,0 +1,249 @@
+// What all stages share: the batch, its pairs and sides, their views, and the arena of counters.
+// Layouts are those of `tldi::Params` and of `tldi-wgpu`'s `batch` module.
+
+// Numbers of the stages, filled from `tldi::plan::stage_constants`.
+override BLOCK: u32;
+override AIM_SAMPLES: u32;
+override SUPPORT: f32;
+override MAX_CANDIDATES: u32;
+override LEAST_PLANAR: f32;
+override LEAST_RADIUS_PX: f32;
+override EDGE_ON: f32;
+override NORMAL_STEPS: f32;
+override MAX_WEIGHT: f32;
+override DEPTH_BITS: u32;
+override MAX_DEPTH: f32;
+override LEAST_TILE: i32;
+override FACING: f32;
+override WELL_SEEN: f32;
+override SUPPORTED: f32;
+override LEAST_SHARE: f32;
+override CONCLUSIVE: f32;
+override HINT_WEIGHT: f32;
+override MEMORY_WEIGHT: f32;
+override AXIS_HYSTERESIS: f32;
+
+const GROUP: u32 = 256u;
+// Workgroups along x; the rest goes along y.
+const MAX_GROUPS: u32 = 65535u;
+const MAX_VIEWS: u32 = 3u;
+// Normals that one side can hold for `aim`: selected at random, they are a few more than
+// AIM_SAMPLES at times.
+const SAMPLE_SLOTS: u32 = 1024u;
+// What is not a number of anything.
+const NONE: u32 = 0xffffffffu;
+const INFINITE: f32 = 3.0e38;
+
+struct Params {
+    pixel_size: f32,
+    merge_gap: f32,
+    prediction: f32,
+    slope_damping: f32,
+    rho: f32,
+    stack_segments: u32,
+    variant: u32,
+    padding: u32,
+}
+
+// Sizes of the batch, capacities in elements, and where the parts of the arena begin, in words.
+struct Batch {
+    pairs: u32,
+    items: u32,
+    survivors: u32,
+    tiles: u32,
+    pixels: u32,
+    splats: u32,
+    fragments: u32,
+    layers: u32,
+    contacts: u32,
+    cells: u32,
+    sides_at: u32,
+    views_at: u32,
+    zone_at: u32,
+    cells_at: u32,
+    tiles_at: u32,
+    pixels_at: u32,
+}
+
+// Rigid motions are the rows of a matrix, the translation last.
+struct Pair {
+    params: Params,
+    overlap_min: vec3f,
+    zone_inv_cell: f32,
+    overlap_max: vec3f,
+    column_reach: f32,
+    zone_dims: vec3u,
+    // Of 32 bits, of a row along x.
+    zone_row_words: u32,
+    larger_from_a_x: vec3f,
+    // Word of the first cell of `a`; those of `b` follow.
+    zone_first: u32,
+    larger_from_a_y: vec3f,
+    zone_words: u32,
+    larger_from_a_z: vec3f,
+    policy: u32,
+    half_extents: vec3f,
+    plainness: f32,
+    toward_b: vec3f,
+    has_last: u32,
+    last_axis: vec3f,
+    merge_steps: u32,
+    view_x: vec4f,
+    view_y: vec4f,
+    view_z: vec4f,
+    image_size: vec2u,
+    depth_step: f32,
+    depth_inv_step: f32,
+}
+
+// Values of `Pair.policy`.
+const CONTACT_ZONE: u32 = 0u;
+const MOTION: u32 = 1u;
+const COVARIANCE: u32 = 2u;
+const SMALLEST_EXTENT: u32 = 3u;
+const LAST_NORMAL: u32 = 4u;
+const FIXED_VIEW: u32 = 5u;
+
+struct Side {
+    frame_from_cloud_x: vec4f,
+    frame_from_cloud_y: vec4f,
+    frame_from_cloud_z: vec4f,
+    other_from_frame_x: vec4f,
+    other_from_frame_y: vec4f,
+    other_from_frame_z: vec4f,
+    other_min: vec3f,
+    stride: u32,
+    other_max: vec3f,
+    len: u32,
+    middle: vec3f,
+    flags: u32,
+    first_point: u32,
+    first_normal: u32,
+    // Of every n-th point: they are scaled to cover the surface.
+    radius_scale: f32,
+    // Of all points of the cloud, not scaled.
+    max_radius: f32,
+    cell_dims: vec3u,
+    cell_first: u32,
+    cell_inv: f32,
+    mean_radius: f32,
+    padding_a: u32,
+    padding_b: u32,
+}
+
+// Bits of `Side.flags`.
+const HAS_NORMALS: u32 = 1u;
+const ORIENTED: u32 = 2u;
+const RADII_DIFFER: u32 = 4u;
+const HAS_MIDDLE: u32 = 8u;
+
+// A point that passed the cull.
+struct Survivor {
+    // In the frame of the query, metres.
+    position: vec3f,
+    radius: f32,
+    side: u32,
+    // In its cloud.
+    index: u32,
+    cell: u32,
+    is_near: u32,
+}
+
+struct View {
+    view_x: vec4f,
+    view_y: vec4f,
+    view_z: vec4f,
+    axis: vec3f,
+    exists: u32,
+    middles: vec2f,
+    flags: u32,
+    depth_zero: f32,
+    tile_origin: vec2i,
+    tile_edge: i32,
+    first_tile: u32,
+    tile_dims: vec2u,
+    tile_count: u32,
+    first_pixel: u32,
+    rect_origin: vec2i,
+    rect_size: vec2u,
+    pixel_count: u32,
+    padding_a: u32,
+    padding_b: u32,
+    padding_c: u32,
+}
+
+// Bits of `View.flags`: for `a`, then for `b`.
+const MIDDLE_KNOWN: u32 = 1u;
+const FROM_BEHIND: u32 = 4u;
+
+// One oriented disc; see the CPU's `Splat`. Pixels are relative to the image.
+struct Splat {
+    centre: vec2f,
+    slope: vec2f,
+    depth: f32,
+    steps: f32,
+    radius: f32,
+    facing: f32,
+    first: vec2u,
+    last: vec2i,
+    // View and side: 2 * view + side.
+    view_side: u32,
+    class_bits: u32,
+    normal_xy: u32,
+    normal_z: u32,
+}
+
+struct Layer {
+    normal: vec3f,
+    facing: i32,
+    near: f32,
+    far: f32,
+    depth: f32,
+    padding: u32,
+}
+
+const ENTRY: i32 = -1;
+const UNKNOWN: i32 = 0;
+const EXIT: i32 = 1;
+
+// Counters at the start of the arena. They go on counting beyond the capacities: what was needed.
+const SURVIVORS: u32 = 0u;
+const TILES: u32 = 1u;
+const PIXELS: u32 = 2u;
+const SPLATS: u32 = 3u;
+const FRAGMENTS: u32 = 4u;
+const LAYERS: u32 = 5u;
+const CONTACTS: u32 = 6u;
+const ENTRIES: u32 = 7u;
+
+// Words of a side in the arena.
+const SIDE_WORDS: u32 = 8u;
+const KEPT_COUNT: u32 = 0u;
+const NEAR_COUNT: u32 = 1u;
+const RADIUS_LOW: u32 = 2u;
+const RADIUS_HIGH: u32 = 3u;
+const SAMPLE_COUNT: u32 = 4u;
+
+// Words of a view in the arena: greatest and least coordinates of what is seen of each side, as
+// ordered numbers (the least ones negated), and the touching tiles' bounds likewise.
+const VIEW_WORDS: u32 = 16u;
+const TOUCHED: u32 = 12u;
+
+// Steps of the sum of radii, in shares of the largest: 2^20.
+const RADIUS_STEPS: f32 = 1048576.0;
+
+// Words of a pair in what is read back, and of a contact.
+const PAIR_WORDS: u32 = 16u;
+const CONTACT_WORDS: u32 = 16u;
+const COLLIDES: u32 = 0u;
+const GAP: u32 = 1u;
+const CROWDED: u32 = 2u;
+const VIEWS: u32 = 3u;
+const AXES: u32 = 4u;
+
+// Indirect dispatches.
+const TILE_GROUPS: u32 = 0u;
+const PIXEL_GROUPS: u32 = 3u;
+const IMAGE_GROUPS: u32 = 6u;
+
+@group(0) @binding(0) var<uniform> batch: Batch;

@@ -1,0 +1,200 @@
+// Stage `sweep`: the fragments of each pixel become layers. See the CPU's stage.
+
+@group(0) @binding(1) var<storage, read> pairs: array<Pair>;
+@group(0) @binding(2) var<storage, read> sides: array<Side>;
+@group(0) @binding(7) var<storage, read_write> views: array<View>;
+@group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
+@group(0) @binding(11) var<storage, read_write> splats: array<Splat>;
+@group(0) @binding(12) var<storage, read_write> fragments: array<vec2u>;
+@group(0) @binding(13) var<storage, read_write> layers: array<Layer>;
+@group(0) @binding(14) var<storage, read_write> found: array<atomic<u32>>;
+
+// Most fragments of a pixel that one thread sorts; pairs with more are left to the CPU.
+const MOST_FRAGMENTS: u32 = 1024u;
+
+var<workgroup> total: atomic<u32>;
+var<workgroup> base: u32;
+
+fn sift(begin: u32, start: u32, count: u32) {
+    var root = start;
+    let value = fragments[begin + root];
+    loop {
+        var child = 2u * root + 1u;
+        if child >= count {
+            break;
+        }
+        if child + 1u < count && fragments[begin + child].x < fragments[begin + child + 1u].x {
+            child++;
+        }
+        if fragments[begin + child].x <= value.x {
+            break;
+        }
+        fragments[begin + root] = fragments[begin + child];
+        root = child;
+    }
+    fragments[begin + root] = value;
+}
+
+fn sort_fragments(begin: u32, count: u32) {
+    if count <= 24u {
+        for (var i = 1u; i < count; i++) {
+            let value = fragments[begin + i];
+            var k = i;
+            while k > 0u {
+                let before = fragments[begin + k - 1u];
+                if before.x <= value.x {
+                    break;
+                }
+                fragments[begin + k] = before;
+                k--;
+            }
+            fragments[begin + k] = value;
+        }
+        return;
+    }
+    for (var start = count / 2u; start > 0u; start--) {
+        sift(begin, start - 1u, count);
+    }
+    for (var end = count - 1u; end > 0u; end--) {
+        let last = fragments[begin + end];
+        fragments[begin + end] = fragments[begin];
+        fragments[begin] = last;
+        sift(begin, 0u, end);
+    }
+}
+
+fn depth_of(key: u32) -> u32 {
+    return key & ((1u << DEPTH_BITS) - 1u);
+}
+
+fn is_same_layer(key: u32, next: u32, merge_steps: u32) -> bool {
+    return key >> DEPTH_BITS == next >> DEPTH_BITS && depth_of(next) - depth_of(key) <= merge_steps;
+}
+
+// The layer of the fragments from `start` to before `end`.
+fn layer_of(start: u32, end: u32, oriented: bool, view: u32) -> Layer {
+    let first_depth = depth_of(fragments[start].x);
+    var weight = 0u;
+    // Sums of 48 bits, in words of 16 and 32.
+    var depth_low = 0u;
+    var depth_high = 0u;
+    var normal_low = vec3i();
+    var normal_high = vec3i();
+    for (var k = start; k < end; k++) {
+        let f = fragments[k];
+        let w = f.y & 0xffu;
+        weight += w;
+        let above_first = depth_of(f.x) - first_depth;
+        depth_low += w * (above_first & 0xffffu);
+        depth_high += w * (above_first >> 16u) + (depth_low >> 16u);
+        depth_low &= 0xffffu;
+        let of_splat = f.y >> 8u;
+        let xy = splats[of_splat].normal_xy;
+        let n = vec3i(i32(xy << 16u) >> 16u, i32(xy) >> 16u, i32(splats[of_splat].normal_z));
+        normal_low += i32(w) * n;
+        normal_high += normal_low >> vec3u(12u);
+        normal_low &= vec3i(0xfff);
+    }
+    let class_of_run = fragments[start].x >> DEPTH_BITS;
+    let step = pairs[view / MAX_VIEWS].depth_step;
+    let zero = views[view].depth_zero;
+    let mean = (f32(depth_high) * 65536.0 + f32(depth_low)) / f32(weight);
+    var layer: Layer;
+    layer.near = zero + f32(first_depth) * step;
+    layer.far = zero + f32(depth_of(fragments[end - 1u].x)) * step;
+    layer.depth = zero + (f32(first_depth) + mean) * step;
+    let sum = vec3f(normal_high) * 4096.0 + vec3f(normal_low);
+    layer.normal = unit_or(sum, vec3f(0.0, 0.0, -1.0));
+    layer.facing = select(UNKNOWN, EXIT, class_of_run == 1u && oriented);
+    layer.facing = select(layer.facing, ENTRY, class_of_run == 0u);
+    return layer;
+}
+
+fn view_of_pixel(pixel: u32) -> u32 {
+    var low = 0u;
+    var high = batch.pairs * MAX_VIEWS;
+    while high - low > 1u {
+        let middle = (low + high) / 2u;
+        if views[middle].first_pixel <= pixel {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+@compute @workgroup_size(256)
+fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let k = group_index(group) * GROUP + lane;
+    let pixels = min(atomicLoad(&work[PIXELS]), batch.pixels);
+    let fits = atomicLoad(&work[FRAGMENTS]) <= batch.fragments
+        && atomicLoad(&work[SPLATS]) <= batch.splats;
+    let s = k / max(pixels, 1u);
+    let pixel = k - s * pixels;
+    let exists = fits && k < 2u * pixels;
+    var begin = 0u;
+    var end = 0u;
+    var view = 0u;
+    var count = 0u;
+    if exists {
+        view = view_of_pixel(pixel);
+        begin = atomicLoad(&work[begin_at(s, pixel)]);
+        end = atomicLoad(&work[end_at(s, pixel)]);
+        if end - begin > MOST_FRAGMENTS {
+            atomicStore(&found[view / MAX_VIEWS * PAIR_WORDS + CROWDED], 1u);
+            end = begin;
+        }
+    }
+    let merge_steps = pairs[view / MAX_VIEWS].merge_steps;
+    if end > begin {
+        sort_fragments(begin, end - begin);
+        count = 1u;
+        for (var i = begin + 1u; i < end; i++) {
+            if !is_same_layer(fragments[i - 1u].x, fragments[i].x, merge_steps) {
+                count++;
+            }
+        }
+    }
+    let own = atomicAdd(&total, count);
+    workgroupBarrier();
+    if lane == 0u {
+        base = atomicAdd(&work[LAYERS], atomicLoad(&total));
+    }
+    workgroupBarrier();
+    if !exists {
+        return;
+    }
+    let first_layer = base + own;
+    let fitting = first_layer + count <= batch.layers;
+    atomicStore(&work[begin_at(s, pixel)], first_layer);
+    atomicStore(&work[end_at(s, pixel)], select(first_layer, first_layer + count, fitting));
+    if !fitting {
+        return;
+    }
+    let oriented = (sides[view / MAX_VIEWS * 2u + s].flags & (HAS_NORMALS | ORIENTED))
+        == (HAS_NORMALS | ORIENTED);
+    var slot = first_layer;
+    var start = begin;
+    for (var i = begin; i < end; i++) {
+        let is_last = i + 1u == end;
+        if is_last || !is_same_layer(fragments[i].x, fragments[min(i + 1u, end - 1u)].x, merge_steps) {
+            // In order of depth, then of facing.
+            let layer = layer_of(start, i + 1u, oriented, view);
+            var place = slot;
+            while place > first_layer {
+                let before = layers[place - 1u];
+                let is_behind = before.depth > layer.depth
+                    || (before.depth == layer.depth && before.facing > layer.facing);
+                if !is_behind {
+                    break;
+                }
+                layers[place] = before;
+                place--;
+            }
+            layers[place] = layer;
+            slot++;
+            start = i + 1u;
+        }
+    }
+}
