@@ -1,13 +1,10 @@
 //! Whole pairs of clouds against analytic truth: gap, collision, contact normals and support points.
 
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{
-    Backend, CameraPolicy, ContactPoint, CpuBackend, PairQuery, PairResult, Params, PointCloud,
-    Surface, View,
-};
+use tldi::{CameraPolicy, ContactPoint, PairQuery, PairResult, Params, PointCloud, Surface, View};
 use tldi_tests::{
-    Samples, aimed, compare_clouds, deepest_point, random_pose, random_unit, sampled_box,
-    sampled_plane, sampled_sphere,
+    Samples, aimed, compare_batch, compare_clouds, deepest_point, random_pose, random_unit,
+    sampled_box, sampled_plane, sampled_sphere,
 };
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
@@ -282,11 +279,7 @@ fn an_open_body_reaches_to_its_middle() {
             Params::for_radius(R),
         )
     };
-    let mut results = Vec::new();
-    CpuBackend::new()
-        .compare(&[falling], &mut results)
-        .expect("the query is supported");
-    let deep = &results[0];
+    let deep = &compare_batch(&[falling])[0];
     assert!(deepest_normal(deep).y > 0.99, "{:?}", deep.patches);
     let gap = least_patch_gap(deep);
     assert!((gap + 0.045).abs() < 0.45 * R, "{gap}");

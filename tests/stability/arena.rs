@@ -72,7 +72,8 @@ impl Arena {
         world.integration_parameters.dt = DT;
         let tldi = match setup.method {
             Method::Tldi => {
-                let pipeline = TldiPipeline::new(setup.config).map_err(failed)?;
+                let backend = setup.backend.open().map_err(failed)?;
+                let pipeline = TldiPipeline::with_backend(setup.config, backend).map_err(failed)?;
                 pipeline.attach(&mut world);
                 Some(pipeline)
             }

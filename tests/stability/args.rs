@@ -7,6 +7,7 @@ use anyhow::bail;
 use rapier3d_tldi::TldiConfig;
 use std::path::PathBuf;
 use tldi_tests::PolicyChoice;
+use tldi_wgpu::BackendChoice;
 
 /// Seeds of the long and of the short version, where none are asked for.
 const LONG_SEEDS: u64 = 5;
@@ -53,7 +54,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     pub(crate) docs: Option<PathBuf>,
     /// Where clouds are compared; auto takes the GPU if there is one, else the CPU
-    #[arg(long, value_enum, default_value_t = BackendChoice::Auto)]
+    #[arg(long, value_name = "auto|cpu|gpu", default_value_t = BackendChoice::Auto)]
     pub(crate) backend: BackendChoice,
     /// From where pairs of clouds are looked at
     #[arg(long, value_enum, default_value_t = PolicyChoice::ContactZone)]
@@ -61,27 +62,6 @@ pub(crate) struct Args {
     /// Write every step of every world to stderr (use with --scene, --case and --method)
     #[arg(long)]
     trace: bool,
-}
-
-/// Where clouds are compared.
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum BackendChoice {
-    /// The best that there is.
-    Auto,
-    /// The CPU backend.
-    Cpu,
-    /// A GPU backend.
-    Gpu,
-}
-
-impl BackendChoice {
-    /// Fails if a GPU was asked for: there is no such backend yet.
-    pub(crate) fn require_available(self) -> anyhow::Result<()> {
-        if self == Self::Gpu {
-            bail!("the GPU backend is not built yet: use --backend cpu (or leave the option out)");
-        }
-        Ok(())
-    }
 }
 
 impl Args {
@@ -107,6 +87,7 @@ impl Args {
                 camera_policy: self.camera_policy.into(),
                 ..TldiConfig::default()
             },
+            backend: self.backend,
             trace: self.trace,
         }
     }

@@ -4,6 +4,7 @@ use super::method::Method;
 use rapier3d_tldi::TldiConfig;
 use std::collections::BTreeMap;
 use thiserror::Error;
+use tldi_wgpu::BackendChoice;
 
 /// How a case is to be run.
 #[derive(Clone, Copy, Debug)]
@@ -12,6 +13,8 @@ pub(crate) struct Setup {
     pub(crate) method: Method,
     /// Settings of the clouds' pipeline.
     pub(crate) config: TldiConfig,
+    /// Where pairs of clouds are compared.
+    pub(crate) backend: BackendChoice,
     /// Whether every step is written to stderr.
     pub(crate) trace: bool,
 }

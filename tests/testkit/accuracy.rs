@@ -1,12 +1,11 @@
 //! How well the comparison measures contacts of known normal and depth, by angle of motion.
 
+use crate::compare_batch;
 use crate::{Samples, random_unit, sampled_box, sampled_plane, sampled_ramp, sampled_sphere};
 use serde::Serialize;
 use std::fmt;
 use tldi::glamx::{Pose3, Quat, Vec3};
-use tldi::{
-    Backend, CameraPolicy, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View,
-};
+use tldi::{CameraPolicy, PairQuery, PairResult, Params, PointCloud, Surface, View};
 
 /// Spacing and radius r̄ of all samples, metres.
 const R: f32 = 0.01;
@@ -341,11 +340,7 @@ impl Case<'_> {
             },
             params: Params::for_radius(R),
         };
-        let mut results = Vec::new();
-        CpuBackend::new()
-            .compare(&[query], &mut results)
-            .expect("the query is supported");
-        results.remove(0)
+        compare_batch(&[query]).remove(0)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Shared by the tests of all packages: sampled shapes, oracles, random poses, real data.
 
 mod accuracy;
+mod backend;
 mod data;
 mod oracle;
 mod pairs;
@@ -13,6 +14,7 @@ pub use accuracy::{
     ACCURACY_ROWS, ANGLE_BINS, ANGLE_STEP, AccuracyRow, ContactPair, DEEP_LIMIT, NORMAL_LIMIT,
     Regime, SHALLOW_LIMIT, measure_accuracy,
 };
+pub use backend::{compare_batch, gpu_backend};
 pub use data::{data_file, load_cloud};
 pub use oracle::{OracleFragment, oracle_layers};
 pub use pairs::{aimed, compare, compare_clouds, deepest_point};

@@ -1,7 +1,8 @@
-//! One pair at a time, compared on the CPU.
+//! One pair at a time.
 
+use crate::compare_batch;
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{Backend, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View};
+use tldi::{PairQuery, PairResult, Params, PointCloud, Surface, View};
 
 /// A query that aims its own camera, the second surface lying where its pose puts it.
 pub fn aimed<'a>(a: Surface<'a>, b: Surface<'a>, a_from_b: Pose3, params: Params) -> PairQuery<'a> {
@@ -14,13 +15,9 @@ pub fn aimed<'a>(a: Surface<'a>, b: Surface<'a>, a_from_b: Pose3, params: Params
     }
 }
 
-/// Compares two surfaces with [`aimed`] cameras and cold memory.
+/// Compares two surfaces with [`aimed`] cameras.
 pub fn compare(a: Surface, b: Surface, a_from_b: Pose3, params: Params) -> PairResult {
-    let mut results = Vec::new();
-    CpuBackend::new()
-        .compare(&[aimed(a, b, a_from_b, params)], &mut results)
-        .expect("the query is supported");
-    results.remove(0)
+    compare_batch(&[aimed(a, b, a_from_b, params)]).remove(0)
 }
 
 /// Compares two clouds of mean radius `radius`, metres, with the default parameters.

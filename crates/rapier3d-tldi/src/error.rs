@@ -17,6 +17,9 @@ pub enum TldiError {
         "the narrow phase is not attached to this pipeline: call `attach` once after creating or deserialising the world"
     )]
     NotAttached,
+    /// The backend that was asked for is not there.
+    #[error(transparent)]
+    NoBackend(BackendError),
     /// The backend could not compare two colliders of the batch. No step was taken.
     #[error("colliders {collider1:?} and {collider2:?} cannot be compared: {source}")]
     Pair {

@@ -5,7 +5,7 @@ use crate::candidates::CandidateSearch;
 use crate::exact::ExactShape;
 use crate::parts::{PartPair, append_queries};
 use crate::prepared::{Batch, PROBE_ANSWER, Shared};
-use crate::report::{cloud_pairs, contacts_of};
+use crate::report::{ComparedBy, cloud_pairs, contacts_of};
 use crate::surface_motion::{SurfaceMotions, TldiHooks};
 use crate::{
     Contact, PointCloudShape, StepReport, TldiConfig, TldiDispatcher, TldiError, cloud_collider,
@@ -17,7 +17,7 @@ use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher};
 use rapier3d::pipeline::{ActiveHooks, EventHandler, PhysicsHooks, PhysicsWorld};
 use std::sync::Arc;
 use std::time::Instant;
-use tldi::{Backend, BackendError, CpuBackend, PairQuery, PointCloud};
+use tldi::{Backend, BackendError, PairQuery, PointCloud};
 
 /// Finds the contacts of point clouds for one physics world.
 ///
@@ -29,7 +29,7 @@ use tldi::{Backend, BackendError, CpuBackend, PairQuery, PointCloud};
 /// the next is prepared; a pipeline for each remembers more (the view axes of its pairs).
 pub struct TldiPipeline {
     backend: Box<dyn Backend>,
-    backend_name: Arc<str>,
+    compared_by: ComparedBy,
     shared: Arc<Shared>,
     search: CandidateSearch,
     memory: PairMemory,
@@ -41,12 +41,21 @@ pub struct TldiPipeline {
 }
 
 impl TldiPipeline {
-    /// A pipeline on the CPU.
+    /// A pipeline on the CPU; with the feature `gpu`, on a hardware GPU where there is one and a
+    /// batch is large enough to gain from it (or what the variable `TLDI_BACKEND` asks for: `auto`,
+    /// `cpu` or `gpu`).
     ///
     /// # Errors
-    /// [`TldiError::BadConfig`].
+    /// [`TldiError::BadConfig`], [`TldiError::NoBackend`] where `TLDI_BACKEND` asks for what is not
+    /// there.
     pub fn new(config: TldiConfig) -> Result<Self, TldiError> {
-        Self::with_backend(config, Box::new(CpuBackend::new()))
+        #[cfg(feature = "gpu")]
+        let backend = tldi_wgpu::BackendChoice::Auto
+            .open()
+            .map_err(|source| TldiError::NoBackend(source.into()))?;
+        #[cfg(not(feature = "gpu"))]
+        let backend = Box::new(tldi::CpuBackend::new());
+        Self::with_backend(config, backend)
     }
 
     /// A pipeline whose batches `backend` compares. Pairs that are not in the batch are always
@@ -56,7 +65,7 @@ impl TldiPipeline {
     /// [`TldiError::BadConfig`].
     pub fn with_backend(config: TldiConfig, backend: Box<dyn Backend>) -> Result<Self, TldiError> {
         Ok(Self {
-            backend_name: backend.name().into(),
+            compared_by: ComparedBy::default(),
             backend,
             shared: Arc::new(Shared::new(config.validated()?)),
             search: CandidateSearch::default(),
@@ -294,6 +303,7 @@ impl TldiPipeline {
         let mut queries = emptied(std::mem::take(&mut self.queries));
         append_queries(&batch.parts, &sides, &mut queries);
         let outcome = self.backend.compare(&queries, &mut batch.results);
+        self.compared_by.update(&*self.backend);
         let error = outcome.err().map(|source| name_the_pair(source, &batch));
         self.queries = emptied(queries);
         self.sides = emptied(sides);
@@ -328,7 +338,9 @@ impl TldiPipeline {
             contact_pixels: on_the_spot.contact_pixels,
             max_penetration: 0.0,
             prepare_seconds: self.prepare_seconds,
-            backend: Arc::clone(&self.backend_name),
+            backend: Arc::clone(&self.compared_by.backend),
+            adapter: self.compared_by.adapter.clone(),
+            fallback: self.compared_by.fallback.clone(),
         };
         {
             let mut batch = self.shared.batch_mut();

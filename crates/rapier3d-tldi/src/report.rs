@@ -4,6 +4,7 @@ use crate::parts::has_cloud;
 use rapier3d::geometry::{ColliderHandle, ColliderSet, ContactPair, NarrowPhase};
 use rapier3d::math::Vector;
 use std::sync::Arc;
+use tldi::Backend;
 
 /// What one step of a [`TldiPipeline`](crate::TldiPipeline) did.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,8 +28,38 @@ pub struct StepReport {
     pub max_penetration: f32,
     /// Wall-clock time from the search for candidate pairs to the results of the batch.
     pub prepare_seconds: f64,
-    /// Name of the backend that compared the batch.
+    /// Name of the backend that compared the batch: "cpu", "gpu", …
     pub backend: Arc<str>,
+    /// Name of the device that compared it, where it was not the CPU.
+    pub adapter: Option<Arc<str>>,
+    /// Why it was the CPU though a GPU would have been taken: there is none, or it failed. Nothing
+    /// is lost then.
+    pub fallback: Option<Arc<str>>,
+}
+
+/// What compared a batch of pairs.
+#[derive(Clone, Default)]
+pub(crate) struct ComparedBy {
+    pub(crate) backend: Arc<str>,
+    pub(crate) adapter: Option<Arc<str>>,
+    pub(crate) fallback: Option<Arc<str>>,
+}
+
+impl ComparedBy {
+    /// What `backend` says of its last batch. Allocates only where that changes.
+    pub(crate) fn update(&mut self, backend: &dyn Backend) {
+        if *self.backend != *backend.name() {
+            self.backend = backend.name().into();
+        }
+        for (own, new) in [
+            (&mut self.adapter, backend.adapter()),
+            (&mut self.fallback, backend.fallback()),
+        ] {
+            if own.as_deref() != new {
+                *own = new.map(Arc::from);
+            }
+        }
+    }
 }
 
 /// A contact point between two colliders of which at least one holds a cloud.

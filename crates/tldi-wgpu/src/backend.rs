@@ -2,19 +2,16 @@
 
 use crate::buffers::Growable;
 use crate::layout::{
-    BatchData, CONTACT_WORDS, COUNTERS, FRAGMENT_BYTES, GROUP, LAYER_BYTES, PAIR_WORDS, PairData,
-    SAMPLE_SLOTS, SIDE_WORDS, SPLAT_BYTES, SURVIVOR_BYTES, SideData, VIEW_BYTES, VIEW_WORDS,
-    is_for_device,
+    BatchData, CONTACT_WORDS, COUNTERS, FRAGMENT_BYTES, GROUP, LAYER_BYTES, PAIR_WORDS,
+    SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, VIEW_BYTES, is_for_device,
 };
-use crate::pipelines::{Pipeline, pipelines};
+use crate::pipelines::Pipeline;
 use crate::readback::{Counters, Readback};
 use crate::resident::Resident;
 use crate::timer::Timer;
+use crate::upload::Upload;
 use crate::{Gpu, GpuError, StageTime};
-use tldi::plan::PairPlan;
-use tldi::{
-    BLOCK, Backend, BackendError, CpuBackend, PairQuery, PairResult, PatchScratch, Surface,
-};
+use tldi::{Backend, BackendError, CpuBackend, PairQuery, PairResult, PatchScratch};
 use wgpu::BufferUsages;
 
 /// Times that a batch is redone with larger buffers before that counts as a fault: every time at
@@ -60,10 +57,10 @@ const MAX_GROUPS: u32 = 65_535;
 /// ```
 pub struct WgpuBackend {
     gpu: Gpu,
-    pipelines: Vec<Pipeline>,
     resident: Resident,
     buffers: Buffers,
-    capacities: Capacities,
+    /// Elements that the buffers hold: what batches have needed so far.
+    capacities: Counters,
     /// What the bind groups were made of.
     bound: Vec<Option<wgpu::Buffer>>,
     bind_groups: Vec<wgpu::BindGroup>,
@@ -72,28 +69,6 @@ pub struct WgpuBackend {
     cpu: CpuBackend,
     timer: Option<Timer>,
     times: Vec<StageTime>,
-}
-
-/// Elements that the buffers hold. Grown to what a batch needed.
-#[derive(Clone, Copy, Debug)]
-struct Capacities {
-    counted: Counters,
-}
-
-impl Default for Capacities {
-    fn default() -> Self {
-        Self {
-            counted: Counters {
-                survivors: 1 << 15,
-                tiles: 1 << 14,
-                pixels: 1 << 15,
-                splats: 1 << 15,
-                fragments: 1 << 18,
-                layers: 1 << 16,
-                contacts: 1 << 11,
-            },
-        }
-    }
 }
 
 #[derive(Debug)]
@@ -141,19 +116,6 @@ impl Default for Buffers {
     }
 }
 
-/// What a batch uploads.
-#[derive(Debug, Default)]
-struct Upload {
-    /// Index in the batch of each pair on the device.
-    pairs_of: Vec<usize>,
-    pairs: Vec<PairData>,
-    sides: Vec<SideData>,
-    /// Side and first point of each block that may have points in reach.
-    items: Vec<[u32; 2]>,
-    zone_words: u32,
-    cells: u32,
-}
-
 impl WgpuBackend {
     /// A backend on a device. Compiles the stages.
     ///
@@ -161,15 +123,14 @@ impl WgpuBackend {
     /// [`GpuError::Failed`] where the device refuses a stage, [`GpuError::TooLarge`] where it
     /// allows no buffers.
     pub fn new(gpu: Gpu) -> Result<Self, GpuError> {
-        let pipelines = pipelines(&gpu);
+        gpu.pipelines();
         let resident = Resident::new(&gpu)?;
         gpu.check()?;
         Ok(Self {
             gpu,
-            pipelines,
             resident,
             buffers: Buffers::default(),
-            capacities: Capacities::default(),
+            capacities: Counters::LEAST,
             bound: Vec::new(),
             bind_groups: Vec::new(),
             upload: Upload::default(),
@@ -188,7 +149,7 @@ impl WgpuBackend {
     /// Measures the stages from now on; `false` where the device has no timestamps. Every stage is
     /// then a pass of its own, which costs a little.
     pub fn measure_stages(&mut self) -> bool {
-        self.timer = Timer::new(&self.gpu, self.pipelines.len());
+        self.timer = Timer::new(&self.gpu, self.gpu.pipelines().len());
         self.timer.is_some()
     }
 
@@ -197,7 +158,34 @@ impl WgpuBackend {
         &self.times
     }
 
-    /// Everything but what is left to the CPU.
+    /// Compares the batch if at least so many points are in blocks that both sides of a pair reach;
+    /// else returns `false`.
+    pub(crate) fn compare_if_large(
+        &mut self,
+        least_points: usize,
+        batch: &[PairQuery<'_>],
+        results: &mut Vec<PairResult>,
+    ) -> Result<bool, BackendError> {
+        let mut left_to_cpu = Vec::new();
+        for (pair, query) in batch.iter().enumerate() {
+            query
+                .check()
+                .map_err(|reason| BackendError::Unsupported { pair, reason })?;
+            if !is_for_device(query) {
+                left_to_cpu.push(pair);
+            }
+        }
+        self.upload.select(batch);
+        if self.upload.points() < least_points {
+            return Ok(false);
+        }
+        results.resize_with(batch.len(), PairResult::default);
+        results.iter_mut().for_each(PairResult::clear);
+        self.compare_on_device(batch, results, &mut left_to_cpu)?;
+        Ok(true)
+    }
+
+    /// Compares the selected pairs on the device, and the others on the CPU meanwhile.
     fn compare_on_device(
         &mut self,
         batch: &[PairQuery<'_>],
@@ -205,19 +193,18 @@ impl WgpuBackend {
         left_to_cpu: &mut Vec<usize>,
     ) -> Result<(), GpuError> {
         self.gpu.check()?;
-        self.resident.begin();
-        self.gather(batch)?;
-        if self.upload.items.is_empty() {
+        if self.upload.points() == 0 {
             return self.compare_on_cpu(batch, results, left_to_cpu);
         }
+        self.upload.place(batch, &self.gpu, &mut self.resident)?;
         for _ in 0..MOST_TRIES {
             self.submit()?;
             self.compare_on_cpu(batch, results, left_to_cpu)?;
             let needed = self.read_back(batch, results, left_to_cpu)?;
-            if self.capacities.counted.holds(&needed) {
+            if self.capacities.holds(&needed) {
                 return self.compare_on_cpu(batch, results, left_to_cpu);
             }
-            self.capacities.counted.grow(&needed);
+            self.capacities.grow(&needed);
         }
         Err(GpuError::Failed {
             adapter: self.gpu.adapter().to_owned(),
@@ -249,99 +236,13 @@ impl WgpuBackend {
         Ok(())
     }
 
-    /// Fills what is uploaded, but for the sizes of the batch.
-    fn gather(&mut self, batch: &[PairQuery<'_>]) -> Result<(), GpuError> {
-        let upload = &mut self.upload;
-        upload.pairs_of.clear();
-        upload.pairs.clear();
-        upload.sides.clear();
-        upload.items.clear();
-        upload.zone_words = 0;
-        upload.cells = 0;
-        for (pair, query) in batch.iter().enumerate() {
-            let (Surface::Cloud(a), Surface::Cloud(b)) = (query.a, query.b) else {
-                continue;
-            };
-            if !is_for_device(query) {
-                continue;
-            }
-            let Some(plan) = PairPlan::new(query) else {
-                continue;
-            };
-            let first_item = upload.items.len();
-            for (k, cloud) in [a, b].into_iter().enumerate() {
-                let side = &plan.sides[k];
-                let index = (2 * upload.pairs.len() + k) as u32;
-                let is_in_reach = |block: &tldi::Aabb| {
-                    block
-                        .transformed(&side.frame_from_surface)
-                        .intersects(&side.region.overlap)
-                };
-                let blocks = cloud.blocks().iter().enumerate();
-                let reached = blocks.filter(|(_, block)| is_in_reach(block));
-                let before = upload.items.len();
-                upload
-                    .items
-                    .extend(reached.map(|(block, _)| [index, (block * BLOCK) as u32]));
-                if upload.items.len() == before {
-                    upload.items.truncate(first_item);
-                    break;
-                }
-            }
-            if upload.items.len() == first_item {
-                continue;
-            }
-            let data = PairData::new(query, &plan, upload.zone_words);
-            upload.zone_words += 2 * data.zone_words;
-            for (cloud, side) in [a, b].into_iter().zip(&plan.sides) {
-                let place = self.resident.place(&self.gpu, cloud)?;
-                let side = SideData::new(cloud, side, &query.params, place, upload.cells);
-                upload.cells += side.cells();
-                upload.sides.push(side);
-            }
-            upload.pairs.push(data);
-            upload.pairs_of.push(pair);
-        }
-        Ok(())
-    }
-
-    /// Sizes of the batch and where the parts of the arena are.
-    fn batch_data(&self) -> BatchData {
-        let (upload, capacities) = (&self.upload, &self.capacities.counted);
-        let pairs = upload.pairs.len() as u32;
-        let sides_at = COUNTERS;
-        let views_at = sides_at + 2 * pairs * SIDE_WORDS;
-        let zone_at = views_at + 3 * pairs * VIEW_WORDS;
-        let cells_at = zone_at + upload.zone_words;
-        let tiles_at = cells_at + 2 * upload.cells;
-        BatchData {
-            pairs,
-            items: upload.items.len() as u32,
-            survivors: capacities.survivors,
-            tiles: capacities.tiles,
-            pixels: capacities.pixels,
-            splats: capacities.splats,
-            fragments: capacities.fragments,
-            layers: capacities.layers,
-            contacts: capacities.contacts,
-            cells: upload.cells,
-            sides_at,
-            views_at,
-            zone_at,
-            cells_at,
-            tiles_at,
-            pixels_at: tiles_at + 3 * capacities.tiles,
-        }
-    }
-
     /// Uploads and submits the batch.
     fn submit(&mut self) -> Result<(), GpuError> {
-        let data = self.batch_data();
+        let data = self.upload.batch_data(&self.capacities);
         self.prepare_buffers(&data)?;
         self.bind();
         let Self {
             gpu,
-            pipelines,
             buffers,
             bind_groups,
             timer,
@@ -361,6 +262,7 @@ impl WgpuBackend {
                 encoder.clear_buffer(buffer, 0, Some(bytes));
             }
         }
+        let pipelines = gpu.pipelines();
         let direct = |count: u32| [count.min(MAX_GROUPS), count.div_ceil(MAX_GROUPS), 1];
         let by_survivor = direct(data.items.min(data.survivors.div_ceil(GROUP)));
         let dispatch = |pass: &mut wgpu::ComputePass, k: usize| {
@@ -482,7 +384,7 @@ impl WgpuBackend {
             return;
         }
         self.bind_groups.clear();
-        for Pipeline { stage, layout, .. } in &self.pipelines {
+        for Pipeline { stage, layout, .. } in self.gpu.pipelines() {
             let entries: Vec<_> = (stage.bindings.iter())
                 .filter_map(|&binding| {
                     Some(wgpu::BindGroupEntry {
@@ -546,7 +448,7 @@ impl WgpuBackend {
         let words: &[u32] = bytemuck::cast_slice(&view);
         let readback = Readback::new(words, self.upload.pairs.len());
         let needed = readback.counters();
-        if self.capacities.counted.holds(&needed) {
+        if self.capacities.holds(&needed) {
             for (k, &pair) in self.upload.pairs_of.iter().enumerate() {
                 if readback.is_crowded(k) {
                     left_to_cpu.push(pair);
@@ -558,7 +460,7 @@ impl WgpuBackend {
         }
         drop(view);
         buffer.unmap();
-        if self.capacities.counted.holds(&needed) {
+        if self.capacities.holds(&needed) {
             for &pair in &self.upload.pairs_of {
                 self.patches.reduce(&mut results[pair], &batch[pair].params);
             }
@@ -593,17 +495,6 @@ impl Backend for WgpuBackend {
         batch: &[PairQuery<'_>],
         results: &mut Vec<PairResult>,
     ) -> Result<(), BackendError> {
-        results.resize_with(batch.len(), PairResult::default);
-        results.iter_mut().for_each(PairResult::clear);
-        let mut left_to_cpu = Vec::new();
-        for (pair, query) in batch.iter().enumerate() {
-            query
-                .check()
-                .map_err(|reason| BackendError::Unsupported { pair, reason })?;
-            if !is_for_device(query) {
-                left_to_cpu.push(pair);
-            }
-        }
-        Ok(self.compare_on_device(batch, results, &mut left_to_cpu)?)
+        self.compare_if_large(0, batch, results).map(|_| ())
     }
 }

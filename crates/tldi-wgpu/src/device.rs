@@ -1,7 +1,8 @@
 //! The device: chosen once, shared with whoever brings their own.
 
 use crate::GpuError;
-use std::sync::{Arc, Mutex, PoisonError};
+use crate::pipelines::{Pipeline, pipelines};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Which adapters will do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
@@ -20,9 +21,24 @@ pub struct Gpu {
     pub(crate) queue: wgpu::Queue,
     adapter: Arc<str>,
     failure: Arc<Mutex<Option<String>>>,
+    pipelines: Arc<OnceLock<Vec<Pipeline>>>,
 }
 
 impl Gpu {
+    /// The device of this process: opened when it is first asked for, and shared.
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open), which are kept as well.
+    pub fn of_process(choice: AdapterChoice) -> Result<Self, GpuError> {
+        static HARDWARE: OnceLock<Result<Gpu, GpuError>> = OnceLock::new();
+        static ANY: OnceLock<Result<Gpu, GpuError>> = OnceLock::new();
+        let opened = match choice {
+            AdapterChoice::Hardware => &HARDWARE,
+            AdapterChoice::Any => &ANY,
+        };
+        opened.get_or_init(|| Self::open(choice)).clone()
+    }
+
     /// Opens the best adapter.
     ///
     /// # Errors
@@ -92,6 +108,7 @@ impl Gpu {
             queue,
             adapter,
             failure,
+            pipelines: Arc::default(),
         }
     }
 
@@ -108,6 +125,11 @@ impl Gpu {
     /// The queue.
     pub fn queue(&self) -> &wgpu::Queue {
         &self.queue
+    }
+
+    /// The stages, compiled when they are first asked for.
+    pub(crate) fn pipelines(&self) -> &[Pipeline] {
+        self.pipelines.get_or_init(|| pipelines(self))
     }
 
     /// What went wrong since the device was opened.

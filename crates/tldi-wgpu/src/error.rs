@@ -31,6 +31,15 @@ pub enum GpuError {
         /// What its driver says.
         reason: String,
     },
+    /// The variable `TLDI_BACKEND`, or an option, names no backend.
+    #[error("`{0}` is no backend: write auto, cpu or gpu")]
+    UnknownBackend(String),
+    /// Whether the GPU gains could not be measured.
+    #[error("the GPU could not be measured: {reason}")]
+    NotMeasured {
+        /// What went wrong.
+        reason: String,
+    },
     /// A buffer would be larger than the device, or the caller's budget, allows.
     #[error(
         "the GPU's buffer `{buffer}` needs {needed} bytes, {allowed} are allowed: use larger pixels, smaller clouds or fewer pairs a step"

@@ -3,7 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
 use tldi::plan::{DepthScale, PairPlan, SidePlan, ZoneGrid};
-use tldi::{CameraPolicy, PairQuery, Params, PointCloud, Projection, Radii, View, plan};
+use tldi::{
+    CameraPolicy, PairQuery, Params, PointCloud, Projection, Radii, Surface, Variant, View, plan,
+};
 
 /// Words of 32 bits, and bytes, of what only lives on the device.
 pub(crate) const SURVIVOR_BYTES: u64 = 32;
@@ -234,9 +236,9 @@ pub(crate) fn is_for_device(query: &PairQuery) -> bool {
         ),
         View::Aim { .. } => true,
     };
-    let is_cloud = |surface| matches!(surface, tldi::Surface::Cloud(_));
+    let is_cloud = |surface| matches!(surface, Surface::Cloud(_));
     is_orthographic
         && is_cloud(query.a)
         && is_cloud(query.b)
-        && query.params.variant() == tldi::Variant::Oriented
+        && query.params.variant() == Variant::Oriented
 }

@@ -5,8 +5,10 @@
 //! within what rounding of products and sums makes of them. Clouds stay on the device until their
 //! points change; a rigid motion is a pose and no upload.
 
+mod auto;
 mod backend;
 mod buffers;
+mod choice;
 mod device;
 mod error;
 mod layout;
@@ -14,8 +16,11 @@ mod pipelines;
 mod readback;
 mod resident;
 mod timer;
+mod upload;
 
+pub use auto::AutoBackend;
 pub use backend::WgpuBackend;
+pub use choice::{BACKEND_VARIABLE, BackendChoice};
 pub use device::{AdapterChoice, Gpu};
 pub use error::GpuError;
 pub use timer::StageTime;

@@ -17,6 +17,17 @@ pub(crate) struct Counters {
 }
 
 impl Counters {
+    /// Enough for a small scene.
+    pub(crate) const LEAST: Self = Self {
+        survivors: 1 << 15,
+        tiles: 1 << 14,
+        pixels: 1 << 15,
+        splats: 1 << 15,
+        fragments: 1 << 18,
+        layers: 1 << 16,
+        contacts: 1 << 11,
+    };
+
     fn to_array(self) -> [u32; 7] {
         let Self {
             survivors,

@@ -97,11 +97,16 @@ pub enum BackendError {
 /// Compares batches of pairs. All implementations give the same results (integer stages equal
 /// exactly, float ones within a stated bound).
 pub trait Backend: Send {
-    /// Short name for reports: "cpu", …
+    /// Short name for reports of what compared the last batch: "cpu", "gpu", …
     fn name(&self) -> &str;
 
-    /// Name of the device that compares, where it is not the CPU.
+    /// Name of the device that compared the last batch, where it was not the CPU.
     fn adapter(&self) -> Option<&str> {
+        None
+    }
+
+    /// Why batches are compared on the CPU though a GPU would be taken; `None` where nothing failed.
+    fn fallback(&self) -> Option<&str> {
         None
     }
 

@@ -1,0 +1,375 @@
+//! The GPU backend gives the results of the CPU backend, whatever becomes of the GPU.
+//!
+//! Both round products and sums differently (a GPU may fuse them), so that a point within rounding
+//! of a pixel's border may fall to either side. Bounds are in mean radii, and how many pixels differ
+//! is counted.
+
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{
+    Backend, CameraPolicy, ContactPixel, CpuBackend, PairQuery, PairResult, Params, PointCloud,
+    Surface, View, VirtualCamera,
+};
+use tldi_tests::{
+    Samples, aimed, gpu_backend, random_pose, random_unit, sampled_box, sampled_plane,
+    sampled_sphere,
+};
+use tldi_wgpu::{AdapterChoice, AutoBackend, Gpu, WgpuBackend};
+
+const R: f32 = 0.02;
+
+fn on_cpu(batch: &[PairQuery<'_>]) -> Vec<PairResult> {
+    compared(&mut CpuBackend::new(), batch)
+}
+
+fn compared(backend: &mut dyn Backend, batch: &[PairQuery<'_>]) -> Vec<PairResult> {
+    let mut results = Vec::new();
+    let outcome = backend.compare(batch, &mut results);
+    outcome.expect("the queries are supported");
+    results
+}
+
+/// A ball, a box or a sheet, with or without normals, with equal radii or not.
+fn random_cloud(rng: &mut fastrand::Rng) -> PointCloud<'static> {
+    let samples = match rng.u8(..3) {
+        0 => sampled_sphere(0.2 + 0.2 * rng.f32(), R),
+        1 => sampled_box(Vec3::new(0.2, 0.15, 0.25), R, rng),
+        _ => sampled_plane(0.5, R, rng),
+    };
+    let Samples { points, normals } = samples;
+    let radii: Vec<f32> = points.iter().map(|_| R * (0.8 + 0.4 * rng.f32())).collect();
+    let builder = PointCloud::builder(points);
+    let builder = match rng.bool() {
+        true => builder.radius(R),
+        false => builder.radii(radii),
+    };
+    let builder = match rng.bool() {
+        true => builder.normals(normals),
+        false => builder,
+    };
+    builder.build().expect("the samples are valid")
+}
+
+/// Two clouds, and the pose of the second in the frame of the first.
+type Pair = (PointCloud<'static>, PointCloud<'static>, Pose3);
+
+/// Pairs from apart to deep in each other.
+fn random_pairs(seeds: std::ops::Range<u64>) -> Vec<Pair> {
+    seeds
+        .map(|seed| {
+            let mut rng = fastrand::Rng::with_seed(seed);
+            let (a, b) = (random_cloud(&mut rng), random_cloud(&mut rng));
+            let mut pose = random_pose(&mut rng, 0.0);
+            pose.translation = 0.6 * rng.f32() * random_unit(&mut rng);
+            (a, b, pose)
+        })
+        .collect()
+}
+
+fn queries(pairs: &[Pair]) -> Vec<PairQuery<'_>> {
+    pairs
+        .iter()
+        .map(|(a, b, pose)| {
+            let (a, b) = (Surface::Cloud(a), Surface::Cloud(b));
+            aimed(a, b, *pose, Params::for_radius(R))
+        })
+        .collect()
+}
+
+/// How far two backends' results of many pairs are apart.
+#[derive(Debug, Default)]
+struct Difference {
+    pairs: usize,
+    /// Pairs whose answers to `collides`, or whose numbers of views, differ.
+    answers: usize,
+    contacts: usize,
+    /// Contact pixels that only one has, or whose gaps differ by more than 0.01 mean radii.
+    other_contacts: usize,
+    /// Greatest difference of the least gaps, in mean radii.
+    gap: f32,
+    /// Greatest angle between axes, in radians.
+    axis: f32,
+}
+
+impl Difference {
+    fn between(cpu: &[PairResult], gpu: &[PairResult]) -> Self {
+        let mut all = Self::default();
+        for (c, g) in cpu.iter().zip(gpu) {
+            all.pairs += 1;
+            if c.collides != g.collides || c.axes.len() != g.axes.len() {
+                all.answers += 1;
+                continue;
+            }
+            for (axis, other) in c.axes.iter().zip(&g.axes) {
+                all.axis = all.axis.max(axis.distance(*other));
+            }
+            if let (Some(gap), Some(other)) = (c.gap, g.gap) {
+                all.gap = all.gap.max((gap - other).abs() / R);
+            }
+            let is_like = |p: &ContactPixel, q: &ContactPixel| {
+                (p.view, p.pixel) == (q.view, q.pixel) && (p.gap - q.gap).abs() <= 0.01 * R
+            };
+            let only = |own: &[ContactPixel], other: &[ContactPixel]| {
+                let is_missing = |p: &&ContactPixel| !other.iter().any(|q| is_like(p, q));
+                own.iter().filter(is_missing).count()
+            };
+            all.contacts += c.contacts.len();
+            all.other_contacts +=
+                only(&c.contacts, &g.contacts).max(only(&g.contacts, &c.contacts));
+        }
+        all
+    }
+}
+
+/// Whole pairs of all kinds, in one batch.
+#[test]
+fn contacts_are_those_of_the_cpu() {
+    let Some(mut gpu) = gpu_backend() else {
+        return;
+    };
+    let pairs = random_pairs(0..120);
+    let batch = queries(&pairs);
+    let found = Difference::between(&on_cpu(&batch), &compared(&mut gpu, &batch));
+    eprintln!("{found:?}");
+    assert!(found.pairs == 120 && found.contacts > 10_000, "{found:?}");
+    // A swap of two surfaces within rounding of each other may be seen by one only.
+    assert!(found.answers <= 1, "{found:?}");
+    // Neighbours' offsets are summed in steps of 1/2047 of their distance: normals that are
+    // estimated differ by about 0.0005, and so does an axis, or more where it is hardly determined.
+    assert!(found.axis < 2e-3, "{found:?}");
+    assert!(found.gap < 0.05, "{found:?}");
+    assert!(found.other_contacts * 100 < found.contacts, "{found:?}");
+}
+
+/// With given normals, one given view along an axis of the frame, and coordinates and pixels that
+/// are powers of two, nothing is rounded before the layers: pixels are equal, one by one.
+#[test]
+fn pixels_are_equal_where_nothing_is_rounded() {
+    let Some(mut gpu) = gpu_backend() else {
+        return;
+    };
+    let pixel = 1.0 / 64.0;
+    for seed in 0..12 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let mut cloud = |height: f32, normal: Vec3| {
+            let mut at = || (rng.u32(0..256) as f32 - 128.0) / 256.0;
+            let position = |_| Vec3::new(at(), at(), height + at() / 16.0);
+            let points: Vec<Vec3> = (0..3000).map(position).collect();
+            let normals = vec![normal; points.len()];
+            let builder = PointCloud::builder(points).radius(pixel).normals(normals);
+            builder.build().expect("the points are valid")
+        };
+        let (a, b) = (cloud(0.0, Vec3::Z), cloud(0.03, -Vec3::Z));
+        let mut camera = VirtualCamera::along(-Vec3::Z, pixel);
+        camera.view_from_frame.rotation = tldi::glamx::Quat::from_rotation_x(std::f32::consts::PI);
+        let query = PairQuery {
+            view: View::Fixed(camera),
+            ..aimed(
+                Surface::Cloud(&a),
+                Surface::Cloud(&b),
+                Pose3::IDENTITY,
+                Params::for_radius(pixel),
+            )
+        };
+        let (cpu, gpu) = (on_cpu(&[query]), compared(&mut gpu, &[query]));
+        let pixels = |result: &PairResult| -> Vec<_> {
+            let contacts = result.contacts.iter();
+            contacts.map(|c| (c.view, c.pixel)).collect()
+        };
+        assert!(cpu[0].contacts.len() > 1000, "{}", cpu[0].contacts.len());
+        assert_eq!(pixels(&cpu[0]), pixels(&gpu[0]), "seed {seed}");
+        assert_eq!(cpu[0].collides, gpu[0].collides, "seed {seed}");
+        for (c, g) in cpu[0].contacts.iter().zip(&gpu[0].contacts) {
+            // Layers' depths are quotients of integers: a unit in the last place of a metre.
+            assert!((c.gap - g.gap).abs() < 1e-6, "seed {seed}: {c:?} {g:?}");
+        }
+    }
+}
+
+/// All camera policies, with motion and memory.
+#[test]
+fn policies_are_those_of_the_cpu() {
+    let Some(mut gpu) = gpu_backend() else {
+        return;
+    };
+    let pairs = random_pairs(200..230);
+    for policy in [
+        CameraPolicy::ContactZone,
+        CameraPolicy::Motion,
+        CameraPolicy::Covariance,
+        CameraPolicy::SmallestExtent,
+        CameraPolicy::LastNormal,
+    ] {
+        let mut rng = fastrand::Rng::with_seed(7);
+        let batch: Vec<PairQuery> = queries(&pairs)
+            .into_iter()
+            .map(|query| PairQuery {
+                view: View::Aim {
+                    policy,
+                    motion: 0.05 * random_unit(&mut rng),
+                    last_axis: rng.bool().then(|| random_unit(&mut rng)),
+                },
+                ..query
+            })
+            .collect();
+        let found = Difference::between(&on_cpu(&batch), &compared(&mut gpu, &batch));
+        eprintln!("{policy:?} {found:?}");
+        assert!(found.answers <= 1, "{policy:?} {found:?}");
+        assert!(found.axis < 2e-3, "{policy:?} {found:?}");
+        assert!(
+            found.other_contacts * 50 < found.contacts,
+            "{policy:?} {found:?}"
+        );
+    }
+}
+
+/// Atomics come in any order; results do not depend on it, nor on what else is in the batch, nor on
+/// what was compared before.
+#[test]
+fn results_are_the_same_every_time() {
+    let Some(mut gpu) = gpu_backend() else {
+        return;
+    };
+    let pairs = random_pairs(300..316);
+    let batch = queries(&pairs);
+    let first = compared(&mut gpu, &batch);
+    assert_eq!(first, compared(&mut gpu, &batch));
+    for (query, expected) in batch.iter().zip(&first) {
+        assert_eq!(expected, &compared(&mut gpu, &[*query])[0]);
+    }
+}
+
+/// Buffers that are too small for a batch are found out, grown, and the batch is redone.
+#[test]
+fn batches_that_outgrow_the_buffers_are_redone() {
+    let Some(gpu) = gpu_backend() else {
+        return;
+    };
+    let mut rng = fastrand::Rng::with_seed(5);
+    let sheet = |rng: &mut fastrand::Rng| sampled_plane(1.0, 0.004, rng).cloud(0.004);
+    let (a, b) = (sheet(&mut rng), sheet(&mut rng));
+    let query = aimed(
+        Surface::Cloud(&a),
+        Surface::Cloud(&b),
+        Pose3::translation(0.0, 0.002, 0.0),
+        Params::for_radius(0.004),
+    );
+    // Cold, with the least buffers: 62,500 points a side, as many pixels, three times the contacts
+    // that fit at first.
+    let mut cold = WgpuBackend::new(gpu.gpu().clone()).expect("there is a device");
+    let (cpu, gpu) = (on_cpu(&[query]), compared(&mut cold, &[query]));
+    assert!(cpu[0].contacts.len() > 50_000, "{}", cpu[0].contacts.len());
+    let missing = cpu[0].contacts.len().abs_diff(gpu[0].contacts.len());
+    assert!(missing * 1000 < cpu[0].contacts.len(), "{missing}");
+}
+
+/// Exact surfaces and pixels with thousands of fragments are the CPU's, in the same batch.
+#[test]
+fn what_the_gpu_does_not_take_the_cpu_compares() {
+    let Some(mut gpu) = gpu_backend() else {
+        return;
+    };
+    let mut rng = fastrand::Rng::with_seed(3);
+    let plain = sampled_plane(0.5, R, &mut rng).cloud(R);
+    let ball = sampled_sphere(0.2, R).cloud(R);
+    // All at one place, seen from above: a stack of 4000 points in one pixel.
+    let stack: Vec<Vec3> = (0..4000)
+        .map(|k| Vec3::new(0.0, 1e-4 * k as f32, 0.0))
+        .collect();
+    let stack = PointCloud::builder(stack)
+        .radius(R)
+        .normals(vec![Vec3::X; 4000])
+        .build()
+        .expect("the points are valid");
+    let above = |b| {
+        let pose = Pose3::translation(0.01, 0.19, 0.0);
+        aimed(Surface::Cloud(&plain), b, pose, Params::for_radius(R))
+    };
+    let mut camera = VirtualCamera::along(-Vec3::Y, R);
+    camera.size = None;
+    let crowded = PairQuery {
+        view: View::Fixed(camera),
+        a_from_b: Pose3::translation(0.0, -0.2, 0.0),
+        ..above(Surface::Cloud(&stack))
+    };
+    let paper = PairQuery {
+        params: Params::paper(R),
+        ..above(Surface::Cloud(&ball))
+    };
+    let batch = [crowded, above(Surface::Cloud(&ball)), paper];
+    let (cpu, gpu) = (on_cpu(&batch), compared(&mut gpu, &batch));
+    assert_eq!(cpu[0], gpu[0]);
+    assert_eq!(cpu[2], gpu[2]);
+    assert!(!cpu[1].contacts.is_empty());
+    assert_eq!(cpu[1].contacts.len(), gpu[1].contacts.len());
+}
+
+/// New points are uploaded, and old ones are not mistaken for them.
+#[test]
+fn clouds_follow_their_points() {
+    let Some(mut gpu) = gpu_backend() else {
+        return;
+    };
+    let mut rng = fastrand::Rng::with_seed(9);
+    let floor = sampled_plane(0.5, R, &mut rng).cloud(R);
+    let mut ball = sampled_sphere(0.2, R).bare_cloud(R).into_owned();
+    for frame in 0..12 {
+        let height = 0.2 + 0.05 * (frame as f32).sin();
+        let samples = sampled_sphere(0.15 + 0.005 * frame as f32, R);
+        ball.set_points(&samples.points, None)
+            .expect("valid points");
+        let query = aimed(
+            Surface::Cloud(&floor),
+            Surface::Cloud(&ball),
+            Pose3::translation(0.0, height, 0.0),
+            Params::for_radius(R),
+        );
+        let found = Difference::between(&on_cpu(&[query]), &compared(&mut gpu, &[query]));
+        assert!(found.answers == 0 && found.gap < 0.05, "{frame}: {found:?}");
+    }
+}
+
+/// A device that is lost fails with an error that says so; under `AutoBackend` the batch is
+/// finished on the CPU.
+#[test]
+fn a_lost_device_loses_nothing() {
+    let Some(shared) = gpu_backend() else {
+        return;
+    };
+    drop(shared);
+    let pairs = random_pairs(400..404);
+    let batch = queries(&pairs);
+    let open = || Gpu::open(AdapterChoice::Any).and_then(WgpuBackend::new);
+    let mut alone = open().expect("there is a device");
+    let before = compared(&mut alone, &batch);
+    alone.gpu().device().destroy();
+    let error = alone
+        .compare(&batch, &mut Vec::new())
+        .expect_err("it is lost");
+    assert!(error.to_string().contains("failed"), "{error}");
+
+    let gpu = open().expect("there is a device");
+    let device = gpu.gpu().device().clone();
+    let mut auto = AutoBackend::with_gpu(gpu, 0);
+    assert_eq!(before, compared(&mut auto, &batch));
+    assert_eq!((auto.name(), auto.fallback()), ("gpu", None));
+    device.destroy();
+    assert_eq!(on_cpu(&batch), compared(&mut auto, &batch));
+    assert_eq!((auto.name(), auto.adapter()), ("cpu", None));
+    assert!(
+        auto.fallback()
+            .is_some_and(|reason| reason.contains("failed"))
+    );
+}
+
+/// Small batches are the CPU's.
+#[test]
+fn small_batches_stay_on_the_cpu() {
+    let Some(gpu) = gpu_backend() else {
+        return;
+    };
+    let pairs = random_pairs(500..502);
+    let batch = queries(&pairs);
+    let mut auto = AutoBackend::with_gpu(gpu, 1_000_000);
+    assert_eq!(on_cpu(&batch), compared(&mut auto, &batch));
+    assert_eq!((auto.name(), auto.fallback()), ("cpu", None));
+}

@@ -1,0 +1,44 @@
+//! The backend that tests run on.
+
+use std::cell::RefCell;
+use tldi::{Backend, PairQuery, PairResult};
+use tldi_wgpu::{AdapterChoice, BackendChoice, Gpu, WgpuBackend};
+
+/// Compares a batch on the backend that the variable `TLDI_BACKEND` asks for, with warm memory: the
+/// same tests are run for every backend.
+///
+/// # Panics
+/// If a query is not supported, or a GPU that was asked for is not there.
+pub fn compare_batch(batch: &[PairQuery<'_>]) -> Vec<PairResult> {
+    thread_local! {
+        static BACKEND: RefCell<Box<dyn Backend>> =
+            RefCell::new(BackendChoice::Auto.open().expect("the backend is there"));
+    }
+    BACKEND.with_borrow_mut(|backend| {
+        let mut results = Vec::new();
+        backend
+            .compare(batch, &mut results)
+            .expect("the queries are supported");
+        results
+    })
+}
+
+/// A GPU backend, on a software driver where there is no GPU; `None` (said loudly) where there is
+/// neither.
+///
+/// # Panics
+/// There, if the variable `TLDI_REQUIRE_GPU` is set.
+#[allow(
+    clippy::print_stderr,
+    reason = "a test that is skipped for want of a GPU must say so"
+)]
+pub fn gpu_backend() -> Option<WgpuBackend> {
+    match Gpu::of_process(AdapterChoice::Any).and_then(WgpuBackend::new) {
+        Ok(backend) => Some(backend),
+        Err(error) if std::env::var_os("TLDI_REQUIRE_GPU").is_some() => panic!("{error}"),
+        Err(error) => {
+            eprintln!("SKIPPED: {error} (set TLDI_REQUIRE_GPU to make this a failure)");
+            None
+        }
+    }
+}
