@@ -214,7 +214,8 @@ fn push_view(pair: u32, sign: f32) {
         view.view_z = pairs[pair].view_z;
     } else {
         let z = axis;
-        let side = select(-1.0, 1.0, z.z >= 0.0);
+        // The sign of a negative zero is negative.
+        let side = select(1.0, -1.0, bitcast<u32>(z.z) >= 0x80000000u);
         let a = -1.0 / (side + z.z);
         let b = z.x * z.y * a;
         view.view_x = vec4f(1.0 + side * z.x * z.x * a, side * b, -side * z.x, 0.0);

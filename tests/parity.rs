@@ -373,3 +373,42 @@ fn small_batches_stay_on_the_cpu() {
     assert_eq!(on_cpu(&batch), compared(&mut auto, &batch));
     assert_eq!((auto.name(), auto.fallback()), ("cpu", None));
 }
+
+/// The frame of a view follows its axis, whatever the signs of its zeros.
+#[test]
+fn views_along_the_axes_have_the_frames_of_the_cpu() {
+    let Some(mut gpu) = gpu_backend() else {
+        return;
+    };
+    let mut rng = fastrand::Rng::with_seed(11);
+    let (a, b) = (
+        sampled_plane(0.3, R, &mut rng).bare_cloud(R),
+        sampled_sphere(0.1, R).bare_cloud(R),
+    );
+    let axes = [-1.0, -0.0, 0.0, 1.0];
+    for axis in axes
+        .map(|x| axes.map(|y| axes.map(|z| Vec3::new(x, y, z))))
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
+        let query = PairQuery {
+            view: View::Aim {
+                policy: CameraPolicy::LastNormal,
+                motion: Vec3::ZERO,
+                last_axis: Some(axis),
+            },
+            ..aimed(
+                Surface::Cloud(&a),
+                Surface::Cloud(&b),
+                Pose3::translation(0.0, 0.1, 0.0),
+                Params::for_radius(R),
+            )
+        };
+        let found = Difference::between(&on_cpu(&[query]), &compared(&mut gpu, &[query]));
+        assert!(
+            found.answers == 0 && found.other_contacts <= 2,
+            "{axis}: {found:?}"
+        );
+    }
+}

@@ -11,12 +11,17 @@ use crate::resident::Resident;
 use crate::timer::Timer;
 use crate::upload::Upload;
 use crate::{Gpu, GpuError, StageTime};
+use std::sync::mpsc;
+use std::time::Duration;
 use tldi::{Backend, BackendError, CpuBackend, PairQuery, PairResult, PatchScratch};
 use wgpu::BufferUsages;
 
 /// Times that a batch is redone with larger buffers before that counts as a fault: every time at
 /// least one of seven has doubled.
 const MOST_TRIES: usize = 64;
+
+/// Time after the end of a batch within which its readback must be there.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Workgroups along x of a dispatch.
 const MAX_GROUPS: u32 = 65_535;
@@ -420,28 +425,22 @@ impl WgpuBackend {
         let Some(buffer) = self.buffers.readback.get() else {
             return Err(failed("nothing was submitted".to_owned()));
         };
-        let mapped = std::sync::Arc::new(std::sync::Mutex::new(None));
-        let outcome = std::sync::Arc::clone(&mapped);
         let slice = buffer.slice(..);
+        let (mapped, answer) = mpsc::channel();
         slice.map_async(wgpu::MapMode::Read, move |result| {
-            *outcome
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner) = Some(result);
+            // Nobody listens any more after an error.
+            let _ = mapped.send(result);
         });
         self.gpu
             .device
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|e| failed(e.to_string()))?;
+        // Whoever shares the device may have been the one to see the end of the work.
+        let outcome = answer
+            .recv_timeout(ANSWER_TIMEOUT)
+            .map_err(|_| failed("the readback was not answered".to_owned()))?;
         self.gpu.check()?;
-        let outcome = mapped
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
-            .take();
-        match outcome {
-            Some(Ok(())) => {}
-            Some(Err(e)) => return Err(failed(e.to_string())),
-            None => return Err(failed("the readback was not answered".to_owned())),
-        }
+        outcome.map_err(|e| failed(e.to_string()))?;
         let view = slice
             .get_mapped_range()
             .map_err(|e| failed(e.to_string()))?;
