@@ -242,3 +242,109 @@ pub(crate) fn is_for_device(query: &PairQuery) -> bool {
         && is_cloud(query.b)
         && query.params.variant() == Variant::Oriented
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::mem::{offset_of, size_of};
+
+    /// Offset of each member of a WGSL struct, and its size.
+    fn wgsl_layout(name: &str) -> (Vec<(String, u32)>, u32) {
+        let compare = tldi_shaders::STAGES.last().expect("there are stages");
+        let module = naga::front::wgsl::parse_str(compare.source).expect("it is valid");
+        let (_, found) = (module.types.iter())
+            .find(|(_, ty)| ty.name.as_deref() == Some(name))
+            .unwrap_or_else(|| panic!("no struct {name}"));
+        let naga::TypeInner::Struct { members, span } = &found.inner else {
+            panic!("{name} is no struct");
+        };
+        let offset = |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), m.offset);
+        (members.iter().map(offset).collect(), *span)
+    }
+
+    macro_rules! assert_same_layout {
+        ($name:literal, $type:ty, [$($rust:ident $wgsl:ident),+ $(,)?]) => {
+            let (members, size) = wgsl_layout($name);
+            let expected: Vec<(String, u32)> =
+                vec![$((stringify!($wgsl).to_owned(), offset_of!($type, $rust) as u32)),+];
+            let with_rows = |name: &str| name.ends_with("_y") || name.ends_with("_z");
+            for member in &expected {
+                assert!(members.contains(member), "{}: {member:?} {members:?}", $name);
+            }
+            // Further rows of matrices follow their first.
+            for (name, _) in &members {
+                let is_known = expected.iter().any(|(other, _)| other == name);
+                assert!(is_known || with_rows(name) || name.starts_with("padding"), "{name}");
+            }
+            assert_eq!(size as usize, size_of::<$type>(), $name);
+        };
+    }
+
+    /// What Rust writes is what WGSL reads, member by member.
+    #[test]
+    fn layouts_are_those_of_wgsl() {
+        assert_same_layout!("Params", Params, [
+            pixel_size pixel_size, merge_gap merge_gap, prediction prediction,
+            slope_damping slope_damping, rho rho, stack_segments stack_segments,
+            variant variant, _padding padding,
+        ]);
+        assert_same_layout!("Batch", BatchData, [
+            pairs pairs, items items, survivors survivors, tiles tiles, pixels pixels,
+            splats splats, fragments fragments, layers layers, contacts contacts, cells cells,
+            sides_at sides_at, views_at views_at, zone_at zone_at, cells_at cells_at,
+            tiles_at tiles_at, pixels_at pixels_at,
+        ]);
+        assert_same_layout!("Pair", PairData, [
+            params params, overlap_min overlap_min, zone_inv_cell zone_inv_cell,
+            overlap_max overlap_max, column_reach column_reach, zone_dims zone_dims,
+            zone_row_words zone_row_words, larger_from_a_x larger_from_a_x,
+            zone_first zone_first, larger_from_a_y larger_from_a_y, zone_words zone_words,
+            larger_from_a_z larger_from_a_z, policy policy, half_extents half_extents,
+            plainness plainness, toward_b toward_b, has_last has_last, last_axis last_axis,
+            merge_steps merge_steps, view view_x, image_size image_size,
+            depth_step depth_step, depth_inv_step depth_inv_step,
+        ]);
+        assert_same_layout!("Side", SideData, [
+            frame_from_cloud frame_from_cloud_x, other_from_frame other_from_frame_x,
+            other_min other_min, stride stride, other_max other_max, len len, middle middle,
+            flags flags, first_point first_point, first_normal first_normal,
+            radius_scale radius_scale, max_radius max_radius, cell_dims cell_dims,
+            cell_first cell_first, cell_inv cell_inv, mean_radius mean_radius,
+        ]);
+    }
+
+    /// What only lives on the device takes as many bytes as are set aside for it.
+    #[test]
+    fn sizes_are_those_of_wgsl() {
+        for (name, bytes) in [
+            ("Survivor", SURVIVOR_BYTES),
+            ("View", VIEW_BYTES),
+            ("Splat", SPLAT_BYTES),
+            ("Layer", LAYER_BYTES),
+        ] {
+            assert_eq!(u64::from(wgsl_layout(name).1), bytes, "{name}");
+        }
+    }
+
+    /// Numbers that are written on both sides.
+    #[test]
+    fn numbers_are_those_of_wgsl() {
+        let compare = tldi_shaders::STAGES.last().expect("there are stages");
+        for (name, value) in [
+            ("GROUP", GROUP),
+            ("SAMPLE_SLOTS", SAMPLE_SLOTS as u32),
+            ("SIDE_WORDS", SIDE_WORDS),
+            ("VIEW_WORDS", VIEW_WORDS),
+            ("PAIR_WORDS", PAIR_WORDS),
+            ("CONTACT_WORDS", CONTACT_WORDS),
+            ("FIXED_VIEW", FIXED_VIEW),
+            ("HAS_NORMALS", HAS_NORMALS),
+            ("ORIENTED", ORIENTED),
+            ("RADII_DIFFER", RADII_DIFFER),
+            ("HAS_MIDDLE", HAS_MIDDLE),
+        ] {
+            let line = format!("const {name}: u32 = {value}u;");
+            assert!(compare.source.contains(&line), "{line}");
+        }
+    }
+}
