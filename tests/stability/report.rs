@@ -83,10 +83,10 @@ impl Report {
         let seeds: Vec<String> = run.seeds.iter().map(u64::to_string).collect();
         format!(
             "{}, commit {}, {} cores of {}, seeds {}, {} version, {} drops",
-            run.date,
-            run.commit,
-            run.cores,
-            run.cpu,
+            run.host.date,
+            run.host.commit,
+            run.host.cores,
+            run.host.cpu,
             seeds.join(" "),
             if run.long { "long" } else { "short" },
             run.drops,

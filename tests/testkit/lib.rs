@@ -3,6 +3,7 @@
 mod accuracy;
 mod backend;
 mod data;
+mod host;
 mod oracle;
 mod pairs;
 mod policy;
@@ -16,6 +17,7 @@ pub use accuracy::{
 };
 pub use backend::{compare_batch, gpu_backend};
 pub use data::{data_file, load_cloud};
+pub use host::Host;
 pub use oracle::{OracleFragment, oracle_layers};
 pub use pairs::{aimed, compare, compare_clouds, deepest_point};
 pub use policy::PolicyChoice;

@@ -72,6 +72,8 @@ pub struct WgpuBackend {
     upload: Upload,
     patches: PatchScratch,
     cpu: CpuBackend,
+    /// What the last batch needed.
+    last: Counters,
     timer: Option<Timer>,
     times: Vec<StageTime>,
 }
@@ -141,6 +143,7 @@ impl WgpuBackend {
             upload: Upload::default(),
             patches: PatchScratch::default(),
             cpu: CpuBackend::new(),
+            last: Counters::default(),
             timer: None,
             times: Vec::new(),
         })
@@ -161,6 +164,11 @@ impl WgpuBackend {
     /// Time of each stage in the last batch; empty where none is measured.
     pub fn stage_times(&self) -> &[StageTime] {
         &self.times
+    }
+
+    /// What the stages of the last batch had to read and write at least, each element once, bytes.
+    pub fn needed_bytes(&self) -> Vec<(&'static str, u64)> {
+        self.last.bytes(&self.upload)
     }
 
     /// Compares the batch if at least so many points are in blocks that both sides of a pair reach;
@@ -211,10 +219,7 @@ impl WgpuBackend {
             }
             self.capacities.grow(&needed);
         }
-        Err(GpuError::Failed {
-            adapter: self.gpu.adapter().to_owned(),
-            reason: "its counters never settled".to_owned(),
-        })
+        Err(self.gpu.failed("its counters never settled".to_owned()))
     }
 
     /// Compares what is left to the CPU, and leaves nothing.
@@ -418,10 +423,7 @@ impl WgpuBackend {
         results: &mut [PairResult],
         left_to_cpu: &mut Vec<usize>,
     ) -> Result<Counters, GpuError> {
-        let failed = |reason: String| GpuError::Failed {
-            adapter: self.gpu.adapter().to_owned(),
-            reason,
-        };
+        let failed = |reason| self.gpu.failed(reason);
         let Some(buffer) = self.buffers.readback.get() else {
             return Err(failed("nothing was submitted".to_owned()));
         };
@@ -464,6 +466,7 @@ impl WgpuBackend {
                 self.patches.reduce(&mut results[pair], &batch[pair].params);
             }
         }
+        self.last = needed;
         self.times.clear();
         if let Some(timer) = &mut self.timer {
             timer.read(&self.gpu, &mut self.times)?;

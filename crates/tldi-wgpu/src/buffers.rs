@@ -78,10 +78,7 @@ pub(crate) fn create(
         mapped_at_creation: false,
     });
     match pollster::block_on(scope.pop()) {
-        Some(error) => Err(GpuError::Failed {
-            adapter: gpu.adapter().to_owned(),
-            reason: format!("no memory for {size} bytes of `{name}`: {error}"),
-        }),
+        Some(error) => Err(gpu.failed(format!("no memory for {size} bytes of `{name}`: {error}"))),
         None => Ok(buffer),
     }
 }

@@ -132,14 +132,19 @@ impl Gpu {
         self.pipelines.get_or_init(|| pipelines(self))
     }
 
+    /// An error that says what went wrong on this device.
+    pub(crate) fn failed(&self, reason: String) -> GpuError {
+        GpuError::Failed {
+            adapter: self.adapter.to_string(),
+            reason,
+        }
+    }
+
     /// What went wrong since the device was opened.
     pub(crate) fn check(&self) -> Result<(), GpuError> {
         let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
         match &*failure {
-            Some(reason) => Err(GpuError::Failed {
-                adapter: self.adapter.to_string(),
-                reason: reason.clone(),
-            }),
+            Some(reason) => Err(self.failed(reason.clone())),
             None => Ok(()),
         }
     }

@@ -7,6 +7,7 @@
 
 mod auto;
 mod backend;
+mod bandwidth;
 mod buffers;
 mod choice;
 mod device;
@@ -20,6 +21,7 @@ mod upload;
 
 pub use auto::AutoBackend;
 pub use backend::WgpuBackend;
+pub use bandwidth::copy_bandwidth;
 pub use choice::{BACKEND_VARIABLE, BackendChoice};
 pub use device::{AdapterChoice, Gpu};
 pub use error::GpuError;

@@ -1,11 +1,15 @@
 //! What a batch found, as it is read back.
 
-use crate::layout::{CONTACT_WORDS, COUNTERS, PAIR_WORDS};
+use crate::layout::{
+    CONTACT_WORDS, COUNTERS, FRAGMENT_BYTES, LAYER_BYTES, PAIR_WORDS, SAMPLE_SLOTS, SPLAT_BYTES,
+    SURVIVOR_BYTES,
+};
+use crate::upload::Upload;
 use tldi::glamx::Vec3;
 use tldi::{ContactPixel, PairQuery, PairResult, View, VirtualCamera};
 
 /// Elements that a batch needs of each buffer whose size is not known before.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Counters {
     pub(crate) survivors: u32,
     pub(crate) tiles: u32,
@@ -27,6 +31,48 @@ impl Counters {
         layers: 1 << 16,
         contacts: 1 << 11,
     };
+
+    /// What each stage that runs must read and write at least, bytes.
+    pub(crate) fn bytes(&self, upload: &Upload) -> Vec<(&'static str, u64)> {
+        let times = |count: u32, bytes: u64| u64::from(count) * bytes;
+        let survivors = times(self.survivors, SURVIVOR_BYTES);
+        let tiles = times(self.tiles, 4);
+        // Both sides' begins and ends.
+        let pixels = times(self.pixels, 2 * 8);
+        let fragments = times(self.fragments, FRAGMENT_BYTES);
+        let splats = times(self.splats, SPLAT_BYTES);
+        let layers = times(self.layers, LAYER_BYTES);
+        let bare = upload.has_bare_sides();
+        let entries = times(if bare { self.survivors } else { 0 }, 4);
+        let normal = if bare {
+            entries
+        } else {
+            times(self.survivors, 12)
+        };
+        let all = [
+            ("cull", 16 * upload.points() as u64 + survivors),
+            ("zone", 2 * survivors),
+            ("normals_alloc", upload.cell_bytes()),
+            ("normals_sort", survivors + entries),
+            ("sample", survivors),
+            ("aim", 2 * 16 * SAMPLE_SLOTS * upload.pairs.len() as u64),
+            ("columns_bounds", survivors),
+            ("columns_tiles", 0),
+            ("columns_depths", survivors + 2 * tiles),
+            ("columns_touch", 3 * tiles),
+            ("columns_pixels", 0),
+            ("mark", survivors + normal + splats + pixels),
+            ("alloc", 2 * pixels),
+            ("splat", splats + fragments),
+            ("sweep", fragments + splats + layers + pixels),
+            (
+                "compare",
+                layers + pixels + times(self.contacts, 4 * u64::from(CONTACT_WORDS)),
+            ),
+        ];
+        let runs = |stage: &(&str, u64)| bare || !stage.0.starts_with("normals");
+        all.into_iter().filter(runs).collect()
+    }
 
     fn to_array(self) -> [u32; 7] {
         let Self {

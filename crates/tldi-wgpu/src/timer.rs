@@ -84,10 +84,7 @@ impl Timer {
     pub(crate) fn read(&self, gpu: &Gpu, times: &mut Vec<StageTime>) -> Result<(), GpuError> {
         let slice = self.readback.slice(..);
         slice.map_async(wgpu::MapMode::Read, |_| {});
-        let failed = |reason: String| GpuError::Failed {
-            adapter: gpu.adapter().to_owned(),
-            reason,
-        };
+        let failed = |reason| gpu.failed(reason);
         gpu.device
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|e| failed(e.to_string()))?;

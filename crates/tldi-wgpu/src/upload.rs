@@ -66,6 +66,16 @@ impl Upload {
         self.items.len() * BLOCK
     }
 
+    /// Whether a cloud has no normals.
+    pub(crate) fn has_bare_sides(&self) -> bool {
+        self.cells > 0
+    }
+
+    /// Bytes of the cells in which neighbours are looked for.
+    pub(crate) fn cell_bytes(&self) -> u64 {
+        2 * 4 * u64::from(self.cells)
+    }
+
     /// Puts the clouds of the selected pairs on the device, and fills what tells of them.
     pub(crate) fn place(
         &mut self,
