@@ -22,7 +22,20 @@ macro_rules! shader {
 
 const CULL: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "cull.wgsl");
 const ZONE: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "zone.wgsl");
-const NORMALS: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "normals.wgsl");
+const NORMALS_ALLOC: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "normals_alloc.wgsl"
+);
+const NORMALS_SORT: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "normals_sort.wgsl");
+const NORMALS: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/eigen.wgsl",
+    "shared/bare_normal.wgsl",
+    "shared/modelled.wgsl",
+    "normals.wgsl"
+);
 const SAMPLE: &str = shader!(
     "shared/types.wgsl",
     "shared/math.wgsl",
@@ -40,8 +53,7 @@ const COLUMNS: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "columns.
 const MARK: &str = shader!(
     "shared/types.wgsl",
     "shared/math.wgsl",
-    "shared/eigen.wgsl",
-    "shared/bare_normal.wgsl",
+    "shared/modelled.wgsl",
     "shared/pixels.wgsl",
     "mark.wgsl"
 );
@@ -87,8 +99,8 @@ const fn stage(name: &'static str, source: &'static str, bindings: &'static [u32
 pub const STAGES: &[Stage] = &[
     stage("cull", CULL, &[0, 1, 2, 3, 4, 6, 8]),
     stage("zone", ZONE, &[0, 1, 2, 6, 8]),
-    stage("normals_alloc", NORMALS, &[0, 8]),
-    stage("normals_sort", NORMALS, &[0, 6, 8, 9]),
+    stage("normals_alloc", NORMALS_ALLOC, &[0, 8]),
+    stage("normals_sort", NORMALS_SORT, &[0, 6, 8, 9]),
     stage("sample", SAMPLE, &[0, 1, 2, 5, 6, 8, 9, 10]),
     stage("aim", AIM, &[0, 1, 2, 7, 8, 10, 14]),
     stage("columns_bounds", COLUMNS, &[0, 6, 7, 8]),
@@ -96,7 +108,8 @@ pub const STAGES: &[Stage] = &[
     stage("columns_depths", COLUMNS, &[0, 1, 2, 6, 7, 8]),
     stage("columns_touch", COLUMNS, &[0, 1, 7, 8]),
     stage("columns_pixels", COLUMNS, &[0, 7, 8, 15]),
-    stage("mark", MARK, &[0, 1, 2, 5, 6, 7, 8, 9, 11]),
+    stage("normals", NORMALS, &[0, 1, 2, 6, 7, 8, 9, 17]),
+    stage("mark", MARK, &[0, 1, 2, 5, 6, 7, 8, 11, 17]),
     stage("alloc", ALLOC, &[0, 8, 16]),
     stage("splat", SPLAT, &[0, 7, 8, 11, 12]),
     stage("sweep", SWEEP, &[0, 1, 2, 7, 8, 11, 12, 13, 14]),

@@ -7,45 +7,16 @@
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
 @group(0) @binding(7) var<storage, read_write> views: array<View>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
-@group(0) @binding(9) var<storage, read_write> entries: array<u32>;
 @group(0) @binding(11) var<storage, read_write> splats: array<Splat>;
+@group(0) @binding(17) var<storage, read_write> estimated: array<vec4f>;
 
 var<workgroup> total: atomic<u32>;
 var<workgroup> base: u32;
 
-fn position_in(view: u32, i: u32) -> vec3f {
-    return moved(views[view].view_x, views[view].view_y, views[view].view_z, survivors[i].position);
-}
-
-// Whether a point is in a tile that touches, or next to one.
-fn is_modelled(view: u32, p: vec3f, pixel_size: f32) -> bool {
-    if views[view].pixel_count == 0u {
-        return false;
-    }
-    let scale = 1.0 / (pixel_size * f32(views[view].tile_edge));
-    let t = p.xy * scale - vec2f(views[view].tile_origin) / f32(views[view].tile_edge);
-    let dims = views[view].tile_dims;
-    if !(all(t >= vec2f(0.0)) && all(t < vec2f(dims))) {
-        return false;
-    }
-    let own = vec2u(t);
-    let low = max(own, vec2u(1u)) - 1u;
-    let high = min(own + 1u, dims - 1u);
-    let touch = batch.tiles_at + 2u * batch.tiles + views[view].first_tile;
-    for (var y = low.y; y <= high.y; y++) {
-        for (var x = low.x; x <= high.x; x++) {
-            if atomicLoad(&work[touch + y * dims.x + x]) != 0u {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
 fn normal_of(i: u32) -> vec3f {
     let side = survivors[i].side;
     if (sides[side].flags & HAS_NORMALS) == 0u {
-        return bare_normal(side, survivors[i].position, false);
+        return estimated[i].xyz;
     }
     let at = 3u * (sides[side].first_normal + survivors[i].index);
     return turned(

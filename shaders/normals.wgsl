@@ -1,49 +1,33 @@
-// Stage `normals`: the culled points of clouds without normals, sorted into cells, for
-// `bare_normal.wgsl`. `zone` has counted them.
+// Stage `normals`, second half: normals of the points that are modelled. Threads take the points in
+// the order of their cells, so that neighbours read the same ones.
 
+@group(0) @binding(1) var<storage, read> pairs: array<Pair>;
 @group(0) @binding(2) var<storage, read> sides: array<Side>;
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
+@group(0) @binding(7) var<storage, read_write> views: array<View>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
-@group(0) @binding(9) var<storage, read_write> entries: array<u32>;
-
-var<workgroup> total: atomic<u32>;
-var<workgroup> base: u32;
-
-// Counts of cells become the places of their points.
-@compute @workgroup_size(256)
-fn normals_alloc(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    let cell = group_index(group) * GROUP + lane;
-    let exists = cell < batch.cells;
-    var count = 0u;
-    if exists {
-        count = atomicLoad(&work[batch.cells_at + batch.cells + cell]);
-    }
-    let own = atomicAdd(&total, count);
-    workgroupBarrier();
-    if lane == 0u {
-        base = atomicAdd(&work[ENTRIES], atomicLoad(&total));
-    }
-    workgroupBarrier();
-    if exists {
-        atomicStore(&work[batch.cells_at + cell], base + own);
-        atomicStore(&work[batch.cells_at + batch.cells + cell], base + own);
-    }
-}
+@group(0) @binding(9) var<storage, read_write> entries: array<Entry>;
+@group(0) @binding(17) var<storage, read_write> estimated: array<vec4f>;
 
 @compute @workgroup_size(256)
-fn normals_sort(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    let i = group_index(group) * GROUP + lane;
-    if i >= min(atomicLoad(&work[SURVIVORS]), batch.survivors) || survivors[i].cell == NONE {
+fn normals(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let k = group_index(group) * GROUP + lane;
+    let fits = atomicLoad(&work[TILES]) <= batch.tiles && atomicLoad(&work[SURVIVORS]) <= batch.survivors;
+    if !fits || k >= min(atomicLoad(&work[ENTRIES]), arrayLength(&entries)) {
         return;
     }
-    let place = atomicAdd(&work[batch.cells_at + batch.cells + survivors[i].cell], 1u);
-    if place < arrayLength(&entries) {
-        entries[place] = i;
+    let i = entries[k].id & ~NEAR;
+    let side = survivors[i].side;
+    let pixel_size = pairs[side / 2u].params.pixel_size;
+    var is_needed = false;
+    for (var v = 0u; v < MAX_VIEWS; v++) {
+        let view = side / 2u * MAX_VIEWS + v;
+        if views[view].exists == 0u {
+            break;
+        }
+        is_needed = is_needed || is_modelled(view, position_in(view, i), pixel_size);
+    }
+    if is_needed {
+        estimated[i] = vec4f(bare_normal(side, entries[k].position, false), 0.0);
     }
 }

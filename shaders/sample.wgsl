@@ -5,7 +5,7 @@
 @group(0) @binding(5) var<storage, read> normals: array<f32>;
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
-@group(0) @binding(9) var<storage, read_write> entries: array<u32>;
+@group(0) @binding(9) var<storage, read_write> entries: array<Entry>;
 @group(0) @binding(10) var<storage, read_write> samples: array<vec4f>;
 
 @compute @workgroup_size(256)

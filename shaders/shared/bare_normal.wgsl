@@ -59,11 +59,11 @@ fn bare_normal(side: u32, position: vec3f, near_only: bool) -> vec3f {
                 let end = atomicLoad(&work[ends + cell]);
                 for (var k = atomicLoad(&work[begins + cell]); k < end; k++) {
                     let other = entries[min(k, arrayLength(&entries) - 1u)];
-                    let d = survivors[other].position - position;
+                    let d = other.position - position;
                     var is_taken = dot(d, d) <= radius * radius && count < i32(MAX_CANDIDATES);
-                    is_taken = is_taken && (!near_only || survivors[other].is_near != 0u);
-                    if step > 1u {
-                        is_taken = is_taken && hash(survivors[other].index) % step == 0u;
+                    is_taken = is_taken && (!near_only || (other.id & NEAR) != 0u);
+                    if step > 1u && is_taken {
+                        is_taken = hash(survivors[other.id & ~NEAR].index) % step == 0u;
                     }
                     if is_taken {
                         let q = vec3i(round(d * (OFFSET_STEPS / radius)));

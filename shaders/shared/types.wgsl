@@ -30,6 +30,15 @@ const MAX_VIEWS: u32 = 3u;
 // Normals that one side can hold for `aim`: selected at random, they are a few more than
 // AIM_SAMPLES at times.
 const SAMPLE_SLOTS: u32 = 1024u;
+// A culled point in the order of the cells in which neighbours are looked for.
+struct Entry {
+    position: vec3f,
+    // Index of the survivor, and NEAR.
+    id: u32,
+}
+
+const NEAR: u32 = 0x80000000u;
+
 // What is not a number of anything.
 const NONE: u32 = 0xffffffffu;
 const INFINITE: f32 = 3.0e38;

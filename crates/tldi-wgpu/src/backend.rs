@@ -2,8 +2,8 @@
 
 use crate::buffers::Growable;
 use crate::layout::{
-    BatchData, CONTACT_WORDS, COUNTERS, FRAGMENT_BYTES, GROUP, LAYER_BYTES, PAIR_WORDS,
-    SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, VIEW_BYTES, is_for_device,
+    BatchData, CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, GROUP, LAYER_BYTES,
+    NORMAL_BYTES, PAIR_WORDS, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, VIEW_BYTES, is_for_device,
 };
 use crate::pipelines::Pipeline;
 use crate::readback::{Counters, Readback};
@@ -88,6 +88,7 @@ struct Buffers {
     views: Growable,
     work: Growable,
     entries: Growable,
+    estimated: Growable,
     samples: Growable,
     splats: Growable,
     fragments: Growable,
@@ -111,6 +112,7 @@ impl Default for Buffers {
             views: Growable::new("views", storage | to),
             work: Growable::new("work", storage | to | from),
             entries: Growable::new("entries", storage),
+            estimated: Growable::new("estimated normals", storage),
             samples: Growable::new("samples", storage),
             splats: Growable::new("splats", storage),
             fragments: Growable::new("fragments", storage),
@@ -352,7 +354,8 @@ impl WgpuBackend {
                 &mut b.work,
                 4 * u64::from(data.pixels_at) + 16 * u64::from(data.pixels),
             ),
-            (&mut b.entries, 4 * u64::from(bare)),
+            (&mut b.entries, ENTRY_BYTES * u64::from(bare)),
+            (&mut b.estimated, NORMAL_BYTES * u64::from(bare)),
             (&mut b.samples, 2 * 16 * SAMPLE_SLOTS * pairs),
             (&mut b.splats, SPLAT_BYTES * u64::from(data.splats)),
             (&mut b.fragments, FRAGMENT_BYTES * u64::from(data.fragments)),
@@ -389,6 +392,7 @@ impl WgpuBackend {
             grown(&b.found),
             grown(&b.groups),
             grown(&b.splat_groups),
+            grown(&b.estimated),
         ];
         if bound == self.bound {
             return;

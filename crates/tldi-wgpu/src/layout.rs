@@ -9,6 +9,8 @@ use tldi::{
 
 /// Words of 32 bits, and bytes, of what only lives on the device.
 pub(crate) const SURVIVOR_BYTES: u64 = 32;
+pub(crate) const ENTRY_BYTES: u64 = 16;
+pub(crate) const NORMAL_BYTES: u64 = 16;
 pub(crate) const VIEW_BYTES: u64 = 144;
 pub(crate) const SPLAT_BYTES: u64 = 64;
 pub(crate) const LAYER_BYTES: u64 = 32;
@@ -318,6 +320,7 @@ mod tests {
     fn sizes_are_those_of_wgsl() {
         for (name, bytes) in [
             ("Survivor", SURVIVOR_BYTES),
+            ("Entry", ENTRY_BYTES),
             ("View", VIEW_BYTES),
             ("Splat", SPLAT_BYTES),
             ("Layer", LAYER_BYTES),

@@ -1,8 +1,8 @@
 //! What a batch found, as it is read back.
 
 use crate::layout::{
-    CONTACT_WORDS, COUNTERS, FRAGMENT_BYTES, LAYER_BYTES, PAIR_WORDS, SAMPLE_SLOTS, SPLAT_BYTES,
-    SURVIVOR_BYTES,
+    CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, NORMAL_BYTES, PAIR_WORDS,
+    SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES,
 };
 use crate::upload::Upload;
 use tldi::glamx::Vec3;
@@ -43,12 +43,8 @@ impl Counters {
         let splats = times(self.splats, SPLAT_BYTES);
         let layers = times(self.layers, LAYER_BYTES);
         let bare = upload.has_bare_sides();
-        let entries = times(if bare { self.survivors } else { 0 }, 4);
-        let normal = if bare {
-            entries
-        } else {
-            times(self.survivors, 12)
-        };
+        let entries = times(if bare { self.survivors } else { 0 }, ENTRY_BYTES);
+        let normals = times(self.survivors, if bare { NORMAL_BYTES } else { 12 });
         let all = [
             ("cull", 16 * upload.points() as u64 + survivors),
             ("zone", 2 * survivors),
@@ -61,7 +57,8 @@ impl Counters {
             ("columns_depths", survivors + 2 * tiles),
             ("columns_touch", 3 * tiles),
             ("columns_pixels", 0),
-            ("mark", survivors + normal + splats + pixels),
+            ("normals", survivors + entries + normals),
+            ("mark", survivors + normals + splats + pixels),
             ("alloc", 2 * pixels),
             ("splat", splats + fragments),
             ("sweep", fragments + splats + layers + pixels),
