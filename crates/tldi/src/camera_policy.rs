@@ -59,6 +59,14 @@ const HINT_WEIGHT: f32 = 0.5;
 /// Least share of that weight.
 const LEAST_PLAIN: f32 = 0.2;
 
+/// Share of its half extent by which the middle of the smaller surface is plainly on one side of the
+/// other.
+const PLAINLY: f32 = 0.5;
+
+/// Cosine between a motion and an axis from which on the motion tells from which side `b` came. One
+/// that passes along the surface more than it crosses it does not: a slope may lean either way.
+const CROSSING: f32 = 0.5;
+
 /// Weight of the last axis beside the normals of a surface.
 const MEMORY_WEIGHT: f32 = 0.5;
 
@@ -78,18 +86,45 @@ pub(crate) struct Approach {
     /// metres.
     half_extents: Vec3,
     /// From where the bounds meet to where `b` lies, metres.
-    toward_b: Vec3,
+    lies: Vec3,
+    /// Of `b` over the step, metres.
+    motion: Vec3,
+    /// The smaller surface at the larger one, if that is a sheet.
+    body: Option<Body>,
     /// The main axis of the frame before.
     last_axis: Option<Vec3>,
 }
 
+/// The smaller surface of a pair, taken for a body.
+struct Body {
+    /// From the mean of the near points of the larger surface to the middle of this one, as if that
+    /// were `a`: towards `b`, metres.
+    toward_b: Vec3,
+    /// Half the extents of its bounds, in its own frame, metres.
+    half_extents: Vec3,
+    /// From the frame of `a` into its own.
+    from_a: Quat,
+}
+
+impl Body {
+    /// Whether `b`, off by `offset`, is plainly on the side of `a` that `axis` points away from, or
+    /// on the other.
+    fn side(&self, axis: Vec3, offset: Vec3) -> Option<bool> {
+        let along = axis.dot(self.toward_b + offset);
+        let half = self.half_extents.dot((self.from_a * axis).abs());
+        (along.abs() > PLAINLY * half).then_some(along < 0.0)
+    }
+}
+
 impl Approach {
-    /// `motion` is that of `b` relative to `a` over the step, in the frame of `a`, metres.
+    /// `motion` is that of `b` relative to `a` over the step, and `near` are the means of the near
+    /// points of both where they may be sheets, in the frame of `a`, metres.
     pub(crate) fn new(
         a: &Aabb,
         b: &Aabb,
         a_from_b: &Pose3,
         motion: Vec3,
+        near: [Option<Vec3>; 2],
         last_axis: Option<Vec3>,
     ) -> Self {
         // A small body on a large scan lies on the side of its own middle. In the frame of the
@@ -100,26 +135,43 @@ impl Approach {
             let half_extents = 0.5 * (high - low).abs();
             (smaller.center() - 0.5 * (low + high), half_extents)
         };
-        let (toward_b, half_extents, larger_from_a) = if size(b) <= size(a) {
+        let b_from_a = a_from_b.inverse();
+        let (toward_b, half_extents, larger_from_a, body) = if size(b) <= size(a) {
             let (toward_b, half_extents) = meeting(a, &b.transformed(a_from_b));
-            (toward_b, half_extents, Quat::IDENTITY)
+            let body = near[0].map(|near| Body {
+                toward_b: *a_from_b * b.center() - near,
+                half_extents: 0.5 * b.extents(),
+                from_a: b_from_a.rotation,
+            });
+            (toward_b, half_extents, Quat::IDENTITY, body)
         } else {
-            let b_from_a = a_from_b.inverse();
             let (toward_a, half_extents) = meeting(b, &a.transformed(&b_from_a));
             let toward_b = a_from_b.rotation * -toward_a;
-            (toward_b, half_extents, b_from_a.rotation)
+            let body = near[1].map(|near| Body {
+                toward_b: near - a.center(),
+                half_extents: 0.5 * a.extents(),
+                from_a: Quat::IDENTITY,
+            });
+            (toward_b, half_extents, b_from_a.rotation, body)
         };
         Self {
             larger_from_a,
             half_extents,
-            toward_b: toward_b - motion,
+            lies: toward_b,
+            motion,
+            body,
             last_axis,
         }
     }
 
+    /// From where the bounds meet to where `b` lies or comes from, metres.
+    fn toward_b(&self) -> Vec3 {
+        self.lies - self.motion
+    }
+
     /// From `a` towards `b`, unit length or zero.
     fn direction(&self) -> Vec3 {
-        self.toward_b.normalize_or_zero()
+        self.toward_b().normalize_or_zero()
     }
 
     /// Half of where the bounds meet, along `axis`, metres.
@@ -131,14 +183,31 @@ impl Approach {
     /// enough to decide between walls that are alike.
     fn plainness(&self) -> f32 {
         let inside = self.half_extent(self.direction()).max(f32::MIN_POSITIVE);
-        (self.toward_b.length() / inside).clamp(LEAST_PLAIN, 1.0)
+        (self.toward_b().length() / inside).clamp(LEAST_PLAIN, 1.0)
     }
 
     /// Whether `b` lies on the side of `a` that `axis` points away from, so surely that nothing else
-    /// needs to be asked: its middle, or where it came from, is outside of where the bounds meet.
+    /// needs to be asked: its middle, or where it came from, is plainly off the points of `a` that
+    /// are near, or else outside of where the bounds meet.
     fn side_by_position(&self, axis: Vec3) -> Option<bool> {
-        let along = self.toward_b.dot(axis);
-        (along.abs() > self.half_extent(axis)).then_some(along < 0.0)
+        let side = |from: Vec3| match &self.body {
+            Some(body) => body.side(axis, from),
+            None => {
+                let along = (self.lies + from).dot(axis);
+                (along.abs() > self.half_extent(axis)).then_some(along < 0.0)
+            }
+        };
+        let crosses = self.motion.dot(axis).abs() >= CROSSING * self.motion.length();
+        let before = side(-self.motion).filter(|_| crosses);
+        before.or_else(|| side(Vec3::ZERO))
+    }
+
+    /// Whether `b` is plainly not on the side that is remembered, nor comes from there.
+    fn contradicts(&self, remembered: bool, axis: Vec3) -> bool {
+        self.body.as_ref().is_some_and(|body| {
+            body.side(axis, Vec3::ZERO) == Some(!remembered)
+                && body.side(axis, -self.motion) != Some(remembered)
+        })
     }
 }
 
@@ -153,7 +222,7 @@ pub(crate) fn aim(
     axes.clear();
     let single = match policy {
         CameraPolicy::ContactZone => None,
-        CameraPolicy::Motion => Some(-approach.toward_b),
+        CameraPolicy::Motion => Some(-approach.toward_b()),
         CameraPolicy::Covariance => top_eigenvector(&zone_covariance(&sides, &Some)),
         CameraPolicy::SmallestExtent => {
             Some([Vec3::X, Vec3::Y, Vec3::Z][approach.half_extents.min_position()])
@@ -168,7 +237,7 @@ pub(crate) fn aim(
         None => aim_at_zone(&sides, approach, axes),
     }
     if axes.is_empty() {
-        let fallback = approach.last_axis.unwrap_or(-approach.toward_b);
+        let fallback = approach.last_axis.unwrap_or(-approach.toward_b());
         axes.push(fallback.try_normalize().unwrap_or(Vec3::Z));
     }
 }
@@ -206,7 +275,11 @@ fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec
         {
             axis = last;
         }
-        let (axis, conclusive) = oriented(axis, sides, approach);
+        let (mut axis, conclusive) = oriented(axis, sides, approach);
+        if let Some(last) = approach.last_axis.filter(|_| views == 0 && !conclusive) {
+            // A body half way through a rough sheet seems to be beside its rim.
+            axis = oriented(last, sides, approach).0;
+        }
         if views > 0 && !conclusive {
             // A guess at the side would turn a gap into a penetration.
             break;
@@ -225,7 +298,8 @@ fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec
 /// of what is deep in it.
 fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3, bool) {
     let conclusive = |sign: f32| (sign.abs() >= CONCLUSIVE).then_some(sign > 0.0);
-    let by_memory = conclusive(approach.last_axis.map_or(0.0, |last| axis.dot(last)));
+    let by_memory = conclusive(approach.last_axis.map_or(0.0, |last| axis.dot(last)))
+        .filter(|&remembered| !approach.contradicts(remembered, axis));
     let [of_a, of_b] = sides.each_ref().map(|side| mean_along(side, axis));
     let by_both = conclusive(of_b).filter(|_| conclusive(of_b) == conclusive(-of_a));
     let by_position = -axis.dot(approach.direction());
@@ -295,7 +369,9 @@ mod tests {
         Approach {
             larger_from_a: Quat::IDENTITY,
             half_extents: Vec3::ONE,
-            toward_b,
+            lies: toward_b,
+            motion: Vec3::ZERO,
+            body: None,
             last_axis: None,
         }
     }
@@ -382,7 +458,7 @@ mod tests {
         };
         let above = Pose3::translation(0.3, 1.9, 0.0);
         let last = Vec3::new(0.0, -0.6, 0.8);
-        let approach = |motion| Approach::new(&unit, &unit, &above, motion, Some(last));
+        let approach = |motion| Approach::new(&unit, &unit, &above, motion, [None; 2], Some(last));
         let axis = |policy| axes_of(policy, sides, &approach(9.0 * Vec3::X))[0];
         assert_eq!(axis(CameraPolicy::SmallestExtent), -Vec3::Y);
         assert!(axis(CameraPolicy::Covariance).distance(-tilt) < 1e-5);
@@ -412,9 +488,63 @@ mod tests {
             (Vec3::Y, Vec3::Y),
             (Vec3::ZERO, Vec3::Y),
         ] {
-            let approach = Approach::new(&sheet, &body, &half_through, motion, None);
+            let approach = Approach::new(&sheet, &body, &half_through, motion, [None; 2], None);
             assert_eq!(zone_axes(sides, &approach), [axis], "{motion}");
         }
+    }
+
+    /// A body of half a metre at a bare sheet through the origin.
+    fn at_sheet(toward_b: Vec3, motion: Vec3, last_axis: Option<Vec3>) -> Approach {
+        Approach {
+            motion,
+            body: Some(Body {
+                toward_b,
+                half_extents: Vec3::splat(0.5),
+                from_a: Quat::IDENTITY,
+            }),
+            last_axis,
+            ..lying(toward_b)
+        }
+    }
+
+    /// What was remembered gives way where the body plainly lies on the other side, and not where it
+    /// is half through or comes from there.
+    #[test]
+    fn a_memory_that_cannot_be_is_corrected() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        let axis = |y: f32, motion: f32| {
+            let approach = at_sheet(y * Vec3::Y, motion * Vec3::Y, Some(Vec3::Y));
+            zone_axes(sides, &approach)[0]
+        };
+        assert_eq!(axis(0.4, 0.0), -Vec3::Y);
+        assert_eq!(axis(0.2, 0.0), Vec3::Y);
+        assert_eq!(axis(0.4, 2.0), Vec3::Y);
+    }
+
+    /// A motion along a slope does not tell from which side of it a body came.
+    #[test]
+    fn a_fast_body_is_on_the_side_of_a_slope_where_it_lies() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        // 3 m along the slope, and away from it by more than the body is wide.
+        let along = Vec3::new(3.0, 1.2, 0.0);
+        let approach = at_sheet(0.4 * Vec3::Y, along, None);
+        assert!(zone_axes(sides, &approach)[0].y < -0.9);
+        let across = Vec3::new(1.2, 3.0, 0.0);
+        let approach = at_sheet(0.4 * Vec3::Y, across, None);
+        assert!(zone_axes(sides, &approach)[0].y > 0.9);
+    }
+
+    /// Half way through a rough sheet the normals of a ball's rim make an axis along the sheet, to
+    /// which nothing gives a sign: the last one is better.
+    #[test]
+    fn an_axis_without_a_sign_gives_way_to_the_last_one() {
+        let normals = [vec![Vec3::X; 10], vec![Vec3::Y; 2]].concat();
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        let last = -Vec3::Y;
+        let approach = at_sheet(Vec3::ZERO, Vec3::ZERO, Some(last));
+        assert_eq!(zone_axes(sides, &approach)[0], last);
     }
 
     #[test]

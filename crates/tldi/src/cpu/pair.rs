@@ -65,8 +65,18 @@ impl Scratch {
                 last_axis,
             } => {
                 let (bounds_a, bounds_b) = (query.a.bounds(), query.b.bounds());
-                let approach =
-                    Approach::new(&bounds_a, &bounds_b, &query.a_from_b, motion, last_axis);
+                let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| {
+                    let is_cloud = matches!(surface, Surface::Cloud(_));
+                    (is_cloud && !is_oriented(&surface)).then(|| side.mean_of_near())
+                });
+                let approach = Approach::new(
+                    &bounds_a,
+                    &bounds_b,
+                    &query.a_from_b,
+                    motion,
+                    near,
+                    last_axis,
+                );
                 aim(
                     policy,
                     self.zone_normals(query),

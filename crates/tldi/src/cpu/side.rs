@@ -85,6 +85,12 @@ impl Side {
         );
     }
 
+    /// Mean of the cloud's near points, of which there are some, in the frame of the query, metres.
+    pub(super) fn mean_of_near(&self) -> Vec3 {
+        let near = self.near.iter().map(|&i| self.points.point(i as usize));
+        near.sum::<Vec3>() / self.near.len() as f32
+    }
+
     /// Samples the culled points near an exact surface; its normals at the nearest points go to
     /// `surface_normals`. `false` where none is near.
     pub(super) fn near_exact(
