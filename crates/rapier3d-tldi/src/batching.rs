@@ -61,6 +61,7 @@ impl<'a> Frame<'a> {
             PairKey::new(shape1, shape2, &pos12),
             PreparedPair {
                 colliders,
+                rotation1: pose1.rotation,
                 prediction,
                 parts: first_part..batch.parts.len(),
                 used: AtomicBool::new(false),
@@ -88,11 +89,13 @@ impl<'a> Frame<'a> {
             sides,
             |parts, part1, middle| {
                 let world_from_a = part1.map_or(*pose1, |part1| *pose1 * *part1);
+                let a_from_world = world_from_a.rotation.inverse();
                 let middle = world_from_a * middle;
                 let motion = self.motion(collider2, middle) - self.motion(collider1, middle);
+                let last_axis = self.memory.axis(colliders, parts);
                 Hint {
-                    motion: world_from_a.rotation.inverse() * motion,
-                    last_axis: self.memory.axis(colliders, parts),
+                    motion: a_from_world * motion,
+                    last_axis: last_axis.map(|axis| a_from_world * axis),
                 }
             },
         );
@@ -125,13 +128,13 @@ fn pair_id(colliders: [ColliderHandle; 2]) -> PairId {
 type PartsId = (PairId, [u32; 2]);
 
 /// Steps without contact for which the axis of the last one is remembered: a body that hops, or of
-/// which noise hides the contact, is on the side where it was. Longer, and it may have turned.
+/// which noise hides the contact, is on the side where it was. Longer, and it may be elsewhere.
 const MOST_LOST: u32 = 6;
 
 /// Main view axis of the last contact of two parts.
 #[derive(Clone, Copy)]
 struct LastAxis {
-    /// Unit vector in the frame of the first part as it was then.
+    /// Unit vector in world space: bodies that roll turn under their contacts.
     axis: Vector,
     /// Steps without contact since.
     lost_for: u32,
@@ -204,7 +207,13 @@ impl PairMemory {
                 let key = (id, part.parts);
                 // An axis without contact may be that of the few points that came near first.
                 let axis = match result.contacts.is_empty() {
-                    false => (result.axes.first()).map(|&axis| LastAxis { axis, lost_for: 0 }),
+                    false => result.axes.first().map(|&axis| {
+                        let in_collider = part.poses[0].map_or(axis, |pose| pose.rotation * axis);
+                        LastAxis {
+                            axis: pair.rotation1 * in_collider,
+                            lost_for: 0,
+                        }
+                    }),
                     true => axis_of(&self.older_axes, key).and_then(LastAxis::lost),
                 };
                 self.axes.extend(axis.map(|axis| (key, axis)));
@@ -239,6 +248,8 @@ mod tests {
         let shape: rapier3d::geometry::SharedShape =
             rapier3d::geometry::SharedShape::new(PointCloudShape::new(cloud));
         let colliders = [1, 2].map(|index| ColliderHandle::from_raw_parts(index, 0));
+        // A quarter turn about z: from x in the collider to y in the world.
+        let turned = Pose::rotation(0.5 * std::f32::consts::PI * Vector::Z);
         let mut memory = PairMemory::default();
         let mut remembered = |axis: Vector, contacts: Vec<ContactPixel>| {
             let pair = ShapePair {
@@ -259,6 +270,7 @@ mod tests {
             });
             let prepared = PreparedPair {
                 colliders,
+                rotation1: turned.rotation,
                 prediction: pair.prediction,
                 parts: 0..1,
                 used: AtomicBool::new(true),
@@ -283,9 +295,10 @@ mod tests {
             normal_b: -Vector::Y,
             gap: 0.0,
         };
-        assert_eq!(remembered(Vector::Y, vec![touching]), Some(Vector::Y));
+        let axis = remembered(Vector::X, vec![touching]);
+        assert!(axis.is_some_and(|axis| axis.distance(Vector::Y) < 1e-6));
         for _ in 0..MOST_LOST {
-            assert_eq!(remembered(Vector::Z, vec![]), Some(Vector::Y));
+            assert_eq!(remembered(Vector::Z, vec![]), axis);
         }
         assert_eq!(remembered(Vector::Z, vec![]), None);
     }
