@@ -23,6 +23,8 @@ var<workgroup> axis: vec3f;
 var<workgroup> is_done: bool;
 // No normals: the axis is what it is.
 var<workgroup> is_forced: bool;
+// The last axis is asked about in place of the proposed one.
+var<workgroup> is_again: bool;
 var<workgroup> view_count: u32;
 var<workgroup> seen: array<vec3f, 3>;
 
@@ -90,26 +92,69 @@ fn conclusive(sign: f32) -> i32 {
     return select(0, select(-1, 1, sign > 0.0), abs(sign) >= CONCLUSIVE);
 }
 
-// Whether the axis points from `b` towards `a`, and not the other way: 1 or -1; twice that where
-// something told.
-fn orientation(pair: u32) -> i32 {
-    var by_memory = 0;
-    if pairs[pair].has_last != 0u {
-        by_memory = conclusive(dot(axis, pairs[pair].last_axis));
+// Mean of the near points of the larger surface, if that may be a sheet; w is 1 then.
+fn sheet_of(pair: u32) -> vec4f {
+    let side = 2u * pair + (1u - pairs[pair].body_is_b);
+    if (sides[side].flags & ORIENTED) != 0u {
+        return vec4f();
     }
-    let of_a = mean_along(pair, 0u);
-    let of_b = mean_along(pair, 1u);
-    let by_both = select(0, conclusive(of_b), conclusive(of_b) == conclusive(-of_a));
-    let toward_b = pairs[pair].toward_b;
+    let state = batch.sides_at + side * SIDE_WORDS;
+    let low = pairs[pair].overlap_min;
+    let extents = pairs[pair].overlap_max - low;
+    let count = f32(max(atomicLoad(&work[state + NEAR_COUNT]), 1u));
+    var mean = vec3f();
+    for (var k = 0u; k < 3u; k++) {
+        let upper = f32(atomicLoad(&work[state + NEAR_HIGH + k]));
+        let lower = f32(atomicLoad(&work[state + NEAR_LOW + k]));
+        mean[k] = (upper * 65536.0 + lower) / count / PLACE_STEPS;
+    }
+    return vec4f(low + mean * extents, 1.0);
+}
+
+// Whether `b`, off by `offset`, is plainly on the side of `a` that the axis points away from (1), or
+// on the other (-1): by where it lies at the sheet, or by where the bounds meet.
+fn side_of(pair: u32, sheet: vec4f, offset: vec3f) -> i32 {
+    var along = dot(pairs[pair].lies + offset, axis);
     let in_larger = vec3f(
         dot(pairs[pair].larger_from_a_x, axis),
         dot(pairs[pair].larger_from_a_y, axis),
         dot(pairs[pair].larger_from_a_z, axis),
     );
-    let along = dot(toward_b, axis);
-    let half_extent = dot(pairs[pair].half_extents, abs(in_larger));
-    let by_place = select(0, select(-1, 1, along < 0.0), abs(along) > half_extent);
-    let by_position = -dot(axis, unit_or(toward_b, vec3f()));
+    var most = dot(pairs[pair].half_extents, abs(in_larger));
+    if sheet.w > 0.0 {
+        let toward_body = pairs[pair].body_middle - sheet.xyz;
+        let toward_b = select(-toward_body, toward_body, pairs[pair].body_is_b != 0u);
+        let in_body = vec3f(
+            dot(pairs[pair].body_from_a_x, axis),
+            dot(pairs[pair].body_from_a_y, axis),
+            dot(pairs[pair].body_from_a_z, axis),
+        );
+        along = dot(toward_b + offset, axis);
+        most = PLAINLY * dot(pairs[pair].body_half_extents, abs(in_body));
+    }
+    return select(0, select(-1, 1, along < 0.0), abs(along) > most);
+}
+
+// Whether the axis points from `b` towards `a`, and not the other way: 1 or -1; twice that where
+// something told.
+fn orientation(pair: u32) -> i32 {
+    let sheet = sheet_of(pair);
+    let motion = pairs[pair].motion;
+    let now = side_of(pair, sheet, vec3f());
+    let before = side_of(pair, sheet, -motion);
+    var by_memory = 0;
+    if pairs[pair].has_last != 0u {
+        by_memory = conclusive(dot(axis, pairs[pair].last_axis));
+    }
+    // What was remembered may plainly not be.
+    let contradicted = sheet.w > 0.0 && now == -by_memory && before != by_memory;
+    by_memory = select(by_memory, 0, contradicted);
+    let of_a = mean_along(pair, 0u);
+    let of_b = mean_along(pair, 1u);
+    let by_both = select(0, conclusive(of_b), conclusive(of_b) == conclusive(-of_a));
+    let is_crossing = abs(dot(motion, axis)) >= CROSSING * length(motion);
+    let by_place = select(now, before, is_crossing && before != 0);
+    let by_position = -dot(axis, unit_or(pairs[pair].toward_b, vec3f()));
     var told = by_memory;
     told = select(by_both, told, told != 0);
     told = select(by_place, told, told != 0);
@@ -192,6 +237,13 @@ fn decide(pair: u32, turn: u32) {
     if policy != FIXED_VIEW && !is_forced {
         told = orientation(pair);
     }
+    if turn == 0u && is_zone && abs(told) < 2 && pairs[pair].has_last != 0u && !is_again {
+        // A body half way through a rough sheet seems to be beside its rim.
+        axis = pairs[pair].last_axis;
+        is_again = true;
+        return;
+    }
+    is_again = false;
     if turn > 0u && abs(told) < 2 {
         // A guess at the side would turn a gap into a penetration.
         is_done = true;
@@ -253,6 +305,7 @@ fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lan
         let near_b = atomicLoad(&work[batch.sides_at + (2u * pair + 1u) * SIDE_WORDS + NEAR_COUNT]);
         is_done = near_a == 0u || near_b == 0u || group_index(group) >= batch.pairs;
         is_forced = false;
+        is_again = false;
         view_count = 0u;
     }
     for (var turn = 0u; turn < MAX_VIEWS; turn++) {
@@ -262,8 +315,6 @@ fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lan
         }
         if lane < 2u {
             atomicStore(&unseen_count[lane], 0u);
-            atomicStore(&facing_count[lane], 0u);
-            atomicStore(&facing_sum[lane], 0);
         }
         workgroupBarrier();
         if !is_done {
@@ -289,23 +340,31 @@ fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lan
         if lane == 0u && !is_done {
             propose(pair, turn);
         }
-        workgroupBarrier();
-        if !is_done {
-            for (var s = 0u; s < 2u; s++) {
-                let side = 2u * pair + s;
-                let count = sample_count(side);
-                for (var k = lane; k < count; k += LANES) {
-                    let along = dot(samples[side * SAMPLE_SLOTS + k].xyz, axis);
-                    if abs(along) >= SUPPORTED {
-                        atomicAdd(&facing_count[s], 1u);
-                        atomicAdd(&facing_sum[s], i32(round(along * STEPS)));
+        for (var attempt = 0u; attempt < 2u; attempt++) {
+            workgroupBarrier();
+            let is_asked = !is_done && (attempt == 0u || is_again);
+            if lane < 2u {
+                atomicStore(&facing_count[lane], 0u);
+                atomicStore(&facing_sum[lane], 0);
+            }
+            workgroupBarrier();
+            if is_asked {
+                for (var s = 0u; s < 2u; s++) {
+                    let side = 2u * pair + s;
+                    let count = sample_count(side);
+                    for (var k = lane; k < count; k += LANES) {
+                        let along = dot(samples[side * SAMPLE_SLOTS + k].xyz, axis);
+                        if abs(along) >= SUPPORTED {
+                            atomicAdd(&facing_count[s], 1u);
+                            atomicAdd(&facing_sum[s], i32(round(along * STEPS)));
+                        }
                     }
                 }
             }
-        }
-        workgroupBarrier();
-        if lane == 0u && !is_done {
-            decide(pair, turn);
+            workgroupBarrier();
+            if lane == 0u && is_asked {
+                decide(pair, turn);
+            }
         }
     }
 }

@@ -22,6 +22,8 @@ override CONCLUSIVE: f32;
 override HINT_WEIGHT: f32;
 override MEMORY_WEIGHT: f32;
 override AXIS_HYSTERESIS: f32;
+override PLAINLY: f32;
+override CROSSING: f32;
 
 const GROUP: u32 = 256u;
 // Workgroups along x; the rest goes along y.
@@ -97,6 +99,20 @@ struct Pair {
     has_last: u32,
     last_axis: vec3f,
     merge_steps: u32,
+    lies: vec3f,
+    body_is_b: u32,
+    motion: vec3f,
+    padding_a: u32,
+    body_middle: vec3f,
+    padding_b: u32,
+    body_half_extents: vec3f,
+    padding_c: u32,
+    body_from_a_x: vec3f,
+    padding_d: u32,
+    body_from_a_y: vec3f,
+    padding_e: u32,
+    body_from_a_z: vec3f,
+    padding_f: u32,
     view_x: vec4f,
     view_y: vec4f,
     view_z: vec4f,
@@ -226,12 +242,15 @@ const CONTACTS: u32 = 6u;
 const ENTRIES: u32 = 7u;
 
 // Words of a side in the arena.
-const SIDE_WORDS: u32 = 8u;
+const SIDE_WORDS: u32 = 16u;
 const KEPT_COUNT: u32 = 0u;
 const NEAR_COUNT: u32 = 1u;
 const RADIUS_LOW: u32 = 2u;
 const RADIUS_HIGH: u32 = 3u;
 const SAMPLE_COUNT: u32 = 4u;
+// Σ of the near points' places in the overlap, lower and upper halves, for each axis.
+const NEAR_LOW: u32 = 5u;
+const NEAR_HIGH: u32 = 8u;
 
 // Words of a view in the arena: greatest and least coordinates of what is seen of each side, as
 // ordered numbers (the least ones negated), and the touching tiles' bounds likewise.
@@ -240,6 +259,9 @@ const TOUCHED: u32 = 12u;
 
 // Steps of the sum of radii, in shares of the largest: 2^20.
 const RADIUS_STEPS: f32 = 1048576.0;
+
+// Steps of a place in the overlap, in shares of its extent.
+const PLACE_STEPS: f32 = 65535.0;
 
 // Words of a pair in what is read back, and of a contact.
 const PAIR_WORDS: u32 = 16u;

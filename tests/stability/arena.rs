@@ -230,23 +230,27 @@ impl Arena {
     fn write_trace(&self) {
         for (handle, body) in self.world.bodies.iter().filter(|(_, b)| b.is_dynamic()) {
             let mut contacts = 0;
-            let mut deepest = f32::INFINITY;
+            let mut deepest = (Vector::ZERO, f32::INFINITY);
             for collider in body.colliders() {
                 let of_body = Placed {
                     body: handle,
                     collider: *collider,
                 };
-                for (_, distance) in self.contacts(&of_body) {
+                for (normal, distance) in self.contacts(&of_body) {
                     contacts += 1;
-                    deepest = deepest.min(distance);
+                    if distance < deepest.1 {
+                        deepest = (normal, distance);
+                    }
                 }
             }
             let (index, _) = handle.into_raw_parts();
             let [p, v, w] = [body.translation(), body.linvel(), body.angvel()];
             let up = *body.rotation() * Vector::Y;
             eprintln!(
-                "step {:4} body {index}: at {p:.5} up {up:.4} v {v:.4} w {w:.3} contacts {contacts} deepest {deepest:.5}{}",
+                "step {:4} body {index}: at {p:.5} up {up:.4} v {v:.4} w {w:.3} contacts {contacts} deepest {:.5} n {:.2}{}",
                 self.steps,
+                deepest.1,
+                deepest.0,
                 if body.is_sleeping() { " asleep" } else { "" },
             );
         }

@@ -51,10 +51,6 @@ const UNEVEN_GAPS: &str = "The gaps of one flat contact differ by up to 0.2 r̄ 
                            and so do the times at which its points touch.";
 const RESAMPLED: &str =
     "New samples bring new gaps in every frame, which push although nothing moved.";
-const NO_VELOCITY: &str = "A wall that is sampled anew has no velocity, and rapier closes \
-                           penetrations by 3 m/s at most.";
-const LATE_VELOCITY: &str = "In the first frame of contact the deforming wall pushes with a part of \
-                             its velocity only; the body is then deeper than rapier can close.";
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
                          mean depth.";
 const WRONG_SIDE: &str = "Rarely, the side on which a body is of a noisy sheet without normals is \
@@ -84,18 +80,6 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known("thin-sheet", "ball on each of two sheets, bare", ONE_LAYER),
     known("tunnelling", "scan", WRONG_SIDE).no_worse_than("passed_share", 0.04),
     known("tunnelling", "waves", STANDING_SWEEP).no_worse_than("passed_share", 0.06),
-    known(
-        "moving-cloud",
-        "kinematic wall, ball, 5 m/s",
-        "The sweep stops the ball in contact with the wall that pushes it in some frames, and the \
-         wall overtakes it.",
-    ),
-    known("moving-cloud", "deforming wall, box, 5 m/s", LATE_VELOCITY),
-    known("moving-cloud", "deforming wall, ball, 5 m/s", LATE_VELOCITY),
-    known("moving-cloud", "streamed wall, box, 2 m/s", NO_VELOCITY),
-    known("moving-cloud", "streamed wall, box, 5 m/s", NO_VELOCITY),
-    known("moving-cloud", "streamed wall, ball, 2 m/s", NO_VELOCITY),
-    known("moving-cloud", "streamed wall, ball, 5 m/s", NO_VELOCITY),
     known(
         "density",
         "1 % flying pixels",

@@ -61,6 +61,7 @@ impl<'a> Frame<'a> {
             PairKey::new(shape1, shape2, &pos12),
             PreparedPair {
                 colliders,
+                rotation1: pose1.rotation,
                 prediction,
                 parts: first_part..batch.parts.len(),
                 used: AtomicBool::new(false),
@@ -88,11 +89,13 @@ impl<'a> Frame<'a> {
             sides,
             |parts, part1, middle| {
                 let world_from_a = part1.map_or(*pose1, |part1| *pose1 * *part1);
+                let a_from_world = world_from_a.rotation.inverse();
                 let middle = world_from_a * middle;
                 let motion = self.motion(collider2, middle) - self.motion(collider1, middle);
+                let last_axis = self.memory.axis(colliders, parts);
                 Hint {
-                    motion: world_from_a.rotation.inverse() * motion,
-                    last_axis: self.memory.axis(colliders, parts),
+                    motion: a_from_world * motion,
+                    last_axis: last_axis.map(|axis| a_from_world * axis),
                 }
             },
         );
@@ -121,22 +124,48 @@ fn pair_id(colliders: [ColliderHandle; 2]) -> PairId {
     colliders.map(|handle| handle.into_raw_parts())
 }
 
+/// Colliders and parts of a comparison.
+type PartsId = (PairId, [u32; 2]);
+
+/// Steps without contact for which the axis of the last one is remembered: a body that hops, or of
+/// which noise hides the contact, is on the side where it was. Longer, and it may be elsewhere.
+const MOST_LOST: u32 = 6;
+
+/// Main view axis of the last contact of two parts.
+#[derive(Clone, Copy)]
+struct LastAxis {
+    /// Unit vector in world space: bodies that roll turn under their contacts.
+    axis: Vector,
+    /// Steps without contact since.
+    lost_for: u32,
+}
+
+impl LastAxis {
+    fn lost(self) -> Option<Self> {
+        let lost_for = self.lost_for + 1;
+        (lost_for <= MOST_LOST).then_some(Self { lost_for, ..self })
+    }
+}
+
+fn axis_of(axes: &[(PartsId, LastAxis)], key: PartsId) -> Option<LastAxis> {
+    let at = axes.binary_search_by_key(&key, |(key, _)| *key).ok()?;
+    Some(axes[at].1)
+}
+
 /// What is remembered about pairs from step to step, until they separate. All in ascending order.
 #[derive(Default)]
 pub(crate) struct PairMemory {
-    /// Main view axis of each comparison, by colliders and parts.
-    axes: Vec<((PairId, [u32; 2]), Vector)>,
+    /// Of each comparison, by colliders and parts.
+    axes: Vec<(PartsId, LastAxis)>,
     /// The measurements that rapier's manifolds are from.
     measured: Vec<(PairId, Measured)>,
-    older_axes: Vec<((PairId, [u32; 2]), Vector)>,
+    older_axes: Vec<(PartsId, LastAxis)>,
     older_measured: Vec<(PairId, Measured)>,
 }
 
 impl PairMemory {
     fn axis(&self, colliders: [ColliderHandle; 2], parts: [u32; 2]) -> Option<Vector> {
-        let key = (pair_id(colliders), parts);
-        let at = self.axes.binary_search_by_key(&key, |(key, _)| *key).ok()?;
-        Some(self.axes[at].1)
+        axis_of(&self.axes, (pair_id(colliders), parts)).map(|last| last.axis)
     }
 
     fn measured(&self, colliders: [ColliderHandle; 2]) -> Option<Measured> {
@@ -171,13 +200,23 @@ impl PairMemory {
                 continue;
             }
             for part in &batch.parts[pair.parts.clone()] {
-                let axes = part
-                    .comparison
-                    .as_ref()
-                    .map(|comparison| &batch.results[comparison.query].axes);
-                if let Some(axis) = axes.and_then(|axes| axes.first()) {
-                    self.axes.push(((id, part.parts), *axis));
-                }
+                let Some(comparison) = &part.comparison else {
+                    continue;
+                };
+                let result = &batch.results[comparison.query];
+                let key = (id, part.parts);
+                // An axis without contact may be that of the few points that came near first.
+                let axis = match result.contacts.is_empty() {
+                    false => result.axes.first().map(|&axis| {
+                        let in_collider = part.poses[0].map_or(axis, |pose| pose.rotation * axis);
+                        LastAxis {
+                            axis: pair.rotation1 * in_collider,
+                            lost_for: 0,
+                        }
+                    }),
+                    true => axis_of(&self.older_axes, key).and_then(LastAxis::lost),
+                };
+                self.axes.extend(axis.map(|axis| (key, axis)));
             }
         }
         self.axes.sort_unstable_by_key(|(key, _)| *key);
@@ -190,5 +229,77 @@ impl PairMemory {
             .iter()
             .take_while(|((key, _), _)| *key == id);
         self.axes.extend(kept);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PointCloudShape;
+    use tldi::{ContactPixel, PairResult, PointCloud};
+
+    /// The axis of points that came near without touching says nothing of the side of a body.
+    #[test]
+    fn axes_are_remembered_of_contacts() {
+        let points: Vec<Vector> = (0..64)
+            .map(|k| 0.1 * Vector::new((k % 8) as f32, 0.0, (k / 8) as f32))
+            .collect();
+        let cloud = PointCloud::builder(points).radius(0.1).build().unwrap();
+        let shape: rapier3d::geometry::SharedShape =
+            rapier3d::geometry::SharedShape::new(PointCloudShape::new(cloud));
+        let colliders = [1, 2].map(|index| ColliderHandle::from_raw_parts(index, 0));
+        // A quarter turn about z: from x in the collider to y in the world.
+        let turned = Pose::rotation(0.5 * std::f32::consts::PI * Vector::Z);
+        let mut memory = PairMemory::default();
+        let mut remembered = |axis: Vector, contacts: Vec<ContactPixel>| {
+            let pair = ShapePair {
+                shape1: &*shape.0,
+                shape2: &*shape.0,
+                pos12: Pose::IDENTITY,
+                prediction: 0.1,
+            };
+            let mut batch = Batch::default();
+            let hint = |_, _: Option<&Pose>, _| Hint::default();
+            let mut sides = Vec::new();
+            let config = TldiConfig::default();
+            append_part_pairs(pair, &config, &mut batch.parts, &mut sides, hint);
+            batch.results.push(PairResult {
+                axes: vec![axis],
+                contacts,
+                ..PairResult::default()
+            });
+            let prepared = PreparedPair {
+                colliders,
+                rotation1: turned.rotation,
+                prediction: pair.prediction,
+                parts: 0..1,
+                used: AtomicBool::new(true),
+                is_kept: false,
+                measured: None,
+                _shapes: [shape.clone(), shape.clone()],
+            };
+            batch.push(
+                PairKey::new(pair.shape1, pair.shape2, &pair.pos12),
+                prepared,
+            );
+            memory.update(&[], &batch);
+            memory.axis(colliders, [0, 0])
+        };
+        assert_eq!(remembered(Vector::Z, vec![]), None);
+        let touching = ContactPixel {
+            pixel: [0, 0],
+            view: 0,
+            point_a: Vector::ZERO,
+            point_b: Vector::ZERO,
+            normal_a: Vector::Y,
+            normal_b: -Vector::Y,
+            gap: 0.0,
+        };
+        let axis = remembered(Vector::X, vec![touching]);
+        assert!(axis.is_some_and(|axis| axis.distance(Vector::Y) < 1e-6));
+        for _ in 0..MOST_LOST {
+            assert_eq!(remembered(Vector::Z, vec![]), axis);
+        }
+        assert_eq!(remembered(Vector::Z, vec![]), None);
     }
 }

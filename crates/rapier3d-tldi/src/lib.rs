@@ -67,9 +67,11 @@ pub mod prelude;
 mod prepared;
 mod queries;
 mod report;
+mod sampled_motion;
 mod shape;
 mod shape_casts;
 mod surface_motion;
+mod surface_push;
 
 pub use collider::cloud_collider;
 pub use config::TldiConfig;

@@ -5,7 +5,7 @@ use crate::TldiConfig;
 use crate::measured::{Measured, rolls};
 use crate::parts::{Hint, PartPair, ShapePair, append_part_pairs, append_queries, within_reach};
 use rapier3d::geometry::{ColliderHandle, SharedShape};
-use rapier3d::math::Pose;
+use rapier3d::math::{Pose, Rotation};
 use rapier3d::parry::shape::{Ball, Shape};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -39,6 +39,8 @@ impl PairKey {
 /// A pair of the batch.
 pub(crate) struct PreparedPair {
     pub(crate) colliders: [ColliderHandle; 2],
+    /// Of the first collider in world space.
+    pub(crate) rotation1: Rotation,
     /// Contacts up to this gap were sought, metres.
     pub(crate) prediction: f32,
     /// Its parts, in [`Batch::parts`].

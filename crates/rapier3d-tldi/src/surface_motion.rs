@@ -4,31 +4,54 @@
 //! `tangent_velocity` of the solver contacts, which it treats as a motion of the first body's
 //! surface, along the normal as well. A penetration it undoes at a rate; so that a surface that
 //! comes nearer at some speed does not have to penetrate until that rate keeps up, contacts are
-//! told to be deeper by as much.
+//! told to be deeper by as much. What comes faster than rapier corrects pushes bodies before the step
+//! (`surface_push.rs`). The speed of what is sampled anew is measured (`sampled_motion.rs`).
 
 use crate::PointCloudShape;
+use crate::sampled_motion::{Snapshot, way_along};
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodyHandle};
 use rapier3d::geometry::{ColliderHandle, ColliderSet, SolverFlags};
 use rapier3d::math::Vector;
 use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
 use tldi::PointCloud;
 
-/// Velocities of the points of the clouds that deformed since the last step.
+/// What is known of the motion of the clouds that got other points since the last step.
 #[derive(Default)]
 pub(crate) struct SurfaceMotions {
     motions: Vec<SurfaceMotion>,
+    sampled: Vec<SampledMotion>,
     /// Seconds in which the solver undoes a penetration: between moving bodies, and with one that
     /// does not move.
     undoing: [f32; 2],
+    dt: f32,
+    /// Closing speed in m/s from which on bodies are pushed, or were in this step.
+    least_push: f32,
+    pushed: bool,
     /// Memory of those that were forgotten.
     spare: Vec<Vec<Vector>>,
+    spare_snapshots: Vec<Snapshot>,
 }
 
+/// Of a cloud that deformed.
 struct SurfaceMotion {
     collider: ColliderHandle,
     /// Of each point, in the collider's frame, m/s.
     velocities: Vec<Vector>,
 }
+
+/// Of a cloud that was sampled anew.
+struct SampledMotion {
+    collider: ColliderHandle,
+    /// Its points before that, and, if it was sampled anew in the step before as well, those that it
+    /// had before that.
+    before: Snapshot,
+    earlier: Option<Snapshot>,
+    /// Since the last step, or in it.
+    is_new: bool,
+}
+
+/// Share of rapier's fastest correction up to which that is left to do it: its contacts rub.
+const LEFT_TO_CORRECTION: f32 = 0.5;
 
 impl SurfaceMotions {
     /// The points that `cloud` has now, in memory to be handed to [`record`](Self::record).
@@ -37,6 +60,14 @@ impl SurfaceMotions {
         points.clear();
         points.extend(cloud.points());
         points
+    }
+
+    /// The points that `cloud` has now, to be handed to
+    /// [`record_sampled`](Self::record_sampled).
+    pub(crate) fn snapshot(&mut self, cloud: &PointCloud<'_>) -> Snapshot {
+        let mut snapshot = self.spare_snapshots.pop().unwrap_or_default();
+        snapshot.take(cloud);
+        snapshot
     }
 
     /// Records that the points `before` moved to those of `cloud` within `dt` seconds.
@@ -57,8 +88,37 @@ impl SurfaceMotions {
         });
     }
 
-    /// The points of this collider are others than before: nothing is known of their motion.
+    /// Records that this collider's surface, sampled by `before`, is sampled anew.
+    pub(crate) fn record_sampled(&mut self, collider: ColliderHandle, before: Snapshot) {
+        self.forget_velocities(collider);
+        match self.sampled.iter_mut().find(|m| m.collider == collider) {
+            // Twice since the last step: what lay before the first time counts.
+            Some(motion) if motion.is_new => self.spare_snapshots.push(before),
+            Some(motion) => {
+                let earlier = std::mem::replace(&mut motion.before, before);
+                self.spare_snapshots.extend(motion.earlier.replace(earlier));
+                motion.is_new = true;
+            }
+            None => self.sampled.push(SampledMotion {
+                collider,
+                before,
+                earlier: None,
+                is_new: true,
+            }),
+        }
+    }
+
+    /// Nothing is known of the motion of this collider's points.
     pub(crate) fn forget(&mut self, collider: ColliderHandle) {
+        self.forget_velocities(collider);
+        if let Some(at) = self.sampled.iter().position(|m| m.collider == collider) {
+            let motion = self.sampled.swap_remove(at);
+            self.spare_snapshots.push(motion.before);
+            self.spare_snapshots.extend(motion.earlier);
+        }
+    }
+
+    fn forget_velocities(&mut self, collider: ColliderHandle) {
         if let Some(at) = self.motions.iter().position(|m| m.collider == collider) {
             self.spare.push(self.motions.swap_remove(at).velocities);
         }
@@ -72,28 +132,69 @@ impl SurfaceMotions {
             integration.static_contact_softness,
         ];
         self.undoing = softness.map(|softness| 1.0 / softness.erp_inv_dt(substep));
+        self.dt = integration.dt;
+        self.least_push = LEFT_TO_CORRECTION * integration.max_corrective_velocity();
+        self.pushed = false;
+    }
+
+    /// Closing speed in m/s from which on bodies are pushed; says that they were.
+    pub(crate) fn begin_push(&mut self) -> f32 {
+        self.pushed = true;
+        self.least_push
     }
 
     /// After a step, surfaces stand still until they are moved again.
     pub(crate) fn clear(&mut self) {
         self.spare
             .extend(self.motions.drain(..).map(|motion| motion.velocities));
+        let stopped = self.sampled.extract_if(.., |motion| !motion.is_new);
+        for motion in stopped {
+            self.spare_snapshots.push(motion.before);
+            self.spare_snapshots.extend(motion.earlier);
+        }
+        for motion in &mut self.sampled {
+            motion.is_new = false;
+        }
+    }
+
+    /// Whether one of these colliders has a motion.
+    pub(crate) fn have(&self, colliders: [ColliderHandle; 2]) -> bool {
+        let deformed = self.motions.iter().map(|motion| motion.collider);
+        let sampled = self.sampled.iter().filter(|motion| motion.is_new);
+        deformed
+            .chain(sampled.map(|motion| motion.collider))
+            .any(|collider| colliders.contains(&collider))
     }
 
     /// Velocity in world space, m/s, of the collider's surface at a point in world space, beside
-    /// that of its body.
-    fn at(&self, collider: ColliderHandle, colliders: &ColliderSet, point: Vector) -> Vector {
-        let motion = self.motions.iter().find(|m| m.collider == collider);
-        let collider = colliders.get(collider);
-        let Some((motion, collider)) = motion.zip(collider) else {
+    /// that of its body; of one that was sampled anew along `normal`, of unit length.
+    pub(crate) fn at(
+        &self,
+        collider: ColliderHandle,
+        colliders: &ColliderSet,
+        point: Vector,
+        normal: Vector,
+    ) -> Vector {
+        let Some(found) = colliders.get(collider) else {
             return Vector::ZERO;
         };
-        let Some(shape) = collider.shape().as_shape::<PointCloudShape>() else {
+        let Some(shape) = found.shape().as_shape::<PointCloudShape>() else {
             return Vector::ZERO;
         };
-        let pose = collider.position();
+        let pose = found.position();
         let local = pose.inverse_transform_point(point);
-        pose.rotation * mean_near(shape.cloud(), &motion.velocities, local)
+        if let Some(motion) = self.motions.iter().find(|m| m.collider == collider) {
+            return pose.rotation * mean_near(shape.cloud(), &motion.velocities, local);
+        }
+        let sampled = self.sampled.iter().find(|m| m.collider == collider);
+        match sampled.and_then(|m| Some([m.earlier.as_ref()?, &m.before])) {
+            Some(old) if self.dt > 0.0 => {
+                let normal_in_cloud = pose.rotation.inverse() * normal;
+                let way = way_along(shape.cloud(), old, local, normal_in_cloud);
+                way / self.dt * normal
+            }
+            _ => Vector::ZERO,
+        }
     }
 }
 
@@ -158,10 +259,14 @@ impl PhysicsHooks for TldiHooks<'_> {
         {
             for contact in rigid.solver_contacts.iter_mut() {
                 // Inside a hook the anchors are in world space.
-                let velocity = self.motions.at(collider1, colliders, contact.anchor1)
-                    - self.motions.at(collider2, colliders, contact.anchor2);
+                let of =
+                    |collider, anchor| self.motions.at(collider, colliders, anchor, *rigid.normal);
+                let velocity = of(collider1, contact.anchor1) - of(collider2, contact.anchor2);
+                let closing = velocity.dot(*rigid.normal).max(0.0);
                 contact.tangent_velocity += velocity;
-                contact.dist -= undoing * velocity.dot(*rigid.normal).max(0.0);
+                if !(self.motions.pushed && closing > self.motions.least_push) {
+                    contact.dist -= undoing * closing;
+                }
             }
         }
         self.inner.modify_solver_contacts(context);

@@ -16,7 +16,7 @@ pub(crate) const SPLAT_BYTES: u64 = 64;
 pub(crate) const LAYER_BYTES: u64 = 32;
 pub(crate) const FRAGMENT_BYTES: u64 = 8;
 pub(crate) const SAMPLE_SLOTS: u64 = 1024;
-pub(crate) const SIDE_WORDS: u32 = 8;
+pub(crate) const SIDE_WORDS: u32 = 16;
 pub(crate) const VIEW_WORDS: u32 = 16;
 pub(crate) const PAIR_WORDS: u32 = 16;
 pub(crate) const CONTACT_WORDS: u32 = 16;
@@ -75,6 +75,15 @@ pub(crate) struct PairData {
     has_last: u32,
     last_axis: [f32; 3],
     merge_steps: u32,
+    lies: [f32; 3],
+    body_is_b: u32,
+    motion: [f32; 3],
+    padding_a: u32,
+    body_middle: [f32; 3],
+    padding_b: u32,
+    body_half_extents: [f32; 3],
+    padding_c: u32,
+    body_from_a: [[f32; 4]; 3],
     view: [[f32; 4]; 3],
     image_size: [u32; 2],
     depth_step: f32,
@@ -88,6 +97,7 @@ impl PairData {
         let row_words = grid.dims[0].div_ceil(32);
         let larger_from_a = rows(&plan.approach.larger_from_a);
         let scale = DepthScale::new(0.0, &query.params);
+        let body = &plan.approach.body;
         let (policy, view_from_frame, image_size) = match query.view {
             View::Fixed(camera) => (FIXED_VIEW, camera.view_from_frame, camera.size),
             View::Aim { policy, .. } => (policy_number(policy), Pose3::IDENTITY, None),
@@ -108,10 +118,19 @@ impl PairData {
             policy,
             half_extents: plan.approach.half_extents.to_array(),
             plainness: plan.approach.plainness(),
-            toward_b: plan.approach.toward_b.to_array(),
+            toward_b: plan.approach.toward_b().to_array(),
             has_last: u32::from(plan.approach.last_axis.is_some()),
             last_axis: plan.approach.last_axis.unwrap_or(Vec3::ZERO).to_array(),
             merge_steps: scale.merge_steps(&query.params),
+            lies: plan.approach.lies.to_array(),
+            body_is_b: u32::from(body.is_b),
+            motion: plan.approach.motion.to_array(),
+            padding_a: 0,
+            body_middle: body.middle.to_array(),
+            padding_b: 0,
+            body_half_extents: body.half_extents.to_array(),
+            padding_c: 0,
+            body_from_a: pose_rows(&Pose3::from_rotation(body.from_a)),
             view: pose_rows(&view_from_frame),
             image_size: image_size.unwrap_or([0, 0]),
             depth_step: scale.step,
@@ -303,7 +322,7 @@ mod tests {
             zone_first zone_first, larger_from_a_y larger_from_a_y, zone_words zone_words,
             larger_from_a_z larger_from_a_z, policy policy, half_extents half_extents,
             plainness plainness, toward_b toward_b, has_last has_last, last_axis last_axis,
-            merge_steps merge_steps, view view_x, image_size image_size,
+            merge_steps merge_steps, lies lies, body_is_b body_is_b, motion motion, body_middle body_middle, body_half_extents body_half_extents, body_from_a body_from_a_x, view view_x, image_size image_size,
             depth_step depth_step, depth_inv_step depth_inv_step,
         ]);
         assert_same_layout!("Side", SideData, [

@@ -59,11 +59,21 @@ const HINT_WEIGHT: f32 = 0.5;
 /// Least share of that weight.
 const LEAST_PLAIN: f32 = 0.2;
 
+/// Share of its half extent by which the middle of the smaller surface is plainly on one side of the
+/// other.
+const PLAINLY: f32 = 0.5;
+
+/// Cosine between a motion and an axis from which on the motion tells from which side `b` came. One
+/// that passes along the surface more than it crosses it does not: a slope may lean either way.
+const CROSSING: f32 = 0.5;
+
 /// Weight of the last axis beside the normals of a surface.
 const MEMORY_WEIGHT: f32 = 0.5;
 
 /// For [`stage_constants`](crate::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 7] = [
+pub(crate) const CONSTANTS: [(&str, f64); 9] = [
+    ("PLAINLY", PLAINLY as f64),
+    ("CROSSING", CROSSING as f64),
     ("WELL_SEEN", WELL_SEEN as f64),
     ("SUPPORTED", SUPPORTED as f64),
     ("LEAST_SHARE", LEAST_SHARE as f64),
@@ -90,9 +100,43 @@ pub struct Approach {
     /// metres.
     pub half_extents: Vec3,
     /// From where the bounds meet to where `b` lies, metres.
-    pub toward_b: Vec3,
+    pub lies: Vec3,
+    /// Of `b` over the step, metres.
+    pub motion: Vec3,
+    /// The smaller surface.
+    pub body: Body,
+    /// Mean of the near points of the larger surface, if that may be a sheet, metres.
+    pub sheet: Option<Vec3>,
     /// The main axis of the frame before.
     pub last_axis: Option<Vec3>,
+}
+
+/// The smaller surface of a pair, taken for a body.
+#[derive(Clone, Copy, Debug)]
+pub struct Body {
+    /// Middle of its bounds, in the frame of `a`, metres.
+    pub middle: Vec3,
+    /// Half the extents of its bounds, in its own frame, metres.
+    pub half_extents: Vec3,
+    /// From the frame of `a` into its own.
+    pub from_a: Quat,
+    /// Whether it is `b`.
+    pub is_b: bool,
+}
+
+impl Body {
+    /// Whether `b`, off by `offset`, is plainly on the side of `a` that `axis` points away from, or
+    /// on the other; `sheet` is the mean of the near points of the larger surface.
+    fn side(&self, sheet: Vec3, axis: Vec3, offset: Vec3) -> Option<bool> {
+        let toward_b = if self.is_b {
+            self.middle - sheet
+        } else {
+            sheet - self.middle
+        };
+        let along = axis.dot(toward_b + offset);
+        let half = self.half_extents.dot((self.from_a * axis).abs());
+        (along.abs() > PLAINLY * half).then_some(along < 0.0)
+    }
 }
 
 impl Approach {
@@ -112,26 +156,53 @@ impl Approach {
             let half_extents = 0.5 * (high - low).abs();
             (smaller.center() - 0.5 * (low + high), half_extents)
         };
-        let (toward_b, half_extents, larger_from_a) = if size(b) <= size(a) {
+        let b_from_a = a_from_b.inverse();
+        let (toward_b, half_extents, larger_from_a, body) = if size(b) <= size(a) {
             let (toward_b, half_extents) = meeting(a, &b.transformed(a_from_b));
-            (toward_b, half_extents, Quat::IDENTITY)
+            let body = Body {
+                middle: *a_from_b * b.center(),
+                half_extents: 0.5 * b.extents(),
+                from_a: b_from_a.rotation,
+                is_b: true,
+            };
+            (toward_b, half_extents, Quat::IDENTITY, body)
         } else {
-            let b_from_a = a_from_b.inverse();
             let (toward_a, half_extents) = meeting(b, &a.transformed(&b_from_a));
             let toward_b = a_from_b.rotation * -toward_a;
-            (toward_b, half_extents, b_from_a.rotation)
+            let body = Body {
+                middle: a.center(),
+                half_extents: 0.5 * a.extents(),
+                from_a: Quat::IDENTITY,
+                is_b: false,
+            };
+            (toward_b, half_extents, b_from_a.rotation, body)
         };
         Self {
             larger_from_a,
             half_extents,
-            toward_b: toward_b - motion,
+            lies: toward_b,
+            motion,
+            body,
+            sheet: None,
             last_axis,
         }
     }
 
+    /// The same with the means of the near points of `a` and of `b`, where they may be sheets.
+    pub(crate) fn at_sheet(self, near: [Option<Vec3>; 2]) -> Self {
+        let [near_a, near_b] = near;
+        let sheet = if self.body.is_b { near_a } else { near_b };
+        Self { sheet, ..self }
+    }
+
+    /// From where the bounds meet to where `b` lies or comes from, metres.
+    pub fn toward_b(&self) -> Vec3 {
+        self.lies - self.motion
+    }
+
     /// From `a` towards `b`, unit length or zero.
     fn direction(&self) -> Vec3 {
-        self.toward_b.normalize_or_zero()
+        self.toward_b().normalize_or_zero()
     }
 
     /// Half of where the bounds meet, along `axis`, metres.
@@ -139,18 +210,35 @@ impl Approach {
         self.half_extents.dot((self.larger_from_a * axis).abs())
     }
 
-    /// Weight of the direction to `b`: 1 where it lies outside of where the bounds meet, or comes from there; less inside, but
-    /// enough to decide between walls that are alike.
+    /// Weight of the direction to `b`: 1 where it lies outside of where the bounds meet, or comes
+    /// from there; less inside, but enough to decide between walls that are alike.
     pub fn plainness(&self) -> f32 {
         let inside = self.half_extent(self.direction()).max(f32::MIN_POSITIVE);
-        (self.toward_b.length() / inside).clamp(LEAST_PLAIN, 1.0)
+        (self.toward_b().length() / inside).clamp(LEAST_PLAIN, 1.0)
     }
 
     /// Whether `b` lies on the side of `a` that `axis` points away from, so surely that nothing else
-    /// needs to be asked: its middle, or where it came from, is outside of where the bounds meet.
+    /// needs to be asked: its middle, or where it came from, is plainly off the points of `a` that
+    /// are near, or else outside of where the bounds meet.
     fn side_by_position(&self, axis: Vec3) -> Option<bool> {
-        let along = self.toward_b.dot(axis);
-        (along.abs() > self.half_extent(axis)).then_some(along < 0.0)
+        let side = |from: Vec3| match self.sheet {
+            Some(sheet) => self.body.side(sheet, axis, from),
+            None => {
+                let along = (self.lies + from).dot(axis);
+                (along.abs() > self.half_extent(axis)).then_some(along < 0.0)
+            }
+        };
+        let crosses = self.motion.dot(axis).abs() >= CROSSING * self.motion.length();
+        let before = side(-self.motion).filter(|_| crosses);
+        before.or_else(|| side(Vec3::ZERO))
+    }
+
+    /// Whether `b` is plainly not on the side that is remembered, nor comes from there.
+    fn contradicts(&self, remembered: bool, axis: Vec3) -> bool {
+        self.sheet.is_some_and(|sheet| {
+            self.body.side(sheet, axis, Vec3::ZERO) == Some(!remembered)
+                && self.body.side(sheet, axis, -self.motion) != Some(remembered)
+        })
     }
 }
 
@@ -165,7 +253,7 @@ pub(crate) fn aim(
     axes.clear();
     let single = match policy {
         CameraPolicy::ContactZone => None,
-        CameraPolicy::Motion => Some(-approach.toward_b),
+        CameraPolicy::Motion => Some(-approach.toward_b()),
         CameraPolicy::Covariance => top_eigenvector(&zone_covariance(&sides, &Some)),
         CameraPolicy::SmallestExtent => {
             Some([Vec3::X, Vec3::Y, Vec3::Z][approach.half_extents.min_position()])
@@ -180,7 +268,7 @@ pub(crate) fn aim(
         None => aim_at_zone(&sides, approach, axes),
     }
     if axes.is_empty() {
-        let fallback = approach.last_axis.unwrap_or(-approach.toward_b);
+        let fallback = approach.last_axis.unwrap_or(-approach.toward_b());
         axes.push(fallback.try_normalize().unwrap_or(Vec3::Z));
     }
 }
@@ -218,7 +306,11 @@ fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec
         {
             axis = last;
         }
-        let (axis, conclusive) = oriented(axis, sides, approach);
+        let (mut axis, conclusive) = oriented(axis, sides, approach);
+        if let Some(last) = approach.last_axis.filter(|_| views == 0 && !conclusive) {
+            // A body half way through a rough sheet seems to be beside its rim.
+            axis = oriented(last, sides, approach).0;
+        }
         if views > 0 && !conclusive {
             // A guess at the side would turn a gap into a penetration.
             break;
@@ -237,7 +329,8 @@ fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec
 /// of what is deep in it.
 fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3, bool) {
     let conclusive = |sign: f32| (sign.abs() >= CONCLUSIVE).then_some(sign > 0.0);
-    let by_memory = conclusive(approach.last_axis.map_or(0.0, |last| axis.dot(last)));
+    let by_memory = conclusive(approach.last_axis.map_or(0.0, |last| axis.dot(last)))
+        .filter(|&remembered| !approach.contradicts(remembered, axis));
     let [of_a, of_b] = sides.each_ref().map(|side| mean_along(side, axis));
     let by_both = conclusive(of_b).filter(|_| conclusive(of_b) == conclusive(-of_a));
     let by_position = -axis.dot(approach.direction());
@@ -307,7 +400,15 @@ mod tests {
         Approach {
             larger_from_a: Quat::IDENTITY,
             half_extents: Vec3::ONE,
-            toward_b,
+            lies: toward_b,
+            motion: Vec3::ZERO,
+            body: Body {
+                middle: toward_b,
+                half_extents: Vec3::splat(0.5),
+                from_a: Quat::IDENTITY,
+                is_b: true,
+            },
+            sheet: None,
             last_axis: None,
         }
     }
@@ -427,6 +528,56 @@ mod tests {
             let approach = Approach::new(&sheet, &body, &half_through, motion, None);
             assert_eq!(zone_axes(sides, &approach), [axis], "{motion}");
         }
+    }
+
+    /// A body of half a metre at a bare sheet through the origin.
+    fn at_sheet(toward_b: Vec3, motion: Vec3, last_axis: Option<Vec3>) -> Approach {
+        Approach {
+            motion,
+            sheet: Some(Vec3::ZERO),
+            last_axis,
+            ..lying(toward_b)
+        }
+    }
+
+    /// What was remembered gives way where the body plainly lies on the other side, and not where it
+    /// is half through or comes from there.
+    #[test]
+    fn a_memory_that_cannot_be_is_corrected() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        let axis = |y: f32, motion: f32| {
+            let approach = at_sheet(y * Vec3::Y, motion * Vec3::Y, Some(Vec3::Y));
+            zone_axes(sides, &approach)[0]
+        };
+        assert_eq!(axis(0.4, 0.0), -Vec3::Y);
+        assert_eq!(axis(0.2, 0.0), Vec3::Y);
+        assert_eq!(axis(0.4, 2.0), Vec3::Y);
+    }
+
+    /// A motion along a slope does not tell from which side of it a body came.
+    #[test]
+    fn a_fast_body_is_on_the_side_of_a_slope_where_it_lies() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        // 3 m along the slope, and away from it by more than the body is wide.
+        let along = Vec3::new(3.0, 1.2, 0.0);
+        let approach = at_sheet(0.4 * Vec3::Y, along, None);
+        assert!(zone_axes(sides, &approach)[0].y < -0.9);
+        let across = Vec3::new(1.2, 3.0, 0.0);
+        let approach = at_sheet(0.4 * Vec3::Y, across, None);
+        assert!(zone_axes(sides, &approach)[0].y > 0.9);
+    }
+
+    /// Half way through a rough sheet the normals of a ball's rim make an axis along the sheet, to
+    /// which nothing gives a sign: the last one is better.
+    #[test]
+    fn an_axis_without_a_sign_gives_way_to_the_last_one() {
+        let normals = [vec![Vec3::X; 10], vec![Vec3::Y; 2]].concat();
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        let last = -Vec3::Y;
+        let approach = at_sheet(Vec3::ZERO, Vec3::ZERO, Some(last));
+        assert_eq!(zone_axes(sides, &approach)[0], last);
     }
 
     #[test]

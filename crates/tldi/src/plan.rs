@@ -6,7 +6,7 @@ use crate::cpu::{columns, compare, normals, splat};
 use crate::{Aabb, BLOCK, PairQuery, Params, PointCloud, Surface, View};
 use glamx::{Pose3, Vec3};
 
-pub use crate::camera_policy::Approach;
+pub use crate::camera_policy::{Approach, Body};
 pub use crate::cpu::cull::Region;
 pub use crate::cpu::normals::SUPPORT;
 pub use crate::cpu::splat::DepthScale;

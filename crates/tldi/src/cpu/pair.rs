@@ -48,8 +48,13 @@ impl Scratch {
                 self.look(query, &plan, &camera, 0, result);
             }
             View::Aim { policy, .. } => {
+                let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| {
+                    let is_cloud = matches!(surface, Surface::Cloud(_));
+                    (is_cloud && !is_oriented(&surface)).then(|| side.mean_of_near())
+                });
+                let approach = plan.approach.at_sheet(near);
                 let normals = self.zone_normals(query);
-                aim(policy, normals, &plan.approach, &mut result.axes);
+                aim(policy, normals, &approach, &mut result.axes);
                 if query.params.variant() == Variant::Paper {
                     let camera = VirtualCamera::along(result.axes[0], query.params.pixel_size);
                     self.compare_paper(query, &camera, result);

@@ -9,7 +9,7 @@ use super::splat::{DepthScale, Footprint, Fragments, Imaging, SplatPoints};
 use super::sweep;
 use crate::plan::{AIM_SAMPLES, is_aim_sample};
 use crate::{Params, PointCloud, RayHit, RaySurface, Tldi, VirtualCamera};
-use glamx::{Mat3, Pose3, Vec3};
+use glamx::{DVec3, Mat3, Pose3, Vec3};
 
 /// What one side holds, kept from call to call.
 #[derive(Default)]
@@ -81,6 +81,12 @@ impl Side {
             &mut self.kept,
             &mut self.near_normals,
         );
+    }
+
+    /// Mean of the cloud's near points, of which there are some, in the frame of the query, metres.
+    pub(super) fn mean_of_near(&self) -> Vec3 {
+        let near = self.near.iter().map(|&i| self.points.point(i as usize));
+        (near.map(|p| p.as_dvec3()).sum::<DVec3>() / self.near.len() as f64).as_vec3()
     }
 
     /// Samples the culled points near an exact surface; its normals at the nearest points go to
