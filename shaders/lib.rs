@@ -90,6 +90,9 @@ const fn stage(name: &'static str, source: &'static str, bindings: &'static [u32
     }
 }
 
+/// Points from a depth image, before a batch. Bindings: camera, depths, points.
+pub const UNPROJECT: Stage = stage("unproject", include_str!("unproject.wgsl"), &[0, 1, 2]);
+
 /// The stages of a batch, in their order.
 ///
 /// ```

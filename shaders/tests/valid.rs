@@ -3,11 +3,11 @@
 
 use naga::valid::{Capabilities, GlobalUse, ValidationFlags, Validator};
 use std::collections::BTreeSet;
-use tldi_shaders::STAGES;
+use tldi_shaders::{STAGES, UNPROJECT};
 
 #[test]
 fn every_stage_is_valid_and_declares_its_bindings() {
-    for stage in STAGES {
+    for stage in STAGES.iter().chain([&UNPROJECT]) {
         let module = naga::front::wgsl::parse_str(stage.source)
             .unwrap_or_else(|e| panic!("{}: {}", stage.name, e.emit_to_string(stage.source)));
         let info = Validator::new(ValidationFlags::all(), Capabilities::empty())

@@ -8,12 +8,15 @@ use crate::layout::{
 use crate::pipelines::Pipeline;
 use crate::readback::{Counters, Readback};
 use crate::resident::Resident;
+use crate::sources::{DepthCamera, Sources};
 use crate::timer::Timer;
 use crate::upload::Upload;
 use crate::{Gpu, GpuError, StageTime};
 use std::sync::mpsc;
 use std::time::Duration;
-use tldi::{Backend, BackendError, CpuBackend, PairQuery, PairResult, PatchScratch};
+use tldi::{
+    Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult, PatchScratch, Surface,
+};
 use wgpu::BufferUsages;
 
 /// Times that a batch is redone with larger buffers before that counts as a fault: every time at
@@ -63,6 +66,7 @@ const MAX_GROUPS: u32 = 65_535;
 pub struct WgpuBackend {
     gpu: Gpu,
     resident: Resident,
+    sources: Sources,
     buffers: Buffers,
     /// Elements that the buffers hold: what batches have needed so far.
     capacities: Counters,
@@ -138,6 +142,7 @@ impl WgpuBackend {
         Ok(Self {
             gpu,
             resident,
+            sources: Sources::default(),
             buffers: Buffers::default(),
             capacities: Counters::LEAST,
             bound: Vec::new(),
@@ -168,6 +173,45 @@ impl WgpuBackend {
         &self.times
     }
 
+    /// Takes points that already live in a buffer of this device, without a copy to the host: `x`,
+    /// `y`, `z` in metres and the radius of each, four `f32`; `cloud` tells the rest, its number is
+    /// set here. They are read anew in every batch that uses the cloud, by a copy on the device (16
+    /// bytes a point). Points that are not numbers are left out.
+    ///
+    /// # Errors
+    /// [`GpuError::BadSource`] where the buffer is too small or cannot be copied from (it needs
+    /// [`wgpu::BufferUsages::COPY_SRC`]), or `cloud` makes no sense.
+    pub fn adopt(
+        &mut self,
+        points: &wgpu::Buffer,
+        cloud: DeviceCloud,
+    ) -> Result<DeviceCloud, GpuError> {
+        self.sources.adopt(points, cloud)
+    }
+
+    /// Adds a depth camera, whose images become points on the device; returns its number.
+    ///
+    /// # Errors
+    /// [`GpuError::BadSource`] where the camera makes no sense.
+    pub fn add_depth_camera(&mut self, camera: DepthCamera) -> Result<u64, GpuError> {
+        self.sources.add_camera(camera)
+    }
+
+    /// Uploads an image of a depth camera, row by row, 2 bytes a pixel; the cloud, in the camera's
+    /// frame, to be used until the next image.
+    ///
+    /// # Errors
+    /// [`GpuError::BadSource`] where there is no such camera, or the image is not of its size or
+    /// holds no depth in its range.
+    pub fn set_depth(&mut self, camera: u64, image: &[u16]) -> Result<DeviceCloud, GpuError> {
+        self.sources.set_depth(&self.gpu, camera, image)
+    }
+
+    /// Forgets a cloud, or a camera, of this device by its number.
+    pub fn release(&mut self, id: u64) {
+        self.sources.remove(id);
+    }
+
     /// What the stages of the last batch had to read and write at least, each element once, bytes.
     pub fn needed_bytes(&self) -> Vec<(&'static str, u64)> {
         self.last.bytes(&self.upload)
@@ -183,10 +227,10 @@ impl WgpuBackend {
     ) -> Result<bool, BackendError> {
         let mut left_to_cpu = Vec::new();
         for (pair, query) in batch.iter().enumerate() {
-            query
-                .check()
-                .map_err(|reason| BackendError::Unsupported { pair, reason })?;
             if !is_for_device(query) {
+                query
+                    .check()
+                    .map_err(|reason| BackendError::Unsupported { pair, reason })?;
                 left_to_cpu.push(pair);
             }
         }
@@ -206,22 +250,37 @@ impl WgpuBackend {
         batch: &[PairQuery<'_>],
         results: &mut [PairResult],
         left_to_cpu: &mut Vec<usize>,
-    ) -> Result<(), GpuError> {
+    ) -> Result<(), BackendError> {
         self.gpu.check()?;
         if self.upload.points() == 0 {
             return self.compare_on_cpu(batch, results, left_to_cpu);
         }
-        self.upload.place(batch, &self.gpu, &mut self.resident)?;
+        let (resident, sources) = (&mut self.resident, &mut self.sources);
+        self.upload.place(batch, &self.gpu, resident, sources)?;
         for _ in 0..MOST_TRIES {
             self.submit()?;
             self.compare_on_cpu(batch, results, left_to_cpu)?;
             let needed = self.read_back(batch, results, left_to_cpu)?;
+            let lives_on_device = |pair: &&usize| {
+                let is_device = |surface| matches!(surface, Surface::Device(_));
+                is_device(batch[**pair].a) || is_device(batch[**pair].b)
+            };
+            if let Some(&pair) = left_to_cpu.iter().find(lives_on_device) {
+                return Err(BackendError::Unsupported {
+                    pair,
+                    reason: "a pixel has more than 1024 fragments, and points that live on the \
+                             device cannot be left to the CPU: use smaller pixels or fewer points",
+                });
+            }
             if self.capacities.holds(&needed) {
                 return self.compare_on_cpu(batch, results, left_to_cpu);
             }
             self.capacities.grow(&needed);
         }
-        Err(self.gpu.failed("its counters never settled".to_owned()))
+        Err(self
+            .gpu
+            .failed("its counters never settled".to_owned())
+            .into())
     }
 
     /// Compares what is left to the CPU, and leaves nothing.
@@ -230,18 +289,10 @@ impl WgpuBackend {
         batch: &[PairQuery<'_>],
         results: &mut [PairResult],
         left_to_cpu: &mut Vec<usize>,
-    ) -> Result<(), GpuError> {
-        if left_to_cpu.is_empty() {
-            return Ok(());
-        }
+    ) -> Result<(), BackendError> {
         let queries: Vec<PairQuery> = left_to_cpu.iter().map(|&pair| batch[pair]).collect();
-        let mut compared: Vec<PairResult> = Vec::new();
-        self.cpu
-            .compare(&queries, &mut compared)
-            .map_err(|source| GpuError::Failed {
-                adapter: "cpu".to_owned(),
-                reason: source.to_string(),
-            })?;
+        let mut compared = Vec::new();
+        self.cpu.compare(&queries, &mut compared)?;
         for (pair, result) in left_to_cpu.drain(..).zip(compared) {
             results[pair] = result;
         }
@@ -255,12 +306,15 @@ impl WgpuBackend {
         self.bind();
         let Self {
             gpu,
+            resident,
+            sources,
             buffers,
             bind_groups,
             timer,
             ..
         } = self;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        sources.encode(gpu, &mut encoder, resident.points())?;
         // Only what is counted must be zero: the counters up to the ends of pixels, the views, and
         // what is read back of the pairs.
         let counted = 4 * u64::from(data.pixels_at + 2 * data.pixels);

@@ -34,6 +34,12 @@ pub enum GpuError {
     /// The variable `TLDI_BACKEND`, or an option, names no backend.
     #[error("`{0}` is no backend: write auto, cpu or gpu")]
     UnknownBackend(String),
+    /// A cloud on the device, or a depth image, cannot be used.
+    #[error("{reason}")]
+    BadSource {
+        /// What is wrong, and what is needed.
+        reason: String,
+    },
     /// Whether the GPU gains could not be measured.
     #[error("the GPU could not be measured: {reason}")]
     NotMeasured {

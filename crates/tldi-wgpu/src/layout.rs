@@ -3,9 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
 use tldi::plan::{DepthScale, PairPlan, SidePlan, ZoneGrid};
-use tldi::{
-    CameraPolicy, PairQuery, Params, PointCloud, Projection, Radii, Surface, Variant, View, plan,
-};
+use tldi::{CameraPolicy, PairQuery, Params, Projection, Radii, Surface, Variant, View, plan};
 
 /// Words of 32 bits, and bytes, of what only lives on the device.
 pub(crate) const SURVIVOR_BYTES: u64 = 32;
@@ -139,6 +137,41 @@ impl PairData {
     }
 }
 
+/// What a stage must know of a cloud beside its points.
+pub(crate) struct CloudFacts {
+    len: usize,
+    mean_radius: f32,
+    max_radius: f32,
+    has_normals: bool,
+    is_oriented: bool,
+    radii_differ: bool,
+}
+
+impl CloudFacts {
+    /// Of a cloud on the host, or on the device.
+    pub(crate) fn of(surface: &Surface) -> Option<Self> {
+        match surface {
+            Surface::Cloud(cloud) => Some(Self {
+                len: cloud.len(),
+                mean_radius: cloud.mean_radius(),
+                max_radius: cloud.max_radius(),
+                has_normals: cloud.normals().is_some(),
+                is_oriented: cloud.normals_oriented(),
+                radii_differ: matches!(cloud.radii(), Radii::PerPoint(_)),
+            }),
+            Surface::Device(cloud) => Some(Self {
+                len: cloud.len,
+                mean_radius: cloud.mean_radius,
+                max_radius: cloud.max_radius,
+                has_normals: false,
+                is_oriented: false,
+                radii_differ: true,
+            }),
+            Surface::Exact(_) => None,
+        }
+    }
+}
+
 /// See `Side` in WGSL.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -166,24 +199,24 @@ impl SideData {
     /// One side of a pair; its points are at `first_point` of the device's, its cells at
     /// `cell_first`.
     pub(crate) fn new(
-        cloud: &PointCloud,
+        cloud: &CloudFacts,
         side: &SidePlan,
         params: &Params,
         [first_point, first_normal]: [u32; 2],
         cell_first: u32,
     ) -> Self {
-        let stride = plan::stride(cloud, params.pixel_size);
+        let stride = plan::stride(cloud.mean_radius, params.pixel_size);
         let radius_scale = (stride as f32).sqrt();
         let mut flags = 0;
         let mut set = |flag: u32, is_set: bool| flags |= flag * u32::from(is_set);
-        set(HAS_NORMALS, cloud.normals().is_some());
-        set(ORIENTED, cloud.normals_oriented());
-        set(RADII_DIFFER, matches!(cloud.radii(), Radii::PerPoint(_)));
+        set(HAS_NORMALS, cloud.has_normals);
+        set(ORIENTED, cloud.has_normals && cloud.is_oriented);
+        set(RADII_DIFFER, cloud.radii_differ);
         set(HAS_MIDDLE, side.middle.is_some());
-        let cell = plan::SUPPORT * radius_scale * cloud.mean_radius();
-        let (cell, cell_dims) = match cloud.normals() {
-            Some(_) => (cell, [0; 3]),
-            None => cells(side.region.overlap.extents(), cell, cloud.len()),
+        let cell = plan::SUPPORT * radius_scale * cloud.mean_radius;
+        let (cell, cell_dims) = match cloud.has_normals {
+            true => (cell, [0; 3]),
+            false => cells(side.region.overlap.extents(), cell, cloud.len),
         };
         Self {
             frame_from_cloud: pose_rows(&side.frame_from_surface),
@@ -191,17 +224,17 @@ impl SideData {
             other_min: side.region.other_bounds.min.to_array(),
             stride: stride as u32,
             other_max: side.region.other_bounds.max.to_array(),
-            len: cloud.len() as u32,
+            len: cloud.len as u32,
             middle: side.middle.unwrap_or(Vec3::ZERO).to_array(),
             flags,
             first_point,
             first_normal,
             radius_scale,
-            max_radius: cloud.max_radius(),
+            max_radius: cloud.max_radius,
             cell_dims,
             cell_first,
             cell_inv: 1.0 / cell,
-            mean_radius: cloud.mean_radius(),
+            mean_radius: cloud.mean_radius,
             padding: [0; 2],
         }
     }
@@ -257,8 +290,9 @@ pub(crate) fn is_for_device(query: &PairQuery) -> bool {
         ),
         View::Aim { .. } => true,
     };
-    let is_cloud = |surface| matches!(surface, Surface::Cloud(_));
-    is_orthographic
+    let is_cloud = |surface| !matches!(surface, Surface::Exact(_));
+    query.params.check().is_ok()
+        && is_orthographic
         && is_cloud(query.a)
         && is_cloud(query.b)
         && query.params.variant() == Variant::Oriented

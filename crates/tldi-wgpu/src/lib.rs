@@ -16,6 +16,7 @@ mod layout;
 mod pipelines;
 mod readback;
 mod resident;
+mod sources;
 mod timer;
 mod upload;
 
@@ -25,5 +26,6 @@ pub use bandwidth::copy_bandwidth;
 pub use choice::{BACKEND_VARIABLE, BackendChoice};
 pub use device::{AdapterChoice, Gpu};
 pub use error::GpuError;
+pub use sources::DepthCamera;
 pub use timer::StageTime;
 pub use wgpu;

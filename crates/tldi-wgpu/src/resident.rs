@@ -124,21 +124,17 @@ impl Resident {
             slot.used = self.batch;
             return Ok([slot.points.0, slot.normals.unwrap_or(0)]);
         }
+        let normals = cloud.normals();
         let count = cloud.len() as u32;
-        let first = self.room(gpu, count, |all| &mut all.points)?;
-        let normals = match cloud.normals() {
-            Some(normals) => {
-                let first = self.room(gpu, count, |all| &mut all.normals)?;
-                self.staging.clear();
-                self.staging
-                    .extend(normals.iter().flat_map(|n| n.to_array()));
-                let bytes = bytemuck::cast_slice(&self.staging);
-                gpu.queue
-                    .write_buffer(&self.normals.buffer, 12 * u64::from(first), bytes);
-                Some(first)
-            }
-            None => None,
-        };
+        let [first, first_normal] = self.reserve(gpu, id, count, normals.is_some())?;
+        if let Some(normals) = normals {
+            self.staging.clear();
+            self.staging
+                .extend(normals.iter().flat_map(|n| n.to_array()));
+            let bytes = bytemuck::cast_slice(&self.staging);
+            gpu.queue
+                .write_buffer(&self.normals.buffer, 12 * u64::from(first_normal), bytes);
+        }
         let radius = |i: usize| match cloud.radii() {
             Radii::Global(r) => *r,
             Radii::PerPoint(r) => r[i],
@@ -150,6 +146,29 @@ impl Resident {
         let bytes = bytemuck::cast_slice(&self.staging);
         gpu.queue
             .write_buffer(&self.points.buffer, 16 * u64::from(first), bytes);
+        Ok([first, first_normal])
+    }
+
+    /// Room for the points of cloud `id`, and for its normals if it has any: where they are, or will
+    /// be written.
+    pub(crate) fn reserve(
+        &mut self,
+        gpu: &Gpu,
+        id: u64,
+        count: u32,
+        has_normals: bool,
+    ) -> Result<[u32; 2], GpuError> {
+        let known = self.slots.get_mut(&id);
+        if let Some(slot) = known.filter(|slot| slot.points.1 == count) {
+            slot.used = self.batch;
+            return Ok([slot.points.0, slot.normals.unwrap_or(0)]);
+        }
+        self.forget(id);
+        let first = self.room(gpu, count, |all| &mut all.points)?;
+        let normals = match has_normals {
+            true => Some(self.room(gpu, count, |all| &mut all.normals)?),
+            false => None,
+        };
         let slot = Slot {
             points: (first, count),
             normals,
@@ -182,23 +201,19 @@ impl Resident {
         })
     }
 
-    fn forget_unused(&mut self) {
-        let Self {
-            points,
-            normals,
-            slots,
-            batch,
-            ..
-        } = self;
-        slots.retain(|_, slot| {
-            let is_kept = slot.used + KEPT_BATCHES > *batch;
-            if !is_kept {
-                points.give_back(slot.points.0, slot.points.1);
-                if let Some(first) = slot.normals {
-                    normals.give_back(first, slot.points.1);
-                }
+    fn forget(&mut self, id: u64) {
+        if let Some(slot) = self.slots.remove(&id) {
+            self.points.give_back(slot.points.0, slot.points.1);
+            if let Some(first) = slot.normals {
+                self.normals.give_back(first, slot.points.1);
             }
-            is_kept
-        });
+        }
+    }
+
+    fn forget_unused(&mut self) {
+        let is_unused = |slot: &Slot| slot.used + KEPT_BATCHES <= self.batch;
+        let unused = self.slots.iter().filter(|(_, slot)| is_unused(slot));
+        let unused: Vec<u64> = unused.map(|(id, _)| *id).collect();
+        unused.into_iter().for_each(|id| self.forget(id));
     }
 }

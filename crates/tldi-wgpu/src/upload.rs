@@ -1,13 +1,14 @@
 //! What a batch uploads: its pairs, their sides, and the blocks of points in reach.
 
 use crate::layout::{
-    BatchData, COUNTERS, PairData, SIDE_WORDS, SideData, VIEW_WORDS, is_for_device,
+    BatchData, COUNTERS, CloudFacts, PairData, SIDE_WORDS, SideData, VIEW_WORDS, is_for_device,
 };
 use crate::readback::Counters;
 use crate::resident::Resident;
+use crate::sources::Sources;
 use crate::{Gpu, GpuError};
 use tldi::plan::PairPlan;
-use tldi::{Aabb, BLOCK, PairQuery, PointCloud, Surface};
+use tldi::{Aabb, BLOCK, PairQuery, Surface};
 
 /// The uploads of one batch, kept from batch to batch.
 #[derive(Debug, Default)]
@@ -31,9 +32,9 @@ impl Upload {
         self.plans.clear();
         self.items.clear();
         for (pair, query) in batch.iter().enumerate() {
-            let Some(clouds) = clouds_of(query).filter(|_| is_for_device(query)) else {
+            if !is_for_device(query) {
                 continue;
-            };
+            }
             let Some(plan) = PairPlan::new(query) else {
                 continue;
             };
@@ -45,11 +46,20 @@ impl Upload {
                     let in_frame = block.transformed(&side.frame_from_surface);
                     in_frame.intersects(&side.region.overlap)
                 };
-                let blocks = clouds[k].blocks().iter().enumerate();
-                let reached = blocks.filter(|(_, block)| is_in_reach(block));
+                let item = |block: usize| [index, (block * BLOCK) as u32];
                 let before = self.items.len();
-                self.items
-                    .extend(reached.map(|(block, _)| [index, (block * BLOCK) as u32]));
+                match [query.a, query.b][k] {
+                    Surface::Cloud(cloud) => {
+                        let blocks = cloud.blocks().iter().enumerate();
+                        let reached = blocks.filter(|(_, block)| is_in_reach(block));
+                        self.items.extend(reached.map(|(block, _)| item(block)));
+                    }
+                    // Bounds of its blocks are not known here.
+                    Surface::Device(cloud) => {
+                        self.items.extend((0..cloud.len.div_ceil(BLOCK)).map(item));
+                    }
+                    Surface::Exact(_) => {}
+                }
                 self.items.len() > before
             });
             if is_reached {
@@ -82,8 +92,10 @@ impl Upload {
         batch: &[PairQuery<'_>],
         gpu: &Gpu,
         resident: &mut Resident,
+        sources: &mut Sources,
     ) -> Result<(), GpuError> {
         resident.begin();
+        sources.begin();
         self.pairs.clear();
         self.sides.clear();
         (self.zone_words, self.cells) = (0, 0);
@@ -92,9 +104,16 @@ impl Upload {
             let data = PairData::new(query, plan, self.zone_words);
             self.zone_words += 2 * data.zone_words;
             self.pairs.push(data);
-            for (cloud, side) in clouds_of(query).into_iter().flatten().zip(&plan.sides) {
-                let place = resident.place(gpu, cloud)?;
-                let side = SideData::new(cloud, side, &query.params, place, self.cells);
+            for (surface, side) in [query.a, query.b].iter().zip(&plan.sides) {
+                let place = match surface {
+                    Surface::Cloud(cloud) => resident.place(gpu, cloud)?,
+                    Surface::Device(cloud) => [sources.place(gpu, cloud, resident)?, 0],
+                    Surface::Exact(_) => continue,
+                };
+                let Some(facts) = CloudFacts::of(surface) else {
+                    continue;
+                };
+                let side = SideData::new(&facts, side, &query.params, place, self.cells);
                 self.cells += side.cells();
                 self.sides.push(side);
             }
@@ -128,13 +147,5 @@ impl Upload {
             tiles_at,
             pixels_at: tiles_at + 3 * capacities.tiles,
         }
-    }
-}
-
-/// Both surfaces, if they are clouds.
-fn clouds_of<'a>(query: &PairQuery<'a>) -> Option<[&'a PointCloud<'a>; 2]> {
-    match (query.a, query.b) {
-        (Surface::Cloud(a), Surface::Cloud(b)) => Some([a, b]),
-        _ => None,
     }
 }

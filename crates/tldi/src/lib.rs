@@ -47,7 +47,7 @@ pub use knn::{KdTree, Neighbor};
 pub use params::{Params, Variant};
 pub use patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};
 pub use supports::{Supports, supports};
-pub use surface::{RayHit, RaySurface, Surface};
+pub use surface::{DeviceCloud, RayHit, RaySurface, Surface};
 
 /// A view axis is kept from frame to frame while the zone's normals agree with it within this
 /// angle, in radians (10°).

@@ -3,7 +3,7 @@
 
 use crate::camera_policy;
 use crate::cpu::{columns, compare, normals, splat};
-use crate::{Aabb, BLOCK, PairQuery, Params, PointCloud, Surface, View};
+use crate::{Aabb, BLOCK, PairQuery, Params, Surface, View};
 use glamx::{Pose3, Vec3};
 
 pub use crate::camera_policy::{Approach, Body};
@@ -129,12 +129,12 @@ impl PairPlan {
     }
 }
 
-/// Every how many points of a cloud are enough for pixels of this size, metres.
+/// Every how many points of a cloud of this mean radius are enough for pixels of this size, metres.
 ///
 /// With radii of 0.65 × the distance of the 7th neighbour there are 0.94 (pixel / r̄)² points to a
 /// pixel.
-pub fn stride(cloud: &PointCloud, pixel_size: f32) -> usize {
-    let per_pixel = 0.94 * (pixel_size / cloud.mean_radius()).powi(2);
+pub fn stride(mean_radius: f32, pixel_size: f32) -> usize {
+    let per_pixel = 0.94 * (pixel_size / mean_radius).powi(2);
     ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
 }
 
@@ -142,13 +142,17 @@ pub fn stride(cloud: &PointCloud, pixel_size: f32) -> usize {
 /// points, on both sides; normals that are estimated here need their neighbours, or they would err
 /// at the rim.
 pub(crate) fn ring(surface: &Surface, params: &Params) -> f32 {
-    match surface {
-        Surface::Cloud(cloud) if cloud.normals().is_none() => {
-            let stride = stride(cloud, params.pixel_size) as f32;
-            (2.0 + normals::SUPPORT * stride.sqrt()) * cloud.mean_radius()
-        }
-        surface => 2.0 * surface.mean_radius(),
-    }
+    let is_bare = match surface {
+        Surface::Cloud(cloud) => cloud.normals().is_none(),
+        Surface::Exact(_) => false,
+        Surface::Device(_) => true,
+    };
+    let support = if is_bare {
+        normals::SUPPORT * (stride(surface.mean_radius(), params.pixel_size) as f32).sqrt()
+    } else {
+        0.0
+    };
+    (2.0 + support) * surface.mean_radius()
 }
 
 /// Bounds of both surfaces, each in its own frame; those of the larger one with what of a body may

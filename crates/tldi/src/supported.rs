@@ -2,11 +2,16 @@
 
 use crate::{PairQuery, Params, Projection, Surface, Variant, View, paper};
 
+/// Why the CPU does not compare what lives on a device.
+const ON_A_DEVICE: &str = "the points live on a device: only its backend compares them, with clouds, \
+                           oriented splats and an orthographic view";
+
 impl PairQuery<'_> {
-    /// Whether a backend can compare the pair; if not, why, and what to do instead.
+    /// Whether the CPU can compare the pair, and with it every backend; if not, why, and what to do
+    /// instead.
     pub fn check(&self) -> Result<(), &'static str> {
         supported_surfaces(self.a, self.b)?;
-        supported_params(&self.params)?;
+        self.params.check()?;
         let exact = matches!(self.a, Surface::Exact(_)) || matches!(self.b, Surface::Exact(_));
         if exact && self.params.variant() == Variant::Paper {
             return Err("the paper's variant compares clouds only: use Variant::Oriented");
@@ -35,6 +40,7 @@ impl PairQuery<'_> {
 
 pub(crate) fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static str> {
     match (a, b) {
+        (Surface::Device(_), _) | (_, Surface::Device(_)) => Err(ON_A_DEVICE),
         (Surface::Exact(_), Surface::Exact(_)) => {
             Err("both surfaces are exact: leave this pair to the physics engine")
         }
@@ -42,11 +48,14 @@ pub(crate) fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static 
     }
 }
 
-pub(crate) fn supported_params(p: &Params) -> Result<(), &'static str> {
-    if p.pixel_size > 0.0 && p.merge_gap > 0.0 && p.prediction >= 0.0 {
-        Ok(())
-    } else {
-        Err("pixel_size and merge_gap must be positive, prediction not negative")
+impl Params {
+    /// Whether a backend can use them; if not, why.
+    pub fn check(&self) -> Result<(), &'static str> {
+        if self.pixel_size > 0.0 && self.merge_gap > 0.0 && self.prediction >= 0.0 {
+            Ok(())
+        } else {
+            Err("pixel_size and merge_gap must be positive, prediction not negative")
+        }
     }
 }
 
@@ -69,7 +78,7 @@ fn most_pixels(query: &PairQuery) -> f64 {
             let size = cloud.bounds().extents().length() + 2.0 * cloud.max_radius();
             (f64::from(size) / f64::from(pixel_size) + 2.0).powi(2)
         }
-        Surface::Exact(_) => 0.0,
+        Surface::Exact(_) | Surface::Device(_) => 0.0,
     };
     pixels(&query.a).max(pixels(&query.b))
 }

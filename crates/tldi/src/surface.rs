@@ -31,6 +31,22 @@ pub trait RaySurface: Sync {
     fn is_closed(&self) -> bool;
 }
 
+/// A point cloud, without normals, of which only a device holds the points: what the host must know
+/// of it. Made by the device's backend, which alone can compare it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeviceCloud {
+    /// Number by which the backend knows it.
+    pub id: u64,
+    /// Number of points.
+    pub len: usize,
+    /// Bounds of the positions, or more, metres.
+    pub bounds: Aabb,
+    /// Mean point radius r̄ in metres.
+    pub mean_radius: f32,
+    /// No point has a larger radius, metres.
+    pub max_radius: f32,
+}
+
 /// One side of a pair.
 #[derive(Clone, Copy)]
 pub enum Surface<'a> {
@@ -38,6 +54,8 @@ pub enum Surface<'a> {
     Cloud(&'a PointCloud<'a>),
     /// An exact surface in its own frame.
     Exact(&'a dyn RaySurface),
+    /// A point cloud in its own frame that lives on a device.
+    Device(&'a DeviceCloud),
 }
 
 impl Surface<'_> {
@@ -46,6 +64,7 @@ impl Surface<'_> {
         match self {
             Surface::Cloud(cloud) => cloud.bounds(),
             Surface::Exact(surface) => surface.bounds(),
+            Surface::Device(cloud) => cloud.bounds,
         }
     }
 
@@ -54,6 +73,7 @@ impl Surface<'_> {
         match self {
             Surface::Cloud(cloud) => cloud.mean_radius(),
             Surface::Exact(_) => 0.0,
+            Surface::Device(cloud) => cloud.mean_radius,
         }
     }
 }

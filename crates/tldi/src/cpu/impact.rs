@@ -80,7 +80,7 @@ impl Scratch {
                     let radius = PointRadii::new(cloud, &self.b.points).mean();
                     self.core.cover_by_points(b, &self.b.columns, radius);
                 }
-                Surface::Exact(_) => self.core.cover_by_image(b),
+                _ => self.core.cover_by_image(b),
             }
             self.core.find(b.size[0]);
         }
@@ -171,7 +171,7 @@ impl Scratch {
                 other_from_frame: view_from_a,
                 other_bounds: region,
             };
-            let stride = stride(cloud, query.params.pixel_size);
+            let stride = stride(cloud.mean_radius(), query.params.pixel_size);
             cull::cull(
                 cloud,
                 &frame,
@@ -230,7 +230,7 @@ impl Scratch {
                 self.a
                     .look_with(&view_of(cloud, a_from_a), &exact, hits, image)
             }
-            (Surface::Exact(_), Surface::Exact(_)) => None,
+            _ => None, // refused
         }
     }
 }

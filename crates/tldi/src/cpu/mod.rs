@@ -18,7 +18,7 @@ pub(crate) mod splat;
 mod sweep;
 pub(crate) mod zone;
 
-use crate::supported::{supported_params, supported_surfaces};
+use crate::supported::supported_surfaces;
 use crate::{
     Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,
     Tldi, Variant, VirtualCamera, paper,
@@ -105,7 +105,7 @@ impl CpuBackend {
     /// ```
     pub fn impact(&self, query: &ImpactQuery) -> Result<Option<Impact>, BackendError> {
         supported_surfaces(query.a, query.b)
-            .and_then(|()| supported_params(&query.params))
+            .and_then(|()| query.params.check())
             .map_err(|reason| BackendError::Unsupported { pair: 0, reason })?;
         Ok(self.with_scratch(|scratch| scratch.impact(query)))
     }

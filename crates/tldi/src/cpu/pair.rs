@@ -111,7 +111,7 @@ impl Scratch {
     fn cull(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
         let cull = |side: &mut Side, surface: Surface, plan: &SidePlan| {
             if let Surface::Cloud(cloud) = surface {
-                let stride = stride(cloud, query.params.pixel_size);
+                let stride = stride(cloud.mean_radius(), query.params.pixel_size);
                 let frame = &plan.frame_from_surface;
                 let Side { cull, points, .. } = side;
                 cull::cull(cloud, frame, &plan.region, stride, cull, points);
@@ -163,7 +163,7 @@ impl Scratch {
                 self.b
                     .near_exact(cloud, &query.a_from_b, surface, &frame, reach, near)
             }
-            (Surface::Exact(_), Surface::Exact(_)) => false,
+            _ => false, // refused
         }
     }
 
@@ -214,7 +214,7 @@ impl Scratch {
                 let (cloud, image) = (view_of(cloud, a_from_b), &mut self.a.image);
                 self.b.look_with(&cloud, &exact, hits, image)
             }
-            (Surface::Exact(_), Surface::Exact(_)) => None,
+            _ => None, // refused
         };
         if looked.is_none() {
             return;
@@ -286,5 +286,6 @@ pub(super) fn is_oriented(surface: &Surface) -> bool {
     match surface {
         Surface::Cloud(cloud) => cloud.normals().is_some() && cloud.normals_oriented(),
         Surface::Exact(surface) => surface.is_closed(),
+        Surface::Device(_) => false,
     }
 }

@@ -1,0 +1,323 @@
+//! Clouds that are born on the device: in a buffer of the caller's, or from a depth image.
+
+use crate::buffers::Growable;
+use crate::resident::Resident;
+use crate::{Gpu, GpuError};
+use bytemuck::{Pod, Zeroable};
+use std::collections::HashMap;
+use tldi::glamx::Vec3;
+use tldi::{Aabb, DeviceCloud};
+use wgpu::BufferUsages;
+
+/// Bytes of a point: x, y, z, radius.
+const POINT_BYTES: u64 = 16;
+
+/// A camera whose depth images become clouds, in its optical frame (x right, y down, z forward).
+///
+/// ```
+/// use tldi_wgpu::DepthCamera;
+/// // A Kinect, millimetres.
+/// let camera = DepthCamera {
+///     size: [640, 480],
+///     focal_px: [585.0, 585.0],
+///     principal_px: [320.0, 240.0],
+///     metres_per_unit: 0.001,
+///     range: [0.4, 5.0],
+///     radius_px: 0.8,
+/// };
+/// assert_eq!(camera.size[0] * camera.size[1], 307_200);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthCamera {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Focal lengths in pixels.
+    pub focal_px: [f32; 2],
+    /// Principal point in pixels; the centre of the first pixel is at 0.
+    pub principal_px: [f32; 2],
+    /// Metres along the optical axis of one unit of depth.
+    pub metres_per_unit: f32,
+    /// Nearest and farthest depth that is trusted, metres. 0 and 65535 units are no measurement.
+    pub range: [f32; 2],
+    /// Radius of a point in pixels at its depth: 0.7 reaches the neighbours on a surface that is
+    /// seen face on, more those of slopes.
+    pub radius_px: f32,
+}
+
+/// See `DepthCamera` in WGSL.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct CameraData {
+    size: [u32; 2],
+    focal_px: [f32; 2],
+    principal_px: [f32; 2],
+    metres_per_unit: f32,
+    range: [f32; 2],
+    radius_px: f32,
+    first_point: u32,
+    padding: u32,
+}
+
+#[derive(Debug)]
+enum Source {
+    Buffer(wgpu::Buffer),
+    Depth {
+        camera: DepthCamera,
+        depths: Growable,
+        uniform: Growable,
+    },
+}
+
+/// The clouds that are born on the device, by their numbers.
+#[derive(Debug, Default)]
+pub(crate) struct Sources {
+    all: HashMap<u64, Source>,
+    next_id: u64,
+    unproject: Option<wgpu::ComputePipeline>,
+    /// Those of the current batch, and their first points.
+    used: Vec<(u64, u32, u32)>,
+}
+
+impl Sources {
+    fn add(&mut self, source: Source) -> u64 {
+        // Not among the numbers of clouds with points on the host.
+        let id = u64::MAX - self.next_id;
+        self.next_id += 1;
+        self.all.insert(id, source);
+        id
+    }
+
+    /// Takes the points in a buffer of the caller's.
+    pub(crate) fn adopt(
+        &mut self,
+        points: &wgpu::Buffer,
+        mut cloud: DeviceCloud,
+    ) -> Result<DeviceCloud, GpuError> {
+        let needed = POINT_BYTES * cloud.len as u64;
+        if points.size() < needed || !points.usage().contains(BufferUsages::COPY_SRC) {
+            return Err(GpuError::BadSource {
+                reason: format!(
+                    "the buffer has {} bytes and usages {:?}; {} points need {needed} bytes and COPY_SRC",
+                    points.size(),
+                    points.usage(),
+                    cloud.len
+                ),
+            });
+        }
+        let is_usable = |r: f32| r.is_finite() && r > 0.0;
+        if cloud.len == 0
+            || cloud.len > u32::MAX as usize
+            || cloud.bounds.is_empty()
+            || !is_usable(cloud.mean_radius)
+            || !(is_usable(cloud.max_radius) && cloud.max_radius >= cloud.mean_radius)
+        {
+            return Err(GpuError::BadSource {
+                reason: format!("a cloud needs points, bounds and positive radii: {cloud:?}"),
+            });
+        }
+        cloud.id = self.add(Source::Buffer(points.clone()));
+        Ok(cloud)
+    }
+
+    /// A camera without an image yet.
+    pub(crate) fn add_camera(&mut self, camera: DepthCamera) -> Result<u64, GpuError> {
+        let is_positive = |v: f32| v.is_finite() && v > 0.0;
+        let [near, far] = camera.range;
+        let is_valid = camera.size.iter().all(|n| (1..=16_384).contains(n))
+            && camera.focal_px.into_iter().all(is_positive)
+            && camera.principal_px.into_iter().all(f32::is_finite)
+            && is_positive(camera.metres_per_unit)
+            && is_positive(camera.radius_px)
+            && is_positive(far)
+            && (0.0..far).contains(&near);
+        if !is_valid {
+            return Err(GpuError::BadSource {
+                reason: format!(
+                    "a depth camera needs 1 to 16384 columns and rows, positive focal lengths, scale \
+                     and radius, and a range from near to far: {camera:?}"
+                ),
+            });
+        }
+        Ok(self.add(Source::Depth {
+            camera,
+            depths: Growable::new("depths", BufferUsages::STORAGE | BufferUsages::COPY_DST),
+            uniform: Growable::new(
+                "depth camera",
+                BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+            ),
+        }))
+    }
+
+    /// Uploads an image, row by row; what there is to know of its points.
+    pub(crate) fn set_depth(
+        &mut self,
+        gpu: &Gpu,
+        id: u64,
+        image: &[u16],
+    ) -> Result<DeviceCloud, GpuError> {
+        let bad = |reason: String| GpuError::BadSource { reason };
+        let Some(Source::Depth { camera, depths, .. }) = self.all.get_mut(&id) else {
+            return Err(bad(format!("there is no depth camera {id}")));
+        };
+        let len = (camera.size[0] * camera.size[1]) as usize;
+        if image.len() != len {
+            return Err(bad(format!(
+                "the image has {} depths, the camera {} x {}",
+                image.len(),
+                camera.size[0],
+                camera.size[1]
+            )));
+        }
+        let measured = image.iter().filter(|&&d| d != 0 && d != u16::MAX);
+        let metres = measured.map(|&d| f32::from(d) * camera.metres_per_unit);
+        let [near, far] = camera.range;
+        let (mut count, mut sum, mut low, mut high) = (0.0, 0.0, far, near);
+        for depth in metres.filter(|d| (near..=far).contains(d)) {
+            count += 1.0;
+            sum += f64::from(depth);
+            (low, high) = (depth.min(low), depth.max(high));
+        }
+        if count == 0.0 {
+            return Err(bad(
+                "no depth of the image is in the camera's range".to_owned()
+            ));
+        }
+        let words: Vec<u32> = image
+            .chunks(2)
+            .map(|pair| u32::from(pair[0]) | u32::from(*pair.get(1).unwrap_or(&0)) << 16)
+            .collect();
+        depths.write(gpu, &words)?;
+        let radius = |depth: f32| camera.radius_px * depth / camera.focal_px[0];
+        let corner = |column: f32, row: f32, depth: f32| {
+            let [fx, fy] = camera.focal_px;
+            let [cx, cy] = camera.principal_px;
+            Vec3::new((column - cx) / fx * depth, (row - cy) / fy * depth, depth)
+        };
+        let [columns, rows] = camera.size.map(|n| (n - 1) as f32);
+        let mut bounds = Aabb::EMPTY;
+        for depth in [low, high] {
+            bounds = bounds.including(corner(0.0, 0.0, depth));
+            bounds = bounds.including(corner(columns, rows, depth));
+        }
+        Ok(DeviceCloud {
+            id,
+            len,
+            bounds,
+            mean_radius: radius((sum / count) as f32),
+            max_radius: radius(high),
+        })
+    }
+
+    /// Forgets a cloud.
+    pub(crate) fn remove(&mut self, id: u64) {
+        self.all.remove(&id);
+    }
+
+    pub(crate) fn begin(&mut self) {
+        self.used.clear();
+    }
+
+    /// First point of a cloud among the device's.
+    pub(crate) fn place(
+        &mut self,
+        gpu: &Gpu,
+        cloud: &DeviceCloud,
+        resident: &mut Resident,
+    ) -> Result<u32, GpuError> {
+        if !self.all.contains_key(&cloud.id) {
+            return Err(GpuError::BadSource {
+                reason: format!("cloud {} is not of this backend, or was released", cloud.id),
+            });
+        }
+        let [first, _] = resident.reserve(gpu, cloud.id, cloud.len as u32, false)?;
+        if !self.used.iter().any(|(id, ..)| *id == cloud.id) {
+            self.used.push((cloud.id, first, cloud.len as u32));
+        }
+        Ok(first)
+    }
+
+    /// Encodes what brings the points of the batch to their places.
+    pub(crate) fn encode(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        points: &wgpu::Buffer,
+    ) -> Result<(), GpuError> {
+        for (id, first, len) in &self.used {
+            match self.all.get_mut(id) {
+                Some(Source::Buffer(source)) => {
+                    let (at, bytes) = (
+                        POINT_BYTES * u64::from(*first),
+                        POINT_BYTES * u64::from(*len),
+                    );
+                    encoder.copy_buffer_to_buffer(source, 0, points, at, bytes);
+                }
+                Some(Source::Depth {
+                    camera,
+                    depths,
+                    uniform,
+                }) => {
+                    let data = CameraData {
+                        size: camera.size,
+                        focal_px: camera.focal_px,
+                        principal_px: camera.principal_px,
+                        metres_per_unit: camera.metres_per_unit,
+                        range: camera.range,
+                        radius_px: camera.radius_px,
+                        first_point: *first,
+                        padding: 0,
+                    };
+                    uniform.write(gpu, &[data])?;
+                    let pipeline = self.unproject.get_or_insert_with(|| unproject(gpu));
+                    let (Some(depths), Some(uniform)) = (depths.get(), uniform.get()) else {
+                        continue;
+                    };
+                    let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                        label: Some("unproject"),
+                        layout: &pipeline.get_bind_group_layout(0),
+                        entries: &[
+                            wgpu::BindGroupEntry {
+                                binding: 0,
+                                resource: uniform.as_entire_binding(),
+                            },
+                            wgpu::BindGroupEntry {
+                                binding: 1,
+                                resource: depths.as_entire_binding(),
+                            },
+                            wgpu::BindGroupEntry {
+                                binding: 2,
+                                resource: points.as_entire_binding(),
+                            },
+                        ],
+                    });
+                    let groups = len.div_ceil(256);
+                    let mut pass = encoder.begin_compute_pass(&Default::default());
+                    pass.set_pipeline(pipeline);
+                    pass.set_bind_group(0, &bind_group, &[]);
+                    pass.dispatch_workgroups(groups.min(65_535), groups.div_ceil(65_535), 1);
+                }
+                None => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+fn unproject(gpu: &Gpu) -> wgpu::ComputePipeline {
+    let stage = tldi_shaders::UNPROJECT;
+    let module = gpu
+        .device
+        .create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(stage.name),
+            source: wgpu::ShaderSource::Wgsl(stage.source.into()),
+        });
+    gpu.device
+        .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(stage.name),
+            layout: None,
+            module: &module,
+            entry_point: Some(stage.name),
+            compilation_options: Default::default(),
+            cache: None,
+        })
+}
