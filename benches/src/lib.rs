@@ -1,5 +1,9 @@
 //! What the benches share: clouds that a sensor could have handed over this very frame.
 
+pub mod mesh_truth;
+pub mod protocol;
+
+use std::collections::HashMap;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
 
@@ -35,4 +39,50 @@ pub fn bumpy_sheet(points: usize, with_normals: bool, seed: u64) -> PointCloud<'
         false => builder,
     };
     builder.build().expect("the points are finite")
+}
+
+/// Points and faces of a ball with bumps of a tenth of its radius: a closed, smooth mesh of about
+/// `points` points (an icosphere).
+pub fn bumpy_ball(points: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let golden = 0.5 * (1.0 + 5.0f32.sqrt());
+    let mut corners = Vec::new();
+    for [x, y] in [[-1.0, golden], [1.0, golden], [-1.0, -golden], [1.0, -golden]] {
+        corners.push(Vec3::new(x, y, 0.0));
+        corners.push(Vec3::new(0.0, x, y));
+        corners.push(Vec3::new(y, 0.0, x));
+    }
+    // Faces of the icosahedron: three corners that are two apart.
+    let is_edge = |i: usize, j: usize| (corners[i].distance(corners[j]) - 2.0).abs() < 1e-3;
+    let mut faces: Vec<[u32; 3]> = Vec::new();
+    for i in 0..12 {
+        for j in i + 1..12 {
+            for k in j + 1..12 {
+                if is_edge(i, j) && is_edge(j, k) && is_edge(i, k) {
+                    faces.push([i as u32, j as u32, k as u32]);
+                }
+            }
+        }
+    }
+    let mut sphere: Vec<Vec3> = corners.iter().map(|c| c.normalize()).collect();
+    while sphere.len() < points {
+        let mut middles = HashMap::new();
+        let mut middle = |a: u32, b: u32| {
+            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                sphere.push((sphere[a as usize] + sphere[b as usize]).normalize());
+                sphere.len() as u32 - 1
+            })
+        };
+        faces = faces
+            .iter()
+            .flat_map(|&[a, b, c]| {
+                let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+                [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
+            })
+            .collect();
+    }
+    let bumpy = |p: &Vec3| {
+        let wave = (6.0 * p.x).sin() + (7.0 * p.y).sin() + (5.0 * p.z).cos();
+        *p * (1.0 + 0.1 * wave / 3.0)
+    };
+    (sphere.iter().map(bumpy).collect(), faces)
 }

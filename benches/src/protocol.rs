@@ -1,0 +1,73 @@
+//! The cases of the paper's accuracy protocol: two copies of a model, the second at 31 distances and
+//! 900 rotations.
+
+use tldi::glamx::{Pose3, Quat, Vec3};
+
+/// Distances: 3.0 down to 0 along x.
+const DISTANCES: usize = 31;
+/// Rotations about y, and about z.
+const ROTATIONS: usize = 30;
+/// All cases.
+pub const ALL_CASES: usize = DISTANCES * ROTATIONS * ROTATIONS;
+
+/// One case.
+#[derive(Clone, Copy, Debug)]
+pub struct Case {
+    /// Distance of the middles along x, in units of which the model is 2 large.
+    pub distance: f32,
+    /// From the frame of the second copy into that of the first.
+    pub a_from_b: Pose3,
+}
+
+/// The `index`-th of all cases.
+pub fn case(index: usize) -> Case {
+    let distance = 3.0 - 0.1 * (index / (ROTATIONS * ROTATIONS)) as f32;
+    let turn = |k: usize| std::f32::consts::TAU * k as f32 / ROTATIONS as f32;
+    let about_y = Quat::from_rotation_y(turn(index / ROTATIONS % ROTATIONS));
+    let about_z = Quat::from_rotation_z(turn(index % ROTATIONS));
+    Case {
+        distance,
+        a_from_b: Pose3::from_parts(distance.max(0.0) * Vec3::X, about_y * about_z),
+    }
+}
+
+/// An even sample of `count` of all cases.
+pub fn cases(count: usize) -> impl Iterator<Item = Case> {
+    let count = count.min(ALL_CASES);
+    // A step that shares no factor with the number of rotations, so that all of them occur.
+    (0..count).map(move |k| case(k * ALL_CASES / count + (k * 7) % (ALL_CASES / count).max(1)))
+}
+
+/// Moves and scales points so that their bounds are in a cube of 2 about the origin.
+pub fn normalised(points: &[Vec3]) -> Vec<Vec3> {
+    let (low, high) = points
+        .iter()
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| {
+            (low.min(*p), high.max(*p))
+        });
+    let scale = 2.0 / (high - low).max_element();
+    let middle = 0.5 * (low + high);
+    points.iter().map(|p| (*p - middle) * scale).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn all_cases_are_those_of_the_paper() {
+        assert_eq!(ALL_CASES, 27_900);
+        assert_eq!(cases(ALL_CASES).count(), 27_900);
+        assert_eq!(case(0).distance, 3.0);
+        assert!(case(ALL_CASES - 1).distance.abs() < 1e-5);
+    }
+
+    #[test]
+    fn samples_are_even() {
+        let distances: HashSet<i32> = cases(310).map(|c| (10.0 * c.distance).round() as i32).collect();
+        assert_eq!(distances.len(), 31);
+        let turns: HashSet<String> = cases(930).map(|c| format!("{:.4}", c.a_from_b.rotation)).collect();
+        assert!(turns.len() > 400, "{}", turns.len());
+    }
+}
