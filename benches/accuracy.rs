@@ -13,9 +13,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use tldi::glamx::Vec3;
-use tldi::{
-    Backend, PairQuery, PairResult, Params, PointCloud, Surface, View, VirtualCamera,
-};
+use tldi::{Backend, PairQuery, PairResult, Params, PointCloud, Surface, View, VirtualCamera};
 use tldi_benches::mesh_truth::ExactMesh;
 use tldi_benches::protocol::{ALL_CASES, Case, cases, normalised};
 use tldi_tests::{Host, standard_normal};
@@ -38,10 +36,20 @@ struct Args {
     #[arg(long, value_enum)]
     variant: Vec<VariantChoice>,
     /// Compression of the paper's depth ranges, several by commas
-    #[arg(long, value_name = "R,R", value_delimiter = ',', default_value = "0.05")]
+    #[arg(
+        long,
+        value_name = "R,R",
+        value_delimiter = ',',
+        default_value = "0.05"
+    )]
     rho: Vec<f32>,
     /// Edge of the paper's image in pixels, several by commas
-    #[arg(long, value_name = "N,N", value_delimiter = ',', default_value = "1024")]
+    #[arg(
+        long,
+        value_name = "N,N",
+        value_delimiter = ',',
+        default_value = "1024"
+    )]
     resolution: Vec<u32>,
     /// Edge of the default's pixels in mean radii, several by commas
     #[arg(long, value_name = "S,S", value_delimiter = ',', default_value = "1")]
@@ -136,7 +144,18 @@ fn main() -> anyhow::Result<()> {
     };
     println!(
         "{name}: {} points, {} of {ALL_CASES} cases\n{:<8} {:>5} {:>6} {:>6} {:>6} {:>8} {:>8} {:>8} {:>10} {:>9}",
-        points.len(), all.len(), "variant", "rho", "pixels", "scale", "noise", "FN %", "FP %", "error %", "worst FN r", "median ms"
+        points.len(),
+        all.len(),
+        "variant",
+        "rho",
+        "pixels",
+        "scale",
+        "noise",
+        "FN %",
+        "FP %",
+        "error %",
+        "worst FN r",
+        "median ms"
     );
     for &noise in &args.noise {
         let clouds = [0, 1].map(|k| noisy(&points, noise, args.seed + k));
@@ -145,7 +164,16 @@ fn main() -> anyhow::Result<()> {
             [Err(e), _] | [_, Err(e)] => return Err(e),
         };
         for method in methods(&args) {
-            let row = measure(&mut *backend, [&a, &b], &mesh, &all, &truth, method, noise, &name)?;
+            let row = measure(
+                &mut *backend,
+                [&a, &b],
+                &mesh,
+                &all,
+                &truth,
+                method,
+                noise,
+                &name,
+            )?;
             print(&row);
             report.rows.push(row);
         }
@@ -170,13 +198,17 @@ fn model(path: Option<&Path>) -> anyhow::Result<(String, Vec<Vec3>, Vec<[u32; 3]
         "{} has no faces: the truth needs a mesh",
         path.display()
     );
-    let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    let name = path
+        .file_name()
+        .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     Ok((name, raw.points, raw.faces))
 }
 
 /// The points with noise of σ = `noise` mean radii on every coordinate, and radii of their own.
 fn noisy(points: &[Vec3], noise: f32, seed: u64) -> anyhow::Result<PointCloud<'static>> {
-    let clean = PointCloud::builder(points.to_vec()).knn_radii(7, 0.65).build()?;
+    let clean = PointCloud::builder(points.to_vec())
+        .knn_radii(7, 0.65)
+        .build()?;
     if noise == 0.0 {
         return Ok(clean);
     }
@@ -237,7 +269,10 @@ fn query<'a>(a: &'a PointCloud, b: &'a PointCloud, case: &Case, method: Method) 
         }
         None => {
             let pixel = method.pixel_scale.unwrap_or(1.0) * radius;
-            (View::aimed(), Params::for_radius(radius).with_pixel_size(pixel))
+            (
+                View::aimed(),
+                Params::for_radius(radius).with_pixel_size(pixel),
+            )
         }
     };
     PairQuery {

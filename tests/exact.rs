@@ -2,7 +2,9 @@
 
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Aabb, Backend, BackendError, CpuBackend, Params, RayHit, RaySurface, Surface};
-use tldi_tests::{aimed, compare, deepest_point, random_pose, random_unit, sampled_sphere};
+use tldi_tests::{
+    HalfSpace, aimed, compare, deepest_point, random_pose, random_unit, sampled_sphere,
+};
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
 const R: f32 = 0.01;
@@ -41,42 +43,12 @@ impl RaySurface for Ball {
     }
 }
 
-/// The half-space y < 0.
-struct Ground;
-
-impl RaySurface for Ground {
-    fn bounds(&self) -> Aabb {
-        Aabb {
-            min: Vec3::NEG_INFINITY,
-            max: Vec3::new(f32::INFINITY, 0.0, f32::INFINITY),
-        }
-    }
-
-    fn crossings(&self, origin: Vec3, direction: Vec3, max_distance: f32, hits: &mut Vec<RayHit>) {
-        let distance = -origin.y / direction.y;
-        if (0.0..=max_distance).contains(&distance) {
-            hits.push(RayHit {
-                distance,
-                normal: Vec3::Y,
-            });
-        }
-    }
-
-    fn project(&self, point: Vec3) -> (f32, Vec3) {
-        (point.y, Vec3::Y)
-    }
-
-    fn is_closed(&self) -> bool {
-        true
-    }
-}
-
 /// A cloud wholly inside a solid, deeper than it is wide, is pushed out the shortest way.
 #[test]
 fn clouds_deep_inside_exact_solids() {
     let radius = 0.08;
     let cloud = sampled_sphere(radius, R).cloud(R);
-    let surfaces: [&dyn RaySurface; 2] = [&Ball(0.6), &Ground];
+    let surfaces: [&dyn RaySurface; 2] = [&Ball(0.6), &HalfSpace];
     for (surface, height) in surfaces.into_iter().zip([0.3, -0.3]) {
         let result = compare(
             Surface::Exact(surface),
@@ -107,7 +79,7 @@ fn clouds_against_exact_surfaces() {
         on_ground.translation = Vec3::new(rng.f32(), radius + gap, rng.f32());
         let cases: [(&dyn RaySurface, Pose3, Vec3); 2] = [
             (&Ball(0.1), on_ball, direction),
-            (&Ground, on_ground, Vec3::Y),
+            (&HalfSpace, on_ground, Vec3::Y),
         ];
         for (surface, exact_from_cloud, normal) in cases {
             let params = Params::for_radius(R);
@@ -132,7 +104,7 @@ fn clouds_against_exact_surfaces() {
 /// What cannot be compared is refused with the place in the batch.
 #[test]
 fn unsupported_pairs_are_named() {
-    let (ground, ball) = (Surface::Exact(&Ground), Surface::Exact(&Ball(1.0)));
+    let (ground, ball) = (Surface::Exact(&HalfSpace), Surface::Exact(&Ball(1.0)));
     let query = aimed(ground, ball, Pose3::IDENTITY, Params::for_radius(R));
     let error = CpuBackend::new()
         .compare(&[query], &mut Vec::new())

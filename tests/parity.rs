@@ -10,7 +10,7 @@ use tldi::{
     Surface, View, VirtualCamera,
 };
 use tldi_tests::{
-    Samples, aimed, gpu_backend, random_pose, random_unit, sampled_box, sampled_plane,
+    HalfSpace, Samples, aimed, gpu_backend, random_pose, random_unit, sampled_box, sampled_plane,
     sampled_sphere,
 };
 use tldi_wgpu::{AdapterChoice, AutoBackend, Gpu, WgpuBackend};
@@ -265,7 +265,7 @@ fn batches_that_outgrow_the_buffers_are_redone() {
 /// Exact surfaces and pixels with thousands of fragments are the CPU's, in the same batch.
 #[test]
 fn what_the_gpu_does_not_take_the_cpu_compares() {
-    let Some(mut gpu) = gpu_backend() else {
+    let Some(mut backend) = gpu_backend() else {
         return;
     };
     let mut rng = fastrand::Rng::with_seed(3);
@@ -295,8 +295,10 @@ fn what_the_gpu_does_not_take_the_cpu_compares() {
         params: Params::paper(R),
         ..above(Surface::Cloud(&ball))
     };
-    let batch = [crowded, above(Surface::Cloud(&ball)), paper];
-    let (cpu, gpu) = (on_cpu(&batch), compared(&mut gpu, &batch));
+    let exact = above(Surface::Exact(&HalfSpace));
+    let batch = [crowded, above(Surface::Cloud(&ball)), paper, exact];
+    let (cpu, gpu) = (on_cpu(&batch), compared(&mut backend, &batch));
+    assert_eq!(backend.pairs_on_cpu(), 3);
     assert_eq!(cpu[0], gpu[0]);
     assert_eq!(cpu[2], gpu[2]);
     assert!(!cpu[1].contacts.is_empty());

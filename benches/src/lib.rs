@@ -1,6 +1,7 @@
 //! What the benches share: clouds that a sensor could have handed over this very frame.
 
 pub mod mesh_truth;
+pub mod peers;
 pub mod protocol;
 
 use std::collections::HashMap;
@@ -30,9 +31,7 @@ pub fn bumpy_sheet(points: usize, with_normals: bool, seed: u64) -> PointCloud<'
         positions.push(Vec3::new(x, height, z));
         normals.push(Vec3::new(-slope_x, 1.0, -slope_z).normalize());
     }
-    // 7 neighbours lie within π d² × density = 8.
-    let density = points as f32 / (SHEET_EDGE * SHEET_EDGE);
-    let radius = 0.65 * (8.0 / (std::f32::consts::PI * density)).sqrt();
+    let radius = covering_radius(points, SHEET_EDGE * SHEET_EDGE);
     let builder = PointCloud::builder(positions).radius(radius);
     let builder = match with_normals {
         true => builder.normals(normals),
@@ -41,12 +40,41 @@ pub fn bumpy_sheet(points: usize, with_normals: bool, seed: u64) -> PointCloud<'
     builder.build().expect("the points are finite")
 }
 
+/// Radius of balls that cover a surface of `area` square metres on which so many points lie: 0.65 of the
+/// distance to the 7th neighbour.
+pub fn covering_radius(points: usize, area: f32) -> f32 {
+    // 8 points, with itself, lie within π d² × density.
+    0.65 * (8.0 * area / (std::f32::consts::PI * points as f32)).sqrt()
+}
+
+/// Random points in random order on a ball of about 1 m with bumps.
+pub fn random_body(points: usize, seed: u64) -> Vec<Vec3> {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let direction = |rng: &mut fastrand::Rng| {
+        let (height, turn) = (2.0 * rng.f32() - 1.0, std::f32::consts::TAU * rng.f32());
+        let across = (1.0 - height * height).sqrt();
+        Vec3::new(across * turn.cos(), height, across * turn.sin())
+    };
+    (0..points).map(|_| bumpy(direction(&mut rng))).collect()
+}
+
+/// A point of the unit sphere on the bumpy ball.
+fn bumpy(p: Vec3) -> Vec3 {
+    let wave = (6.0 * p.x).sin() + (7.0 * p.y).sin() + (5.0 * p.z).cos();
+    p * (1.0 + 0.1 * wave / 3.0)
+}
+
 /// Points and faces of a ball with bumps of a tenth of its radius: a closed, smooth mesh of about
 /// `points` points (an icosphere).
 pub fn bumpy_ball(points: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let golden = 0.5 * (1.0 + 5.0f32.sqrt());
     let mut corners = Vec::new();
-    for [x, y] in [[-1.0, golden], [1.0, golden], [-1.0, -golden], [1.0, -golden]] {
+    for [x, y] in [
+        [-1.0, golden],
+        [1.0, golden],
+        [-1.0, -golden],
+        [1.0, -golden],
+    ] {
         corners.push(Vec3::new(x, y, 0.0));
         corners.push(Vec3::new(0.0, x, y));
         corners.push(Vec3::new(y, 0.0, x));
@@ -80,9 +108,5 @@ pub fn bumpy_ball(points: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
             })
             .collect();
     }
-    let bumpy = |p: &Vec3| {
-        let wave = (6.0 * p.x).sin() + (7.0 * p.y).sin() + (5.0 * p.z).cos();
-        *p * (1.0 + 0.1 * wave / 3.0)
-    };
-    (sphere.iter().map(bumpy).collect(), faces)
+    (sphere.into_iter().map(bumpy).collect(), faces)
 }

@@ -31,14 +31,20 @@ impl ExactMesh {
         });
         let leaves: Vec<Aabb> = leaves.collect();
         Self {
-            triangles: faces.iter().map(|f| f.map(|i| corner(i).as_dvec3())).collect(),
+            triangles: faces
+                .iter()
+                .map(|f| f.map(|i| corner(i).as_dvec3()))
+                .collect(),
             bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves),
         }
     }
 
     /// Whether the surface meets the other one, which `pose` brings into the frame of this one.
     pub fn intersects(&self, other: &Self, pose: &Pose3) -> bool {
-        let exact = DPose3::from_parts(pose.translation.as_dvec3(), pose.rotation.as_dquat().normalize());
+        let exact = DPose3::from_parts(
+            pose.translation.as_dvec3(),
+            pose.rotation.as_dquat().normalize(),
+        );
         let rough: Pose = *pose;
         let near = self.bvh.leaf_pairs(&other.bvh, |a, b| {
             a.aabb().intersects(&b.aabb().transform_by(&rough))
@@ -122,7 +128,13 @@ mod tests {
             ];
             ExactMesh::new(&points, &[[2, 1, 3], [0, 2, 3], [1, 0, 3], [0, 1, 2]])
         };
-        for (x, meets) in [(0.5, true), (1.99, true), (2.0, true), (2.01, false), (9.0, false)] {
+        for (x, meets) in [
+            (0.5, true),
+            (1.99, true),
+            (2.0, true),
+            (2.01, false),
+            (9.0, false),
+        ] {
             let pose = Pose3::translation(x, 0.0, 0.0);
             // Edges at x = 1 and x = -1 cross at right angles when 2 apart.
             assert_eq!(mesh.intersects(&mesh, &pose), meets, "{x}");

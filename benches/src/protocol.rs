@@ -19,23 +19,28 @@ pub struct Case {
     pub a_from_b: Pose3,
 }
 
-/// The `index`-th of all cases.
-pub fn case(index: usize) -> Case {
-    let distance = 3.0 - 0.1 * (index / (ROTATIONS * ROTATIONS)) as f32;
+/// The case of a distance and a rotation, by their numbers.
+fn case(distance: usize, rotation: usize) -> Case {
+    let distance = 3.0 - 0.1 * distance as f32;
     let turn = |k: usize| std::f32::consts::TAU * k as f32 / ROTATIONS as f32;
-    let about_y = Quat::from_rotation_y(turn(index / ROTATIONS % ROTATIONS));
-    let about_z = Quat::from_rotation_z(turn(index % ROTATIONS));
+    let about_y = Quat::from_rotation_y(turn(rotation / ROTATIONS));
+    let about_z = Quat::from_rotation_z(turn(rotation % ROTATIONS));
     Case {
         distance,
         a_from_b: Pose3::from_parts(distance.max(0.0) * Vec3::X, about_y * about_z),
     }
 }
 
-/// An even sample of `count` of all cases.
+/// Shares no factor with the number of rotations: its multiples pass through all of them.
+const ROTATION_STEP: usize = 557;
+
+/// An even sample of `count` of all cases: as many at every distance, of rotations all over.
 pub fn cases(count: usize) -> impl Iterator<Item = Case> {
     let count = count.min(ALL_CASES);
-    // A step that shares no factor with the number of rotations, so that all of them occur.
-    (0..count).map(move |k| case(k * ALL_CASES / count + (k * 7) % (ALL_CASES / count).max(1)))
+    (0..count).map(move |k| {
+        let rotation = k * ROTATION_STEP % (ROTATIONS * ROTATIONS);
+        case(k * DISTANCES / count, rotation)
+    })
 }
 
 /// Moves and scales points so that their bounds are in a cube of 2 about the origin.
@@ -58,16 +63,24 @@ mod tests {
     #[test]
     fn all_cases_are_those_of_the_paper() {
         assert_eq!(ALL_CASES, 27_900);
-        assert_eq!(cases(ALL_CASES).count(), 27_900);
-        assert_eq!(case(0).distance, 3.0);
-        assert!(case(ALL_CASES - 1).distance.abs() < 1e-5);
+        let all: HashSet<String> = cases(ALL_CASES)
+            .map(|case| format!("{:.1} {:.4}", case.distance, case.a_from_b.rotation))
+            .collect();
+        // Turns by 180° about both axes, in different orders, are the same.
+        assert!(all.len() > 27_000, "{}", all.len());
+        assert_eq!(case(0, 0).distance, 3.0);
+        assert!(case(DISTANCES - 1, 0).distance.abs() < 1e-5);
     }
 
     #[test]
     fn samples_are_even() {
-        let distances: HashSet<i32> = cases(310).map(|c| (10.0 * c.distance).round() as i32).collect();
+        let distances: HashSet<i32> = cases(310)
+            .map(|c| (10.0 * c.distance).round() as i32)
+            .collect();
         assert_eq!(distances.len(), 31);
-        let turns: HashSet<String> = cases(930).map(|c| format!("{:.4}", c.a_from_b.rotation)).collect();
-        assert!(turns.len() > 400, "{}", turns.len());
+        let turns: HashSet<String> = cases(930)
+            .map(|c| format!("{:.4}", c.a_from_b.rotation))
+            .collect();
+        assert!(turns.len() > 800, "{}", turns.len());
     }
 }

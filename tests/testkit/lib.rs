@@ -3,6 +3,7 @@
 mod accuracy;
 mod backend;
 mod data;
+mod half_space;
 mod host;
 mod oracle;
 mod pairs;
@@ -17,6 +18,7 @@ pub use accuracy::{
 };
 pub use backend::{compare_batch, gpu_backend};
 pub use data::{data_file, load_cloud};
+pub use half_space::HalfSpace;
 pub use host::Host;
 pub use oracle::{OracleFragment, oracle_layers};
 pub use pairs::{aimed, compare, compare_clouds, deepest_point};

@@ -76,6 +76,7 @@ pub struct WgpuBackend {
     upload: Upload,
     patches: PatchScratch,
     cpu: CpuBackend,
+    pairs_on_cpu: usize,
     /// What the last batch needed.
     last: Counters,
     timer: Option<Timer>,
@@ -150,6 +151,7 @@ impl WgpuBackend {
             upload: Upload::default(),
             patches: PatchScratch::default(),
             cpu: CpuBackend::new(),
+            pairs_on_cpu: 0,
             last: Counters::default(),
             timer: None,
             times: Vec::new(),
@@ -212,6 +214,11 @@ impl WgpuBackend {
         self.sources.remove(id);
     }
 
+    /// Pairs of the last batch that were left to the CPU.
+    pub fn pairs_on_cpu(&self) -> usize {
+        self.pairs_on_cpu
+    }
+
     /// What the stages of the last batch had to read and write at least, each element once, bytes.
     pub fn needed_bytes(&self) -> Vec<(&'static str, u64)> {
         self.last.bytes(&self.upload)
@@ -252,6 +259,7 @@ impl WgpuBackend {
         left_to_cpu: &mut Vec<usize>,
     ) -> Result<(), BackendError> {
         self.gpu.check()?;
+        self.pairs_on_cpu = 0;
         if self.upload.points() == 0 {
             return self.compare_on_cpu(batch, results, left_to_cpu);
         }
@@ -290,6 +298,7 @@ impl WgpuBackend {
         results: &mut [PairResult],
         left_to_cpu: &mut Vec<usize>,
     ) -> Result<(), BackendError> {
+        self.pairs_on_cpu += left_to_cpu.len();
         let queries: Vec<PairQuery> = left_to_cpu.iter().map(|&pair| batch[pair]).collect();
         let mut compared = Vec::new();
         self.cpu.compare(&queries, &mut compared)?;

@@ -1,0 +1,57 @@
+//! parry's bounding volume hierarchy, rebuilt in every frame.
+
+use super::{Found, Frame, Peer};
+use rapier3d::math::Vector;
+use rapier3d::parry::bounding_volume::Aabb;
+use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy};
+use std::time::Instant;
+use tldi::glamx::Vec3;
+
+/// A hierarchy of the balls of each body, both built anew, descended together.
+pub struct BvhRebuild {
+    /// `Binned` or `Ploc`.
+    pub strategy: BvhBuildStrategy,
+}
+
+pub(super) fn ball_bounds(p: &Vec3, radius: f32) -> Aabb {
+    let half = Vector::splat(radius);
+    let middle = Vector::new(p.x, p.y, p.z);
+    Aabb::new(middle - half, middle + half)
+}
+
+/// Pairs of balls that overlap.
+pub(super) fn overlapping(a: &Bvh, b: &Bvh, frame: &Frame) -> usize {
+    let reach = 4.0 * frame.radius * frame.radius;
+    a.leaf_pairs(b, |a, b| a.intersects(b))
+        .filter(|(i, j)| frame.a[*i as usize].distance_squared(frame.b[*j as usize]) <= reach)
+        .count()
+}
+
+impl Peer for BvhRebuild {
+    fn name(&self) -> String {
+        match self.strategy {
+            BvhBuildStrategy::Binned => "bvh rebuild (binned)".to_owned(),
+            BvhBuildStrategy::Ploc => "bvh rebuild (ploc)".to_owned(),
+        }
+    }
+
+    fn compare(&mut self, frame: &Frame) -> Found {
+        let start = Instant::now();
+        let build = |points: &[Vec3]| {
+            let leaves: Vec<Aabb> = points
+                .iter()
+                .map(|p| ball_bounds(p, frame.radius))
+                .collect();
+            Bvh::from_leaves(self.strategy, &leaves)
+        };
+        let (a, b) = (build(frame.a), build(frame.b));
+        let built = start.elapsed().as_secs_f64();
+        let contacts = overlapping(&a, &b, frame);
+        Found {
+            build_seconds: built,
+            query_seconds: start.elapsed().as_secs_f64() - built,
+            collides: contacts > 0,
+            contacts,
+        }
+    }
+}

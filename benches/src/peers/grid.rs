@@ -1,0 +1,127 @@
+//! A uniform grid by counting sort, rebuilt in every frame.
+
+use super::{Found, Frame, Peer};
+use std::time::Instant;
+use tldi::Aabb;
+use tldi::glamx::{UVec3, Vec3};
+
+/// Most cells: larger grids get larger cells.
+const MAX_CELLS: f32 = (1 << 24) as f32;
+
+/// The first body's points in cells as large as a pair of balls reaches; the second's look around.
+#[derive(Default)]
+pub struct Grid {
+    cells: Vec<u32>,
+    starts: Vec<u32>,
+    sorted: Vec<Vec3>,
+}
+
+/// Cells over the points of a body, and a rim of two: what is near it has neighbours as well.
+pub(super) struct Cells {
+    min: Vec3,
+    inv_cell: f32,
+    pub(super) dims: UVec3,
+}
+
+impl Cells {
+    pub(super) fn new(points: &[Vec3], edge: f32) -> Self {
+        let bounds = points.iter().fold(Aabb::EMPTY, |all, p| all.including(*p));
+        let dims = |edge: f32| (bounds.extents() / edge).floor() + Vec3::splat(5.0);
+        let mut edge = edge;
+        while dims(edge).element_product() > MAX_CELLS {
+            edge *= 1.26; // twice fewer cells
+        }
+        Self {
+            min: bounds.min - Vec3::splat(2.0 * edge),
+            inv_cell: 1.0 / edge,
+            dims: dims(edge).as_uvec3(),
+        }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.dims.element_product() as usize
+    }
+
+    /// Cell of a point, if its neighbours are cells too.
+    pub(super) fn of(&self, p: Vec3) -> Option<u32> {
+        let at = (p - self.min) * self.inv_cell;
+        let last = (self.dims - UVec3::ONE).as_vec3();
+        let is_inside = at.cmpge(Vec3::ONE).all() && at.cmplt(last).all();
+        is_inside.then(|| {
+            let c = at.as_uvec3();
+            (c.z * self.dims.y + c.y) * self.dims.x + c.x
+        })
+    }
+
+    /// Cell of a point, or the nearest one whose neighbours are cells.
+    pub(super) fn nearest(&self, p: Vec3) -> u32 {
+        let at = ((p - self.min) * self.inv_cell).max(Vec3::ONE);
+        let c = at.as_uvec3().min(self.dims - UVec3::splat(2));
+        (c.z * self.dims.y + c.y) * self.dims.x + c.x
+    }
+
+    /// First cells of the nine rows of three around a cell.
+    pub(super) fn rows(&self, cell: u32) -> impl Iterator<Item = u32> {
+        let (row, slice) = (self.dims.x, self.dims.x * self.dims.y);
+        (0..9).map(move |k| cell + k / 3 * slice + k % 3 * row - slice - row - 1)
+    }
+}
+
+impl Grid {
+    /// Sorts the points into cells.
+    pub(super) fn sort(&mut self, points: &[Vec3], cells: &Cells) {
+        self.starts.clear();
+        self.starts.resize(cells.count() + 1, 0);
+        self.cells.clear();
+        self.cells.extend(points.iter().map(|p| cells.nearest(*p)));
+        for cell in &self.cells {
+            self.starts[*cell as usize + 1] += 1;
+        }
+        for k in 1..self.starts.len() {
+            self.starts[k] += self.starts[k - 1];
+        }
+        self.sorted.resize(points.len(), Vec3::ZERO);
+        let mut cursors = self.starts.clone();
+        for (p, cell) in points.iter().zip(&self.cells) {
+            let cursor = &mut cursors[*cell as usize];
+            self.sorted[*cursor as usize] = *p;
+            *cursor += 1;
+        }
+    }
+
+    /// Points within the balls' reach of `p`.
+    pub(super) fn near(&self, p: Vec3, cells: &Cells, reach: f32) -> usize {
+        let Some(cell) = cells.of(p) else {
+            return 0;
+        };
+        let in_row = |first: u32| {
+            let range =
+                self.starts[first as usize] as usize..self.starts[first as usize + 3] as usize;
+            let row = self.sorted[range].iter();
+            row.filter(|q| p.distance_squared(**q) <= reach * reach)
+                .count()
+        };
+        cells.rows(cell).map(in_row).sum()
+    }
+}
+
+impl Peer for Grid {
+    fn name(&self) -> String {
+        "grid (counting sort)".to_owned()
+    }
+
+    fn compare(&mut self, frame: &Frame) -> Found {
+        let start = Instant::now();
+        let reach = 2.0 * frame.radius;
+        let cells = Cells::new(frame.a, reach);
+        self.sort(frame.a, &cells);
+        let built = start.elapsed().as_secs_f64();
+        let contacts = frame.b.iter().map(|p| self.near(*p, &cells, reach)).sum();
+        Found {
+            build_seconds: built,
+            query_seconds: start.elapsed().as_secs_f64() - built,
+            collides: contacts > 0,
+            contacts,
+        }
+    }
+}
