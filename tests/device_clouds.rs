@@ -127,14 +127,14 @@ fn a_depth_image_is_a_cloud() {
         focal_px: [150.0, 148.0],
         principal_px: [80.0, 60.5],
         metres_per_unit: 0.001,
-        range: [0.3, 4.0],
-        radius_px: 0.9,
+        range: [0.3, 100.0],
+        radius_px: 2.0,
     };
     // A wall 2 m away that leans, with holes, and with what is out of range.
     let depth = |i: u32, j: u32| match (i + 3 * j) % 97 {
         0 => 0,
         1 => u16::MAX,
-        2 => 5000,
+        2 => 200,
         _ => 1900 + i as u16 + (j / 2) as u16,
     };
     let pixels = (0..camera.size[1]).flat_map(|j| (0..camera.size[0]).map(move |i| (i, j)));
@@ -145,7 +145,7 @@ fn a_depth_image_is_a_cloud() {
     let (mut points, mut radii) = (vec![], vec![]);
     for ((i, j), units) in pixels.zip(&image) {
         let z = f32::from(*units) * camera.metres_per_unit;
-        if *units != 0 && *units != u16::MAX && (0.3..=4.0).contains(&z) {
+        if *units != 0 && *units != u16::MAX && (0.3..=100.0).contains(&z) {
             let [x, y] = [
                 (i as f32 - camera.principal_px[0]) / camera.focal_px[0] * z,
                 (j as f32 - camera.principal_px[1]) / camera.focal_px[1] * z,
