@@ -2,8 +2,7 @@
 
 use anyhow::{Context, bail};
 use clap::Parser;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::PointCloud;
@@ -15,7 +14,7 @@ use tldi_examples::scene::{BodyShape, furnished_room};
 use tldi_examples::simulation::{DropSimulation, NamedCloud, Snapshot};
 use tldi_examples::spots::{Demand, find_spots};
 use tldi_examples::up::{Confidence, Up, detect_up};
-use tldi_examples::{load, viewpoint};
+use tldi_examples::{load, output, viewpoint};
 
 /// Lets point-cloud bodies fall onto a point-cloud scan and come to rest
 ///
@@ -107,7 +106,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let report = simulation.report();
     draw(&simulation, &report, up, &snapshots, &args.out)?;
     if let Some(path) = &args.common.json {
-        write_file(path, &serde_json::to_vec_pretty(&report)?)?;
+        output::write_json(path, &report)?;
     }
     finish(&report)
 }
@@ -200,14 +199,7 @@ fn ball_radius(cloud: &PointCloud<'_>) -> f32 {
 
 /// Takes all steps; returns the state before the first one, after [`MID_STEP`] and after the last.
 fn simulate(simulation: &mut DropSimulation, steps: usize) -> anyhow::Result<[Snapshot; 3]> {
-    let bar = if io::stderr().is_terminal() {
-        ProgressBar::new(steps as u64)
-    } else {
-        ProgressBar::hidden()
-    };
-    bar.set_style(ProgressStyle::with_template(
-        "{bar:40} {pos}/{len} steps, {eta} left",
-    )?);
+    let bar = output::progress_bar(steps, "steps");
     let initial = simulation.snapshot();
     let mut mid = initial.clone();
     for step in 1..=steps {
@@ -269,21 +261,16 @@ fn draw(
         .map(|pose| pose.translation)
         .collect();
     let camera = viewpoint::choose(&scene(&in_sight), &starts, PICTURE_SIZE);
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    output::make_folder(folder)?;
     for (snapshot, name) in snapshots
         .iter()
         .zip(["initial.png", "mid.png", "final.png"])
     {
         let picture = scene(snapshot).draw(&camera, &snapshot.contacts);
-        write_file(&folder.join(name), &picture.to_png()?)?;
+        output::write_file(&folder.join(name), &picture.to_png()?)?;
     }
     eprintln!("pictures are in {}", folder.display());
     Ok(())
-}
-
-fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn finish(report: &DropReport) -> anyhow::Result<()> {

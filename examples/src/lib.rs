@@ -1,8 +1,12 @@
 //! What the runnable stories share: command-line options, generated scenes, loading, finding up,
 //! spots to drop bodies on, the simulation, pictures and reports.
 
+pub mod animation;
 pub mod cli;
 pub mod load;
+pub mod output;
+pub mod query;
+pub mod query_pictures;
 pub mod render;
 pub mod report;
 pub mod scene;

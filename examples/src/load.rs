@@ -122,3 +122,27 @@ pub fn derived(
     }
     builder.build()
 }
+
+/// The cloud with a colour (red, green, blue, alpha) for each point.
+///
+/// # Errors
+/// [`CloudError`]; not for a cloud that was valid.
+pub fn painted(
+    cloud: &PointCloud<'_>,
+    color: impl Fn(usize) -> [u8; 4],
+) -> Result<PointCloud<'static>, CloudError> {
+    let points: Vec<Vec3> = cloud.points().collect();
+    let radii: Vec<f32> = (0..cloud.len()).map(|i| cloud.radius(i)).collect();
+    let colors: Vec<[u8; 4]> = (0..cloud.len()).map(color).collect();
+    let mut builder = PointCloud::builder(points).radii(radii).colors(colors);
+    if let Some(normals) = cloud.normals() {
+        builder = builder.normals(normals.to_vec());
+    }
+    builder.build()
+}
+
+/// The name of a file without its folder and extensions.
+pub fn stem(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.split('.').next().unwrap_or_default().to_owned()
+}
