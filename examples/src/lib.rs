@@ -9,6 +9,8 @@ pub mod query;
 pub mod query_pictures;
 pub mod render;
 pub mod report;
+pub mod robot;
+pub mod scan;
 pub mod scene;
 mod shading;
 pub mod simulation;

@@ -45,6 +45,7 @@ mod header;
 mod input;
 #[cfg(feature = "las")]
 mod las;
+mod mesh_sampling;
 mod options;
 mod pcd;
 mod ply;
@@ -57,6 +58,7 @@ mod slot;
 mod text;
 
 pub use error::{Position, SourceError, SourceErrorKind};
+pub use mesh_sampling::{MeshSample, sample_mesh};
 pub use options::{Format, Progress, ReadOptions};
 pub use raw_cloud::RawCloud;
 pub use read::{read, read_from, read_with_progress};
