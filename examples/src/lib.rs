@@ -3,6 +3,7 @@
 
 pub mod animation;
 pub mod cli;
+pub mod depth;
 pub mod load;
 pub mod output;
 pub mod query;

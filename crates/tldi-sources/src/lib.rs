@@ -38,6 +38,7 @@
 //! ```
 
 mod collector;
+pub mod depth;
 #[cfg(feature = "e57")]
 mod e57;
 mod error;
