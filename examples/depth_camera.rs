@@ -72,6 +72,7 @@ const GENERATED_FRAMES: usize = 150;
 const FRAME_SECONDS: f32 = 1.0 / 30.0;
 /// Width of a body in metres, and at least this many mean radii of a frame.
 const BODY_SIZE: f32 = 0.08;
+const GENERATED_BODY_SIZE: f32 = 0.14;
 const BODY_RADII: f32 = 8.0;
 const BODY_SPACING: f32 = 0.03;
 const PICTURE_SIZE: [u32; 2] = [1280, 720];
@@ -179,9 +180,12 @@ fn open(args: &Args) -> anyhow::Result<(FrameSource, Vec<String>)> {
 }
 
 fn make_bodies(args: &Args, frame_radius: f32) -> anyhow::Result<Vec<NamedCloud>> {
-    let size = args
-        .size
-        .unwrap_or(BODY_SIZE.max(BODY_RADII * frame_radius));
+    let least = if args.frames.is_some() {
+        BODY_SIZE
+    } else {
+        GENERATED_BODY_SIZE
+    };
+    let size = args.size.unwrap_or(least.max(BODY_RADII * frame_radius));
     let shapes = [BodyShape::RoundedBox, BodyShape::Pebble, BodyShape::Star];
     (0..usize::from(args.count))
         .map(|k| {

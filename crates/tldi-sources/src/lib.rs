@@ -47,6 +47,7 @@ mod input;
 #[cfg(feature = "las")]
 mod las;
 mod mesh_sampling;
+mod moving;
 mod options;
 mod pcd;
 mod ply;
@@ -60,6 +61,7 @@ mod text;
 
 pub use error::{Position, SourceError, SourceErrorKind};
 pub use mesh_sampling::{MeshSample, sample_mesh};
+pub use moving::{MovingError, MovingPoints};
 pub use options::{Format, Progress, ReadOptions};
 pub use raw_cloud::RawCloud;
 pub use read::{read, read_from, read_with_progress};

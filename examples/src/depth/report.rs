@@ -89,13 +89,16 @@ pub struct DepthBodyReport {
     pub first_rested_at_seconds: Option<f32>,
 }
 
+/// A number of a frame.
+type Column<'a> = &'a dyn Fn(&FrameReport) -> f64;
+
 impl DepthReport {
     /// Writes the results as tables for people.
     ///
     /// # Errors
     /// Those of writing.
     pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
-        let column = |value: &dyn Fn(&FrameReport) -> f64| {
+        let column = |value: Column<'_>| {
             let mut values: Vec<f64> = self.frames.iter().map(value).collect();
             values.sort_by(f64::total_cmp);
             let last = values.len().saturating_sub(1);
@@ -103,7 +106,7 @@ impl DepthReport {
             [at(last / 2), at(last)]
         };
         writeln!(out, "{:<22} {:>10} {:>10}", "of a frame", "median", "most")?;
-        let rows: [(&str, &dyn Fn(&FrameReport) -> f64); 7] = [
+        let rows: [(&str, Column<'_>); 7] = [
             ("points", &|f| f.points as f64),
             ("flying pixels", &|f| f.flying_pixels as f64),
             ("decode ms", &|f| f.decode_ms),
