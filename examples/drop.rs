@@ -2,20 +2,19 @@
 
 use anyhow::{Context, bail};
 use clap::Parser;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
-use tldi_examples::cli::{Common, UpChoice};
+use tldi_examples::cli::Common;
 use tldi_examples::render::{BODY_COLORS, Item, Paint, Scene};
 use tldi_examples::report::DropReport;
-use tldi_examples::scene::{BodyShape, furnished_room};
+use tldi_examples::scan::{ScanSource, choose_up, load_scan, positive};
+use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::{DropSimulation, NamedCloud, Snapshot};
 use tldi_examples::spots::{Demand, find_spots};
-use tldi_examples::up::{Confidence, Up, detect_up};
-use tldi_examples::{load, viewpoint};
+use tldi_examples::{load, output, viewpoint};
 
 /// Lets point-cloud bodies fall onto a point-cloud scan and come to rest
 ///
@@ -24,9 +23,8 @@ use tldi_examples::{load, viewpoint};
 #[derive(Parser)]
 #[command(version)]
 struct Args {
-    /// Scan to drop bodies onto (PLY, PCD, XYZ or CSV, also as .gz); a generated room if left out
-    #[arg(long, value_name = "FILE")]
-    scan: Option<PathBuf>,
+    #[command(flatten)]
+    source: ScanSource,
     /// Body to drop, its y axis up; generated shapes if left out
     #[arg(long, value_name = "FILE")]
     body: Option<PathBuf>,
@@ -39,14 +37,6 @@ struct Args {
     /// Number of steps of 1/60 s
     #[arg(long, value_name = "N", default_value_t = 300)]
     steps: usize,
-    /// Direction against gravity in the frame of the scan; auto finds it in the scan
-    #[arg(
-        long,
-        value_name = "X,Y,Z",
-        default_value = "auto",
-        allow_hyphen_values = true
-    )]
-    up: UpChoice,
     /// Folder for initial.png, mid.png and final.png
     #[arg(long, value_name = "DIR", default_value = "out/drop")]
     out: PathBuf,
@@ -54,10 +44,6 @@ struct Args {
     common: Common,
 }
 
-/// Distance between the points of the generated room and standard deviation of their error, in
-/// metres: those of a good terrestrial scanner.
-const ROOM_SPACING: f32 = 0.015;
-const ROOM_NOISE: f32 = 0.001;
 /// Distance between the points of a generated body, as a share of its width.
 const BODY_SPACING: f32 = 0.025;
 /// The step in which `mid.png` is made: bodies have just landed.
@@ -67,19 +53,8 @@ const MID_STEP: usize = 15;
 const LARGEST_DRAWN_RADIUS: f32 = 3.0;
 const PICTURE_SIZE: [u32; 2] = [1280, 720];
 
-fn positive(text: &str) -> Result<f32, String> {
-    match text.parse() {
-        Ok(number) if number > 0.0 && f32::is_finite(number) => Ok(number),
-        _ => Err("expected a number greater than 0".to_owned()),
-    }
-}
-
 fn main() -> ExitCode {
     let args = Args::parse();
-    if let Err(error) = args.common.backend.require_available() {
-        eprintln!("error: {error}");
-        return ExitCode::from(2);
-    }
     match run(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -90,8 +65,8 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
-    let scan = load_scan(args)?;
-    let up = choose_up(args.up, &scan);
+    let scan = load_scan(&args.source, args.common.seed)?;
+    let up = choose_up(args.source.up, &scan);
     let bodies = load_bodies(args, scan.mean_radius())?;
     let demand = Demand {
         count: bodies.len(),
@@ -102,59 +77,22 @@ fn run(args: &Args) -> anyhow::Result<()> {
         seed: args.common.seed,
     };
     let spots = find_spots(&scan, up, &demand)?;
-    let mut simulation = DropSimulation::new(scan, up, bodies, &spots, args.common.seed)?;
+    let (seed, backend) = (args.common.seed, args.common.backend.open()?);
+    let mut simulation = DropSimulation::new(scan, up, bodies, &spots, seed, backend)?;
     let snapshots = simulate(&mut simulation, args.steps)?;
     let report = simulation.report();
     draw(&simulation, &report, up, &snapshots, &args.out)?;
     if let Some(path) = &args.common.json {
-        write_file(path, &serde_json::to_vec_pretty(&report)?)?;
+        output::write_json(path, &report)?;
     }
     finish(&report)
-}
-
-fn load_scan(args: &Args) -> anyhow::Result<PointCloud<'static>> {
-    match &args.scan {
-        Some(path) => {
-            eprintln!("reading {}", path.display());
-            load::scan_from_file(path)
-        }
-        None => {
-            eprintln!("generating a room");
-            Ok(load::scan_from_surface(furnished_room(
-                ROOM_SPACING,
-                ROOM_NOISE,
-                args.common.seed,
-            ))?)
-        }
-    }
-}
-
-fn choose_up(choice: UpChoice, scan: &PointCloud<'_>) -> Vec3 {
-    if let UpChoice::Given(up) = choice {
-        return up;
-    }
-    let points: Vec<Vec3> = scan.points().collect();
-    let Up {
-        direction,
-        confidence,
-    } = detect_up(&points, scan.normals().unwrap_or_default());
-    let [x, y, z] = direction.to_array();
-    let remark = match confidence {
-        Confidence::Clear => "",
-        Confidence::AxisOnly => " (warning: perhaps upside down)",
-        Confidence::Assumed => " (warning: assumed, the scan has no level surfaces)",
-    };
-    eprintln!("up is {x:.3},{y:.3},{z:.3}{remark}; --up X,Y,Z sets it");
-    direction
 }
 
 fn load_bodies(args: &Args, scan_radius: f32) -> anyhow::Result<Vec<NamedCloud>> {
     let kinds: Vec<(String, PointCloud<'static>)> = match &args.body {
         Some(path) => {
             eprintln!("reading {}", path.display());
-            let stem = path.file_name().unwrap_or_default().to_string_lossy();
-            let name = stem.split('.').next().unwrap_or_default().to_owned();
-            vec![(name, load::body_from_file(path)?)]
+            vec![(load::stem(path), load::body_from_file(path)?)]
         }
         None => (BodyShape::ALL.into_iter())
             .map(|shape| {
@@ -200,14 +138,7 @@ fn ball_radius(cloud: &PointCloud<'_>) -> f32 {
 
 /// Takes all steps; returns the state before the first one, after [`MID_STEP`] and after the last.
 fn simulate(simulation: &mut DropSimulation, steps: usize) -> anyhow::Result<[Snapshot; 3]> {
-    let bar = if io::stderr().is_terminal() {
-        ProgressBar::new(steps as u64)
-    } else {
-        ProgressBar::hidden()
-    };
-    bar.set_style(ProgressStyle::with_template(
-        "{bar:40} {pos}/{len} steps, {eta} left",
-    )?);
+    let bar = output::progress_bar(steps, "steps");
     let initial = simulation.snapshot();
     let mut mid = initial.clone();
     for step in 1..=steps {
@@ -269,21 +200,16 @@ fn draw(
         .map(|pose| pose.translation)
         .collect();
     let camera = viewpoint::choose(&scene(&in_sight), &starts, PICTURE_SIZE);
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    output::make_folder(folder)?;
     for (snapshot, name) in snapshots
         .iter()
         .zip(["initial.png", "mid.png", "final.png"])
     {
         let picture = scene(snapshot).draw(&camera, &snapshot.contacts);
-        write_file(&folder.join(name), &picture.to_png()?)?;
+        output::write_file(&folder.join(name), &picture.to_png()?)?;
     }
     eprintln!("pictures are in {}", folder.display());
     Ok(())
-}
-
-fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn finish(report: &DropReport) -> anyhow::Result<()> {

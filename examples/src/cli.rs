@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 use thiserror::Error;
-use tldi::glamx::Vec3;
+use tldi::glamx::{EulerRot, Pose3, Quat, Vec3};
+use tldi_wgpu::BackendChoice;
 
 /// Options that every binary has; flatten into the binary's own arguments.
 #[derive(clap::Args, Clone, Debug)]
@@ -11,41 +12,13 @@ pub struct Common {
     /// Write the results to this file as JSON
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Where the work is done; auto takes the GPU if there is one, else the CPU
-    #[arg(long, value_enum, default_value_t = BackendChoice::Auto)]
+    /// Where clouds are compared; auto takes a hardware GPU where it gains, else the CPU (or what the
+    /// variable TLDI_BACKEND says)
+    #[arg(long, value_name = "auto|cpu|gpu", default_value_t = BackendChoice::Auto)]
     pub backend: BackendChoice,
     /// Seed of everything random: equal seeds give equal results
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-}
-
-/// Where the work is done.
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BackendChoice {
-    /// The best that there is.
-    Auto,
-    /// The CPU backend.
-    Cpu,
-    /// A GPU backend.
-    Gpu,
-}
-
-/// A backend was asked for that this build does not have.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("the GPU backend is not built yet: use --backend cpu (or leave the option out)")]
-pub struct NoGpuBackend;
-
-impl BackendChoice {
-    /// Turns the choice into a backend that exists.
-    ///
-    /// # Errors
-    /// [`NoGpuBackend`] if a GPU was asked for.
-    pub fn require_available(self) -> Result<(), NoGpuBackend> {
-        match self {
-            Self::Auto | Self::Cpu => Ok(()),
-            Self::Gpu => Err(NoGpuBackend),
-        }
-    }
 }
 
 /// The up direction of a scan: given, or to be found in the scan.
@@ -86,9 +59,88 @@ impl FromStr for UpChoice {
     }
 }
 
+/// Three numbers, `x,y,z`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triple(pub Vec3);
+
+/// A pose, `x,y,z` in metres or `x,y,z,rx,ry,rz` with turns in degrees, about the fixed axes x,
+/// then y, then z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseArgument(pub Pose3);
+
+/// Numbers that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("`{text}` cannot be read: write {expected}")]
+pub struct BadNumbers {
+    text: String,
+    expected: &'static str,
+}
+
+/// The finite numbers of a list with commas.
+fn numbers(text: &str) -> Option<Vec<f32>> {
+    let number = |part: &str| part.trim().parse().ok().filter(|n| f32::is_finite(*n));
+    text.split(',').map(number).collect()
+}
+
+impl FromStr for Triple {
+    type Err = BadNumbers;
+
+    fn from_str(text: &str) -> Result<Self, BadNumbers> {
+        match numbers(text).as_deref() {
+            Some(&[x, y, z]) => Ok(Self(Vec3::new(x, y, z))),
+            _ => Err(BadNumbers {
+                text: text.to_owned(),
+                expected: "three numbers, as in 0,0,-1.5",
+            }),
+        }
+    }
+}
+
+impl FromStr for PoseArgument {
+    type Err = BadNumbers;
+
+    fn from_str(text: &str) -> Result<Self, BadNumbers> {
+        let (place, turn) = match numbers(text).as_deref() {
+            Some(&[x, y, z]) => (Vec3::new(x, y, z), Quat::IDENTITY),
+            Some(&[x, y, z, rx, ry, rz]) => {
+                let [rx, ry, rz] = [rx, ry, rz].map(f32::to_radians);
+                let turn = Quat::from_euler(EulerRot::ZYX, rz, ry, rx);
+                (Vec3::new(x, y, z), turn)
+            }
+            _ => {
+                return Err(BadNumbers {
+                    text: text.to_owned(),
+                    expected: "three numbers of metres, as in 0,0,0.5, or these and three of degrees",
+                });
+            }
+        };
+        Ok(Self(Pose3::from_parts(place, turn)))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f32::consts::FRAC_1_SQRT_2;
+
+    #[test]
+    fn poses_turn_by_degrees_about_fixed_axes() {
+        // A quarter turn about x takes y to z, one about z then leaves it there.
+        let PoseArgument(pose) = "1,2,3,90,0,90".parse().unwrap();
+        assert!((pose * Vec3::Y - Vec3::new(1.0, 2.0, 4.0)).length() < 1e-6);
+        assert!((pose * Vec3::X - Vec3::new(1.0, 3.0, 3.0)).length() < 1e-6);
+        let PoseArgument(pose) = "0, 0, 0, 0, 45, 0".parse().unwrap();
+        let turned = Vec3::new(FRAC_1_SQRT_2, 0.0, -FRAC_1_SQRT_2);
+        assert!((pose * Vec3::X - turned).length() < 1e-6);
+        assert_eq!(
+            "1,0,2".parse(),
+            Ok(PoseArgument(Pose3::translation(1.0, 0.0, 2.0)))
+        );
+        for bad in ["", "1,2", "1,2,3,4", "1,2,x", "nan,0,0", "1,2,3,4,5,6,7"] {
+            assert!(bad.parse::<PoseArgument>().is_err(), "{bad}");
+            assert!(bad.parse::<Triple>().is_err(), "{bad}");
+        }
+    }
 
     #[test]
     fn up_is_read_and_normalised() {
@@ -100,12 +152,5 @@ mod tests {
         for bad in ["", "z", "1,2", "1,2,3,4", "0,0,0", "nan,0,1", "inf,0,0"] {
             assert!(bad.parse::<UpChoice>().is_err(), "{bad}");
         }
-    }
-
-    #[test]
-    fn a_missing_gpu_is_an_error_that_says_so() {
-        assert_eq!(BackendChoice::Auto.require_available(), Ok(()));
-        let error = BackendChoice::Gpu.require_available().unwrap_err();
-        assert!(error.to_string().contains("not built"), "{error}");
     }
 }

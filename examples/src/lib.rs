@@ -1,10 +1,18 @@
 //! What the runnable stories share: command-line options, generated scenes, loading, finding up,
 //! spots to drop bodies on, the simulation, pictures and reports.
 
+pub mod animation;
 pub mod cli;
+pub mod depth;
+pub mod devices;
 pub mod load;
+pub mod output;
+pub mod query;
+pub mod query_pictures;
 pub mod render;
 pub mod report;
+pub mod robot;
+pub mod scan;
 pub mod scene;
 mod shading;
 pub mod simulation;

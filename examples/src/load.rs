@@ -15,13 +15,19 @@ const PLAUSIBLE_BODY_SIZES: std::ops::RangeInclusive<f32> = 0.02..=1.0;
 /// Least extent of a body in mean radii of the scan: a smaller one would lie in the noise.
 const LEAST_BODY_RADII: f32 = 10.0;
 
-/// Loads a scan: radii from neighbours, normals by principal component analysis, colours kept.
+/// Loads a scan, `scale` metres a unit of the file: radii from neighbours, normals by principal
+/// component analysis, colours kept.
 ///
 /// # Errors
 /// Those of reading the file and of building the cloud, with the path.
-pub fn scan_from_file(path: &Path) -> anyhow::Result<PointCloud<'static>> {
-    let raw = tldi_sources::read(path, &tldi_sources::ReadOptions::default())
+pub fn scan_from_file(path: &Path, scale: f32) -> anyhow::Result<PointCloud<'static>> {
+    let mut raw = tldi_sources::read(path, &tldi_sources::ReadOptions::default())
         .with_context(|| format!("cannot read the scan {}", path.display()))?;
+    if scale != 1.0 {
+        raw.points.iter_mut().for_each(|point| *point *= scale);
+        raw.radii = None;
+        raw.viewpoint = raw.viewpoint.map(|viewpoint| viewpoint * scale);
+    }
     finish_scan(raw.into_builder())
         .with_context(|| format!("cannot use the scan {}", path.display()))
 }
@@ -110,7 +116,21 @@ pub fn derived(
     place: impl Fn(Vec3) -> Vec3,
     radius: impl Fn(f32) -> f32,
 ) -> Result<PointCloud<'static>, CloudError> {
-    let kept = || (0..cloud.len()).step_by(step);
+    let kept: Vec<usize> = (0..cloud.len()).step_by(step).collect();
+    subset(cloud, &kept, place, radius)
+}
+
+/// The points of a cloud with these indices, as [`derived`].
+///
+/// # Errors
+/// [`CloudError`] if there is none, or places or radii are refused.
+pub fn subset(
+    cloud: &PointCloud<'_>,
+    indices: &[usize],
+    place: impl Fn(Vec3) -> Vec3,
+    radius: impl Fn(f32) -> f32,
+) -> Result<PointCloud<'static>, CloudError> {
+    let kept = || indices.iter().copied();
     let points: Vec<Vec3> = kept().map(|i| place(cloud.point(i))).collect();
     let radii: Vec<f32> = kept().map(|i| radius(cloud.radius(i))).collect();
     let mut builder = PointCloud::builder(points).radii(radii);
@@ -121,4 +141,28 @@ pub fn derived(
         builder = builder.colors(kept().map(|i| colors[i]).collect::<Vec<_>>());
     }
     builder.build()
+}
+
+/// The cloud with a colour (red, green, blue, alpha) for each point.
+///
+/// # Errors
+/// [`CloudError`]; not for a cloud that was valid.
+pub fn painted(
+    cloud: &PointCloud<'_>,
+    color: impl Fn(usize) -> [u8; 4],
+) -> Result<PointCloud<'static>, CloudError> {
+    let points: Vec<Vec3> = cloud.points().collect();
+    let radii: Vec<f32> = (0..cloud.len()).map(|i| cloud.radius(i)).collect();
+    let colors: Vec<[u8; 4]> = (0..cloud.len()).map(color).collect();
+    let mut builder = PointCloud::builder(points).radii(radii).colors(colors);
+    if let Some(normals) = cloud.normals() {
+        builder = builder.normals(normals.to_vec());
+    }
+    builder.build()
+}
+
+/// The name of a file without its folder and extensions.
+pub fn stem(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.split('.').next().unwrap_or_default().to_owned()
 }

@@ -10,6 +10,8 @@ pub struct DropReport {
     pub backend: String,
     /// Name of the GPU, if one did the work.
     pub adapter: Option<String>,
+    /// Why the CPU had to do though a GPU would have been taken.
+    pub fallback: Option<String>,
     /// Steps simulated.
     pub steps: usize,
     /// Length of a step in seconds.

@@ -1,11 +1,13 @@
 //! Lets bodies fall onto a scan and records what happens.
 
+use crate::devices::Devices;
 use crate::report::{BodyReport, DropReport};
 use crate::spots::Spot;
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 use std::time::Instant;
+use tldi::Backend;
 use tldi::glamx::{Pose3, Quat, Vec3};
 
 /// Mass per volume of the bodies in kg/m³: wood.
@@ -53,7 +55,7 @@ pub struct DropSimulation {
     pairs_batched: usize,
     pairs_missed: usize,
     max_penetration: f32,
-    backend: String,
+    devices: Devices,
     wall_seconds: f64,
 }
 
@@ -69,15 +71,16 @@ impl DropSimulation {
     /// its lowest point between 15 and 30 cm above the surface.
     ///
     /// # Errors
-    /// Those of [`TldiPipeline::new`].
+    /// Those of [`TldiPipeline::with_backend`].
     pub fn new(
         scan: PointCloud<'static>,
         up: Vec3,
         bodies: Vec<NamedCloud>,
         spots: &[Spot],
         seed: u64,
+        backend: Box<dyn Backend>,
     ) -> Result<Self, TldiError> {
-        let tldi = TldiPipeline::new(TldiConfig::default())?;
+        let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
         let mut world = PhysicsWorld {
             gravity: -GRAVITY * up,
             ..PhysicsWorld::default()
@@ -116,7 +119,7 @@ impl DropSimulation {
             pairs_batched: 0,
             pairs_missed: 0,
             max_penetration: 0.0,
-            backend: String::new(),
+            devices: Devices::default(),
             wall_seconds: 0.0,
         })
     }
@@ -134,9 +137,7 @@ impl DropSimulation {
         self.pairs_batched += report.pairs_batched;
         self.pairs_missed += report.pairs_missed;
         self.max_penetration = report.max_penetration;
-        if self.backend.is_empty() {
-            self.backend = report.backend.to_string();
-        }
+        self.devices.note(&report);
         for body in &mut self.bodies {
             body.slept_at_step = if self.world.bodies[body.handle].is_sleeping() {
                 body.slept_at_step.or(Some(self.steps))
@@ -181,8 +182,9 @@ impl DropSimulation {
             .iter()
             .map(|body| body.named.cloud.mean_radius());
         DropReport {
-            backend: self.backend.clone(),
-            adapter: None,
+            backend: self.devices.backend.clone(),
+            adapter: self.devices.adapter.clone(),
+            fallback: self.devices.fallback.clone(),
             steps: self.steps,
             dt: DT,
             wall_seconds: self.wall_seconds,

@@ -76,6 +76,12 @@ pub fn find_spots(scan: &PointCloud<'_>, up: Vec3, demand: &Demand) -> Result<Ve
         .collect())
 }
 
+/// Middles of all discs of `radius` metres on the surfaces of `scan` that face `up` (unit length)
+/// and are level and without holes; each is as high as its disc's highest point. Empty without any.
+pub fn level_places(scan: &PointCloud<'_>, up: Vec3, radius: f32) -> Vec<Vec3> {
+    HeightMap::of(scan, up, radius).level_places(radius)
+}
+
 /// Heights of the topmost surfaces over a grid of pixels.
 struct HeightMap {
     image: Tldi,

@@ -12,7 +12,7 @@ const TRIAL_SIZE: [u32; 2] = [160, 90];
 /// Elevations of candidate views over the horizon, in radians: 22°, 35°, 50°.
 const ELEVATIONS: [f32; 3] = [0.38, 0.61, 0.87];
 const AZIMUTHS: usize = 16;
-/// Points of the scan, at most, in the images that candidates are judged by.
+/// Points of a cloud, at most, in the images that candidates are judged by.
 const TRIAL_POINTS: usize = 40_000;
 
 /// A perspective camera with an image of `size` that sees the bodies of a scene as well as
@@ -21,31 +21,22 @@ const TRIAL_POINTS: usize = 40_000;
 /// the near plane where there is no view without them.
 pub fn choose(scene: &Scene<'_>, also_at: &[Vec3], size: [u32; 2]) -> VirtualCamera {
     let framing = Framing::of(scene, also_at);
-    let thinned: Vec<(PointCloud<'static>, Pose3)> = scene
-        .items
-        .iter()
-        .filter(|item| item.paint == Paint::Scan)
+    let thinned: Vec<(PointCloud<'static>, Pose3, Paint)> = (scene.items.iter())
         .filter_map(|item| {
             // The fewer points, the larger their discs, so that they cover as much.
             let step = item.cloud.len().div_ceil(TRIAL_POINTS);
             let grown = |radius| radius * (step as f32).sqrt();
             let cloud = load::derived(item.cloud, step, |p| p, grown).ok()?;
-            Some((cloud, item.scene_from_cloud))
+            Some((cloud, item.scene_from_cloud, item.paint))
         })
         .collect();
-    let scan: Vec<Item<'_>> = thinned
-        .iter()
-        .map(|(cloud, pose)| Item {
-            cloud,
-            scene_from_cloud: *pose,
-            paint: Paint::Scan,
-        })
-        .collect();
-    let bodies: Vec<&Item<'_>> = scene
-        .items
-        .iter()
-        .filter(|item| item.paint != Paint::Scan)
-        .collect();
+    let items = thinned.iter().map(|(cloud, pose, paint)| Item {
+        cloud,
+        scene_from_cloud: *pose,
+        paint: *paint,
+    });
+    let (scan, bodies): (Vec<Item<'_>>, Vec<Item<'_>>) =
+        items.partition(|item| item.paint == Paint::Scan);
     let mut best = (
         f32::NEG_INFINITY,
         framing.camera(0.0, ELEVATIONS[1], false, scene.up, size),
@@ -79,7 +70,7 @@ struct Framing {
 impl Framing {
     fn of(scene: &Scene<'_>, also_at: &[Vec3]) -> Self {
         let bodies = scene.items.iter().filter(|item| item.paint != Paint::Scan);
-        let places = bodies.map(|item| item.scene_from_cloud.translation);
+        let places = bodies.map(|item| item.scene_from_cloud * item.cloud.bounds().center());
         Self {
             places: places.chain(also_at.iter().copied()).collect(),
             radius: scene.detail,
@@ -153,7 +144,7 @@ struct Trial {
 }
 
 impl Trial {
-    fn new(scan: &[Item<'_>], bodies: &[&Item<'_>], camera: &VirtualCamera) -> Self {
+    fn new(scan: &[Item<'_>], bodies: &[Item<'_>], camera: &VirtualCamera) -> Self {
         let mut depths = vec![Vec::new(); (TRIAL_SIZE[0] * TRIAL_SIZE[1]) as usize];
         for item in scan {
             for (k, layers) in pixels_of(&item.image(camera), TRIAL_SIZE) {
@@ -163,7 +154,7 @@ impl Trial {
         for pixel in &mut depths {
             pixel.sort_unstable_by(f32::total_cmp);
         }
-        let front = |item: &&Item<'_>| {
+        let front = |item: &Item<'_>| {
             let image = item.image(camera);
             let pixels = pixels_of(&image, TRIAL_SIZE);
             pixels

@@ -1,31 +1,12 @@
 //! Runs the binary `drop` as a user would.
 
+mod common;
+
+use common::{folder, json, keys, write_ply};
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
-
-/// An empty folder of this test's own.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).unwrap();
-    }
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
-fn write_ply(path: &Path, points: &[[f32; 3]]) {
-    let mut text = format!(
-        "ply\nformat ascii 1.0\nelement vertex {}\n\
-         property float x\nproperty float y\nproperty float z\nend_header\n",
-        points.len()
-    );
-    for [x, y, z] in points {
-        text += &format!("{x} {y} {z}\n");
-    }
-    fs::write(path, text).unwrap();
-}
 
 /// A level floor of 1.6 × 1.6 m with a block on it, z up.
 fn floor_with_block() -> Vec<[f32; 3]> {
@@ -73,21 +54,6 @@ fn drop_in(folder: &Path, options: &[&str]) -> Output {
         .args(options)
         .output()
         .unwrap()
-}
-
-fn json(path: PathBuf) -> Value {
-    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
-}
-
-fn keys(value: &Value) -> Vec<&str> {
-    let mut keys: Vec<&str> = value
-        .as_object()
-        .unwrap()
-        .keys()
-        .map(String::as_str)
-        .collect();
-    keys.sort_unstable();
-    keys
 }
 
 #[test]

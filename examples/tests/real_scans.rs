@@ -1,23 +1,11 @@
 //! Up directions of real scans. Looks for them in the folder that the environment variable
 //! `TLDI_DATA` names, or else in `shared/data` beside the workspace.
 
-use std::path::{Path, PathBuf};
+mod common;
+
 use tldi::glamx::Vec3;
 use tldi_examples::load;
 use tldi_examples::up::{Confidence, detect_up};
-
-fn data_file(name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("TLDI_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
-        PathBuf::from,
-    );
-    let file = folder.join(name);
-    if !file.exists() {
-        eprintln!("SKIPPED: there is no {} (set TLDI_DATA)", file.display());
-        return None;
-    }
-    Some(file)
-}
 
 #[test]
 fn up_of_real_scans_is_found() {
@@ -26,10 +14,10 @@ fn up_of_real_scans_is_found() {
         ("kitchen_scan_300k.ply.gz", Vec3::new(0.009, -0.904, -0.427)),
         ("outdoor_rock_scan_259k.ply.gz", Vec3::Z),
     ] {
-        let Some(file) = data_file(name) else {
+        let Some(file) = common::data(name) else {
             continue;
         };
-        let scan = load::scan_from_file(&file).unwrap();
+        let scan = load::scan_from_file(&file, 1.0).unwrap();
         let points: Vec<Vec3> = scan.points().collect();
         let found = detect_up(&points, scan.normals().unwrap());
         let angle = found.direction.angle_between(up).to_degrees();

@@ -1,6 +1,6 @@
 //! How a drop starts, and what its report says.
 
-use tldi::PointCloud;
+use tldi::{CpuBackend, PointCloud};
 use tldi::glamx::Vec3;
 use tldi_examples::load;
 use tldi_examples::simulation::{DropSimulation, NamedCloud};
@@ -42,7 +42,8 @@ fn simulation(places: &[(Vec3, usize)]) -> DropSimulation {
         .map(|&(surface, level)| Spot { surface, level })
         .collect();
     let bodies = vec![cube(); spots.len()];
-    DropSimulation::new(floor(), Vec3::Z, bodies, &spots, 3).unwrap()
+    let backend = Box::new(CpuBackend::new());
+    DropSimulation::new(floor(), Vec3::Z, bodies, &spots, 3, backend).unwrap()
 }
 
 /// Heights of the lowest and the highest point of each body.

@@ -18,7 +18,7 @@ use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher};
 use rapier3d::pipeline::{ActiveHooks, EventHandler, PhysicsHooks, PhysicsWorld};
 use std::sync::Arc;
 use std::time::Instant;
-use tldi::{Backend, BackendError, PairQuery, PointCloud};
+use tldi::{Backend, BackendError, CloudError, PairQuery, PointCloud};
 
 /// Finds the contacts of point clouds for one physics world.
 ///
@@ -146,6 +146,60 @@ impl TldiPipeline {
             return Ok(());
         }
         let before = self.motions.snapshot(shape.cloud());
+        self.change_shape(colliders, collider, |shape| {
+            shape.set_points(points, normals)
+        })?;
+        self.motions.record_sampled(collider, before);
+        Ok(())
+    }
+
+    /// Replaces the cloud of a collider as a whole, where [`set_points`](Self::set_points) does not
+    /// do: a depth camera's frame brings other points with other radii. Rapier is told, which wakes
+    /// the body and what it touches.
+    ///
+    /// # Errors
+    /// [`TldiError::NoSuchCollider`], [`TldiError::NotACloud`].
+    pub fn set_cloud(
+        &mut self,
+        world: &mut PhysicsWorld,
+        collider: ColliderHandle,
+        cloud: PointCloud<'static>,
+    ) -> Result<(), TldiError> {
+        self.set_collider_cloud(&mut world.colliders, collider, cloud)
+    }
+
+    /// [`set_cloud`](Self::set_cloud) for split sets.
+    ///
+    /// # Errors
+    /// Those of [`set_cloud`](Self::set_cloud).
+    pub fn set_collider_cloud(
+        &mut self,
+        colliders: &mut ColliderSet,
+        collider: ColliderHandle,
+        cloud: PointCloud<'static>,
+    ) -> Result<(), TldiError> {
+        let current = colliders
+            .get(collider)
+            .ok_or(TldiError::NoSuchCollider(collider))?;
+        let Some(shape) = current.shape().as_shape::<PointCloudShape>() else {
+            return Err(TldiError::NotACloud(collider));
+        };
+        let before = self.motions.snapshot(shape.cloud());
+        self.change_shape(colliders, collider, |shape| {
+            shape.set_cloud(cloud);
+            Ok(())
+        })?;
+        self.motions.record_sampled(collider, before);
+        Ok(())
+    }
+
+    /// Changes the shape of a cloud's collider, and remembers that it was.
+    fn change_shape(
+        &mut self,
+        colliders: &mut ColliderSet,
+        collider: ColliderHandle,
+        change: impl FnOnce(&mut PointCloudShape) -> Result<(), CloudError>,
+    ) -> Result<(), TldiError> {
         // The batch of a step that was not finished shares the shape: without it the change is
         // made in place.
         self.shared.batch_mut().clear();
@@ -153,10 +207,7 @@ impl TldiPipeline {
             .get_mut(collider)
             .and_then(|collider| collider.shape_mut().as_shape_mut::<PointCloudShape>())
             .ok_or(TldiError::NotACloud(collider))?;
-        shape
-            .set_points(points, normals)
-            .map_err(|source| TldiError::Cloud { collider, source })?;
-        self.motions.record_sampled(collider, before);
+        change(shape).map_err(|source| TldiError::Cloud { collider, source })?;
         if !self.changed.contains(&collider) {
             self.changed.push(collider);
         }

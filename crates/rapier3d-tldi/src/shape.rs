@@ -160,6 +160,14 @@ impl PointCloudShape {
         Ok(())
     }
 
+    /// Replaces the cloud as a whole: points, radii, normals and colours. The mass properties stay, as
+    /// with [`set_points`](Self::set_points).
+    pub fn set_cloud(&mut self, cloud: PointCloud<'static>) {
+        let mut content = Content::new(cloud, self.mass_model());
+        content.unit_mass = self.content.unit_mass.clone();
+        self.content = Arc::new(content);
+    }
+
     /// Lets the mass properties follow the present points when they are asked for next.
     pub fn refresh_mass(&mut self) {
         if let Some(content) = Arc::get_mut(&mut self.content) {

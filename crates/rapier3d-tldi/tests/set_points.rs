@@ -30,6 +30,36 @@ fn new_points_wake_sleepers() -> TestResult {
     Ok(())
 }
 
+/// Another cloud, coarser and with radii of its own, does as well.
+#[test]
+fn another_cloud_takes_the_place_of_the_first() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let floor = insert_floor(&mut world, 0.8);
+    let (body, collider) = world.insert(dynamic_at(HALF), tldi.collider(cloud(&cube(HALF))));
+    settle(&mut world, &mut tldi)?;
+    let sunk = |p: &Vector| *p - Vector::Y * 0.03;
+    let coarser: Vec<Vector> = square(0.8).iter().step_by(2).map(sunk).collect();
+    let radii = vec![1.5 * SPACING; coarser.len()];
+    let next = PointCloud::builder(coarser).radii(radii).build()?;
+    tldi.set_cloud(&mut world, floor, next.into_owned())?;
+    let report = tldi.step(&mut world)?;
+    assert_eq!((report.pairs_batched, report.pairs_missed), (1, 0));
+    assert!(!world.bodies[body].is_sleeping());
+    settle(&mut world, &mut tldi)?;
+    let height = world.bodies[body].translation().y;
+    assert!(
+        (height - (HALF - 0.03)).abs() < 2.0 * REST_TOLERANCE,
+        "{height}"
+    );
+    let (_, ball) = world.insert(RigidBodyBuilder::dynamic(), ColliderBuilder::ball(0.1));
+    let refused = tldi.set_cloud(&mut world, ball, cloud(&cube(HALF)));
+    assert_eq!(refused, Err(TldiError::NotACloud(ball)));
+    world.remove_body(body);
+    let refused = tldi.set_cloud(&mut world, collider, cloud(&cube(HALF)));
+    assert_eq!(refused, Err(TldiError::NoSuchCollider(collider)));
+    Ok(())
+}
+
 #[test]
 fn set_points_errors_leave_the_cloud() -> TestResult {
     let (mut world, mut tldi) = attached();

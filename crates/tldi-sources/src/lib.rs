@@ -38,6 +38,7 @@
 //! ```
 
 mod collector;
+pub mod depth;
 #[cfg(feature = "e57")]
 mod e57;
 mod error;
@@ -45,6 +46,8 @@ mod header;
 mod input;
 #[cfg(feature = "las")]
 mod las;
+mod mesh_sampling;
+mod moving;
 mod options;
 mod pcd;
 mod ply;
@@ -57,6 +60,8 @@ mod slot;
 mod text;
 
 pub use error::{Position, SourceError, SourceErrorKind};
+pub use mesh_sampling::{MeshSample, sample_mesh};
+pub use moving::{MovingError, MovingPoints};
 pub use options::{Format, Progress, ReadOptions};
 pub use raw_cloud::RawCloud;
 pub use read::{read, read_from, read_with_progress};

@@ -32,6 +32,14 @@ const UNEXPLAINED: f32 = 0.1;
 /// along each main axis. In a disc the rim is at 2.
 const LOWEST_OF_BOWL: f32 = 1.5;
 
+/// Points that a bowl needs at least: it has five unknowns, and through as few points there is
+/// always one, with its lowest point anywhere.
+const LEAST_OF_BOWL: f32 = 6.0;
+
+/// Least spread of the squares of places, as a share of what they have in a disc, and least part of
+/// it that is not common to both axes: of places that differ less the bend is the noise of numbers.
+const LEAST_SPREAD: f32 = 0.02;
+
 /// Of points on one plane with unit normal `normal`, those on which a body would rest: in each
 /// quadrant about the middle the one that is farthest out and lowest, a standard deviation of
 /// extent against one of roughness, which is taken to be at least `least_roughness` metres.
@@ -138,12 +146,15 @@ fn bowl(heights: impl Iterator<Item = (Vec2, f32)> + Clone, count: f32) -> (Vec2
         moment += height * bend;
     }
     let determinant = squares.x * squares.y - mixed * mixed;
-    let widening = Vec2::new(
-        moment.x * squares.y - moment.y * mixed,
-        moment.y * squares.x - moment.x * mixed,
-    ) / determinant;
-    let widening = if widening.is_finite() {
-        widening.max(Vec2::ZERO)
+    let is_known = count >= LEAST_OF_BOWL
+        && squares.min_element() > LEAST_SPREAD * count
+        && determinant > LEAST_SPREAD * squares.x * squares.y;
+    let widening = if is_known {
+        let widening = Vec2::new(
+            moment.x * squares.y - moment.y * mixed,
+            moment.y * squares.x - moment.x * mixed,
+        );
+        (widening / determinant).max(Vec2::ZERO)
     } else {
         Vec2::ZERO
     };
@@ -236,6 +247,37 @@ mod tests {
         assert!((lowest.middle().x + 2.5).abs() < 0.01, "{lowest:?}");
         assert!(lowest.middle().z.abs() < 0.01, "{lowest:?}");
         assert_eq!(cap(Vec2::new(0.02, 0.0)).lowest_of_bowl, None);
+    }
+
+    /// Through few points, or points in few places, goes many a bowl: none of them is believed, least
+    /// of all one that is kilometres deep.
+    #[test]
+    fn few_places_make_no_bowl() {
+        let mut rng = Rng::with_seed(5);
+        for case in 0..2000 {
+            // Up to five points anywhere, or any number at the corners of a rectangle.
+            let at_corners = case % 2 == 0;
+            let count = if at_corners { 12 } else { 1 + case / 2 % 5 };
+            let points: Vec<ContactPoint> = (0..count)
+                .map(|_| {
+                    let sides = [(); 2].map(|()| if rng.bool() { 1.0 } else { -1.0 });
+                    let place = if at_corners {
+                        sides
+                    } else {
+                        sides.map(|s| s * rng.f32())
+                    };
+                    let point = Vec3::new(0.004 * place[0], 0.0, 0.002 * place[1]);
+                    ContactPoint {
+                        point_a: point,
+                        point_b: point,
+                        gap: 0.01 * rng.f32(),
+                    }
+                })
+                .collect();
+            let found = supports(&points, Vec3::Y, 1e-5);
+            assert_eq!(found.lowest_of_bowl, None, "{points:?}");
+            assert!(found.roughness_about_bowl <= found.roughness);
+        }
     }
 
     /// One point far below all others does not take the place of the corners.

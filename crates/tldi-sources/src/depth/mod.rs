@@ -1,0 +1,7 @@
+//! Depth cameras: folders of frames, and points from depth images.
+
+mod camera;
+mod sequence;
+
+pub use camera::{DepthCamera, DepthCloud, Intrinsics, SensorModel};
+pub use sequence::{DepthError, DepthFrame, DepthSequence};

@@ -1,0 +1,295 @@
+//! Points that move: a deforming mesh as a NumPy array or as a folder of clouds.
+
+use crate::{ReadOptions, SourceError};
+use flate2::read::MultiGzDecoder;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+use tldi::glamx::Vec3;
+
+/// Most numbers of an array: 2³¹ bytes of them are more than fits a story.
+const MAX_NUMBERS: u64 = 1 << 29;
+
+/// Positions of the same points in frames at equal distances of time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MovingPoints {
+    /// Frames, all of one length; at least one, none of them empty.
+    frames: Vec<Vec<Vec3>>,
+}
+
+/// Why moving points cannot be read.
+#[derive(Debug, Error)]
+pub enum MovingError {
+    /// A file or folder cannot be read.
+    #[error("{path} cannot be read: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// A file is no array of positions.
+    #[error(
+        "{path}: {reason}; an array of frames × points × 3 is needed, 32- or 64-bit floats in C order, as numpy.save writes it"
+    )]
+    Array {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A cloud of a folder cannot be read.
+    #[error(transparent)]
+    Cloud(#[from] SourceError),
+    /// A folder has no clouds.
+    #[error(
+        "there is no cloud in {0}: it needs one file for each frame, in order of their names (PLY, PCD, XYZ, also as .gz)"
+    )]
+    NoClouds(PathBuf),
+    /// Frames have different numbers of points.
+    #[error(
+        "frame {index} has {found} points, the first one {expected}: the frames must show the same points"
+    )]
+    OtherPoints {
+        /// Which frame, from 0.
+        index: usize,
+        /// Points of the first.
+        expected: usize,
+        /// Points of this one.
+        found: usize,
+    },
+    /// There is nothing in it.
+    #[error("there are no frames, or no points in them")]
+    Empty,
+    /// A coordinate is not finite.
+    #[error("point {point} of frame {frame} is not finite")]
+    NotFinite {
+        /// Which frame, from 0.
+        frame: usize,
+        /// Which point, from 0.
+        point: usize,
+    },
+}
+
+impl MovingPoints {
+    /// Frames that are at hand.
+    ///
+    /// # Errors
+    /// [`MovingError::Empty`], [`MovingError::OtherPoints`], [`MovingError::NotFinite`].
+    pub fn new(frames: Vec<Vec<Vec3>>) -> Result<Self, MovingError> {
+        let expected = frames.first().map_or(0, Vec::len);
+        if expected == 0 {
+            return Err(MovingError::Empty);
+        }
+        for (index, frame) in frames.iter().enumerate() {
+            if frame.len() != expected {
+                return Err(MovingError::OtherPoints {
+                    index,
+                    expected,
+                    found: frame.len(),
+                });
+            }
+            if let Some(point) = frame.iter().position(|p| !p.is_finite()) {
+                return Err(MovingError::NotFinite {
+                    frame: index,
+                    point,
+                });
+            }
+        }
+        Ok(Self { frames })
+    }
+
+    /// Reads a NumPy file (`.npy`, also packed with gzip) or a folder with a cloud for each frame.
+    ///
+    /// # Errors
+    /// [`MovingError`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, MovingError> {
+        let path = path.as_ref();
+        if path.is_dir() {
+            read_folder(path)
+        } else {
+            read_npy(path)
+        }
+    }
+
+    /// The frames.
+    pub fn frames(&self) -> &[Vec<Vec3>] {
+        &self.frames
+    }
+
+    /// Number of points.
+    pub fn points(&self) -> usize {
+        self.frames[0].len()
+    }
+
+    /// The frames with every position moved.
+    pub fn map(&mut self, place: impl Fn(Vec3) -> Vec3) {
+        for point in self.frames.iter_mut().flatten() {
+            *point = place(*point);
+        }
+    }
+
+    /// Where the points are at `phase`, of which a whole number is the first frame again: the last
+    /// frame leads into the first. Through four frames around the phase by Catmull–Rom splines, so
+    /// that velocities have no jumps.
+    ///
+    /// ```
+    /// use tldi_sources::MovingPoints;
+    /// use tldi::glamx::Vec3;
+    /// let round = [Vec3::X, Vec3::Y, -Vec3::X, -Vec3::Y].map(|p| vec![p]).to_vec();
+    /// let round = MovingPoints::new(round)?;
+    /// assert_eq!(round.at(0.25)[0], Vec3::Y);
+    /// assert!((round.at(1.125)[0].length() - 1.0).abs() < 0.15);
+    /// # Ok::<(), tldi_sources::MovingError>(())
+    /// ```
+    pub fn at(&self, phase: f32) -> Vec<Vec3> {
+        let count = self.frames.len();
+        let place = phase.rem_euclid(1.0) * count as f32;
+        let first = (place.floor() as usize).min(count - 1);
+        let t = place - first as f32;
+        let frame = |offset: usize| &self.frames[(first + count - 1 + offset) % count];
+        let [before, from, to, after] = [frame(0), frame(1), frame(2), frame(3)];
+        (0..from.len())
+            .map(|i| {
+                let [a, b, c, d] = [before[i], from[i], to[i], after[i]];
+                let slope = 0.5 * (c - a);
+                let next_slope = 0.5 * (d - b);
+                let rest = c - b;
+                b + t
+                    * (slope
+                        + t * ((3.0 * rest - 2.0 * slope - next_slope)
+                            + t * (slope + next_slope - 2.0 * rest)))
+            })
+            .collect()
+    }
+}
+
+fn read_folder(folder: &Path) -> Result<MovingPoints, MovingError> {
+    let io = |source| MovingError::Io {
+        path: folder.to_owned(),
+        source,
+    };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        if path.is_file() && crate::Format::from_extension(&path).is_some() {
+            files.push(path);
+        }
+    }
+    files.sort();
+    if files.is_empty() {
+        return Err(MovingError::NoClouds(folder.to_owned()));
+    }
+    let mut frames = Vec::new();
+    let mut origin = None;
+    for file in files {
+        let options = ReadOptions {
+            origin,
+            ..ReadOptions::default()
+        };
+        let cloud = crate::read(file, &options)?;
+        origin = Some(cloud.origin);
+        frames.push(cloud.points);
+    }
+    MovingPoints::new(frames)
+}
+
+fn read_npy(path: &Path) -> Result<MovingPoints, MovingError> {
+    let io = |source| MovingError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let bad = |reason: &str| MovingError::Array {
+        path: path.to_owned(),
+        reason: reason.to_owned(),
+    };
+    let mut raw = BufReader::new(File::open(path).map_err(io)?);
+    let is_packed = path.extension().is_some_and(|extension| extension == "gz");
+    let mut source: Box<dyn Read> = if is_packed {
+        Box::new(MultiGzDecoder::new(&mut raw))
+    } else {
+        Box::new(&mut raw)
+    };
+    let mut exact = |bytes: &mut [u8], what: &str| {
+        (source.read_exact(bytes)).map_err(|error| bad(&format!("the {what} ends early ({error})")))
+    };
+    let mut start = [0; 8];
+    exact(&mut start, "header")?;
+    if !start.starts_with(b"\x93NUMPY") {
+        return Err(bad("it is no NumPy file"));
+    }
+    let mut length = [0; 4];
+    // Version 1 has two bytes of length, later ones four.
+    let bytes = if start[6] == 1 { 2 } else { 4 };
+    exact(&mut length[..bytes], "header")?;
+    let length = u32::from_le_bytes(length) as usize;
+    if length > 1 << 16 {
+        return Err(bad("its header is too long"));
+    }
+    let mut header = vec![0; length];
+    exact(&mut header, "header")?;
+    let header = String::from_utf8_lossy(&header);
+    let Header { is_double, shape } = parse_header(&header).map_err(|reason| bad(&reason))?;
+    let [frames, points] = shape;
+    let numbers = frames.checked_mul(points).and_then(|n| n.checked_mul(3));
+    let Some(numbers) = numbers.filter(|n| *n <= MAX_NUMBERS) else {
+        return Err(bad("it is too large"));
+    };
+    let size = if is_double { 8 } else { 4 };
+    let mut found = Vec::new();
+    // Frame by frame: no more is taken than really comes.
+    let mut frame = vec![0; (numbers / frames.max(1) * size) as usize];
+    for index in 0..frames {
+        exact(&mut frame, &format!("frame {index} of {frames}"))?;
+        let number = |bytes: &[u8]| match is_double {
+            true => f64::from_le_bytes(std::array::from_fn(|k| bytes[k])) as f32,
+            false => f32::from_le_bytes(std::array::from_fn(|k| bytes[k])),
+        };
+        let values: Vec<f32> = frame.chunks_exact(size as usize).map(number).collect();
+        found.push(
+            values
+                .chunks_exact(3)
+                .map(|p| Vec3::new(p[0], p[1], p[2]))
+                .collect(),
+        );
+    }
+    MovingPoints::new(found)
+}
+
+struct Header {
+    is_double: bool,
+    shape: [u64; 2],
+}
+
+/// Reads `{'descr': '<f4', 'fortran_order': False, 'shape': (24, 8431, 3), }`.
+fn parse_header(header: &str) -> Result<Header, String> {
+    let after = |key: &str| {
+        let rest = header.split_once(&format!("'{key}':"));
+        rest.map(|(_, rest)| rest.trim_start())
+            .ok_or_else(|| format!("its header has no {key}"))
+    };
+    let kind: String = (after("descr")?.chars().skip(1))
+        .take_while(|c| *c != '\'')
+        .collect();
+    let is_double = match kind.as_str() {
+        "<f4" => false,
+        "<f8" => true,
+        _ => return Err(format!("its numbers are {kind}, not <f4 or <f8")),
+    };
+    if !after("fortran_order")?.starts_with("False") {
+        return Err("it is in Fortran order".to_owned());
+    }
+    let shape = after("shape")?;
+    let inside = shape.split(['(', ')']).nth(1).unwrap_or_default();
+    let sizes: Vec<u64> = (inside.split(',').map(str::trim).filter(|s| !s.is_empty()))
+        .map(|size| size.parse().map_err(|_| format!("its shape is ({inside})")))
+        .collect::<Result<_, _>>()?;
+    match sizes[..] {
+        [frames, points, 3] => Ok(Header {
+            is_double,
+            shape: [frames, points],
+        }),
+        _ => Err(format!("its shape is ({inside})")),
+    }
+}

@@ -1,0 +1,345 @@
+//! Depth frames become a collider that is new in every frame; bodies rest on it and are pushed.
+
+use anyhow::{Context, bail};
+use clap::Parser;
+use std::io;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{PointCloud, VirtualCamera};
+use tldi_examples::cli::{Common, UpChoice};
+use tldi_examples::depth::{
+    DepthScene, DepthSimulation, DepthSnapshot, FrameSource, GeneratedCamera, camera_up,
+};
+use tldi_examples::render::{BODY_COLORS, Item, Paint, Picture, Scene};
+use tldi_examples::scan::positive;
+use tldi_examples::scene::BodyShape;
+use tldi_examples::simulation::NamedCloud;
+use tldi_examples::spots::{Demand, Spot, find_spots};
+use tldi_examples::{animation, load, output, viewpoint};
+use tldi_sources::depth::{DepthCamera, DepthSequence, SensorModel};
+
+/// Depth frames become a collider that is new in every frame; bodies rest on it and are pushed
+///
+/// Frames come at 30 a second of simulated time. Without a folder, a generated sequence is used: a
+/// ball is moved across a low table. Ends with 0 if every frame was taken, with 1 if not, with 2 if
+/// the options cannot be used.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// Folder with intrinsics.txt (width height fx fy cx cy depth_unit_metres), poses.txt (file, then
+    /// the 4×4 camera-to-world matrix row by row, metres) and the 16-bit grey PNG files it lists
+    #[arg(long, value_name = "DIR")]
+    frames: Option<PathBuf>,
+    /// Number of bodies
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(0..=100))]
+    count: u16,
+    /// Width of the bodies in metres; if left out, what the frames resolve
+    #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
+    size: Option<f32>,
+    /// Seconds for which the first frame stays, so that the bodies land before things move
+    #[arg(long, value_name = "S", default_value_t = 1.5)]
+    hold: f32,
+    /// How often the frames are shown
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    loops: u16,
+    /// Remember the points of this many frames where the present one does not see
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    memory: usize,
+    /// Standard deviation of depth at 1 m, metres; it grows with the square of the range
+    #[arg(long, value_name = "M", default_value_t = SensorModel::default().noise, value_parser = positive, allow_hyphen_values = true)]
+    sensor_noise: f32,
+    /// Direction against gravity in the world of the poses; auto finds it in the first frame
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        default_value = "auto",
+        allow_hyphen_values = true
+    )]
+    up: UpChoice,
+    /// Folder for initial.png, mid.png and final.png
+    #[arg(long, value_name = "DIR", default_value = "out/depth_camera")]
+    out: PathBuf,
+    /// Also write motion.png, an animated PNG
+    #[arg(long)]
+    animate: bool,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Frames of the generated sequence.
+const GENERATED_FRAMES: usize = 150;
+const FRAME_SECONDS: f32 = 1.0 / 30.0;
+/// Width of a body in metres, and at least this many mean radii of a frame.
+const BODY_SIZE: f32 = 0.08;
+const GENERATED_BODY_SIZE: f32 = 0.14;
+const BODY_RADII: f32 = 8.0;
+const BODY_SPACING: f32 = 0.03;
+const PICTURE_SIZE: [u32; 2] = [1280, 720];
+const ANIMATION_SIZE: [u32; 2] = [640, 360];
+/// Frames from one picture of the animation to the next.
+const ANIMATION_FRAMES: usize = 3;
+/// Of the points of a frame, one in as many is kept for the animation.
+const ANIMATION_POINT_STEP: usize = 4;
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> anyhow::Result<()> {
+    if !(0.0..=3600.0).contains(&args.hold) {
+        bail!("--hold must be from 0 to 3600 seconds");
+    }
+    let (source, missing) = open(args)?;
+    let model = SensorModel {
+        noise: args.sensor_noise,
+        ..SensorModel::default()
+    };
+    let mut camera = DepthCamera::new(source.intrinsics(), model);
+    let first = source.frame(0)?;
+    let seen = camera.points(&first.depths, &first.world_from_camera);
+    if seen.points.is_empty() {
+        bail!(
+            "{} has no measurement between {} and {} m: is the depth unit right?",
+            first.name,
+            model.range[0],
+            model.range[1]
+        );
+    }
+    let cloud = seen.into_builder().build()?.into_owned();
+    let up = match args.up {
+        UpChoice::Given(up) => up,
+        UpChoice::Auto => {
+            let normals = cloud.normals().unwrap_or_default();
+            let up = camera_up(normals, &first.world_from_camera);
+            let [x, y, z] = up.to_array();
+            eprintln!("up is {x:.3},{y:.3},{z:.3}; --up X,Y,Z sets it");
+            up
+        }
+    };
+    let bodies = make_bodies(args, cloud.mean_radius())?;
+    let spots = match &source {
+        _ if bodies.is_empty() => Vec::new(),
+        FrameSource::Generated(_) if bodies.len() <= GeneratedCamera::spots().len() => {
+            GeneratedCamera::spots()
+        }
+        _ => spots_in_view(&source, &camera, &cloud, up, &bodies, args.common.seed)?,
+    };
+    let scene = DepthScene {
+        camera,
+        up,
+        bodies,
+        spots,
+        memory: args.memory,
+        seed: args.common.seed,
+    };
+    let mut simulation = DepthSimulation::new(scene, &first, args.common.backend.open()?)?;
+    let snapshots = simulate(&mut simulation, &source, args)?;
+    let report = simulation.report(missing);
+    draw(&simulation, up, &snapshots, args)?;
+    if let Some(path) = &args.common.json {
+        output::write_json(path, &report)?;
+    }
+    report.write_table(&mut io::stdout().lock())?;
+    Ok(())
+}
+
+/// The frames, and those that are missing.
+fn open(args: &Args) -> anyhow::Result<(FrameSource, Vec<String>)> {
+    let Some(folder) = &args.frames else {
+        eprintln!("generating depth frames");
+        let camera = GeneratedCamera {
+            frames: GENERATED_FRAMES,
+            seed: args.common.seed,
+        };
+        return Ok((FrameSource::Generated(camera), Vec::new()));
+    };
+    let sequence = DepthSequence::open(folder)
+        .with_context(|| format!("cannot use the frames in {}", folder.display()))?;
+    eprintln!("{} frames in {}", sequence.frames.len(), folder.display());
+    let missing = sequence.missing.clone();
+    if !missing.is_empty() {
+        let names = &missing[..missing.len().min(3)].join(", ");
+        eprintln!(
+            "warning: {} frames of poses.txt are not there: {names} …",
+            missing.len()
+        );
+    }
+    Ok((FrameSource::Folder(sequence), missing))
+}
+
+fn make_bodies(args: &Args, frame_radius: f32) -> anyhow::Result<Vec<NamedCloud>> {
+    let least = if args.frames.is_some() {
+        BODY_SIZE
+    } else {
+        GENERATED_BODY_SIZE
+    };
+    let size = args.size.unwrap_or(least.max(BODY_RADII * frame_radius));
+    let shapes = [BodyShape::RoundedBox, BodyShape::Pebble, BodyShape::Star];
+    (0..usize::from(args.count))
+        .map(|k| {
+            let shape = shapes[k % shapes.len()];
+            let cloud = load::body_from_surface(shape.sample(BODY_SPACING, args.common.seed))?;
+            Ok(NamedCloud {
+                name: format!("{} {}", shape.name(), k + 1),
+                cloud: load::resized(&cloud, size)?,
+            })
+        })
+        .collect()
+}
+
+/// Places that the first frame and the last one see, on near surfaces if there are any, which are
+/// sharper.
+fn spots_in_view(
+    source: &FrameSource,
+    camera: &DepthCamera,
+    first: &PointCloud<'_>,
+    up: Vec3,
+    bodies: &[NamedCloud],
+    seed: u64,
+) -> anyhow::Result<Vec<Spot>> {
+    let radius = |body: &NamedCloud| body.cloud.points().map(Vec3::length).fold(0.0, f32::max);
+    let demand = Demand {
+        count: bodies.len(),
+        body_radius: bodies.iter().map(radius).fold(0.0, f32::max),
+        seed,
+    };
+    let frame = source.frame(source.len() - 1)?;
+    let mut last = camera.clone();
+    last.points(&frame.depths, &frame.world_from_camera);
+    let camera_from_world = frame.world_from_camera.inverse();
+    let depth = |i: usize| (camera_from_world * first.point(i)).z;
+    let seen: Vec<usize> = (0..first.len())
+        .filter(|i| last.sees(first.point(*i), &camera_from_world))
+        .collect();
+    let mut depths: Vec<f32> = seen.iter().map(|i| depth(*i)).collect();
+    depths.sort_unstable_by(f32::total_cmp);
+    let median = depths.get(depths.len() / 2).copied().unwrap_or(0.0);
+    let near: Vec<usize> = seen
+        .iter()
+        .copied()
+        .filter(|i| depth(*i) <= median)
+        .collect();
+    for indices in [near, seen] {
+        if indices.is_empty() {
+            continue;
+        }
+        let part = load::subset(first, &indices, |p| p, |r| r)?;
+        if let Ok(spots) = find_spots(&part, up, &demand) {
+            return Ok(spots);
+        }
+    }
+    Ok(find_spots(first, up, &demand)?)
+}
+
+/// Shows all frames; snapshots before the first, at three fifths and after the last or, for an
+/// animation, after every [`ANIMATION_FRAMES`].
+fn simulate(
+    simulation: &mut DepthSimulation,
+    source: &FrameSource,
+    args: &Args,
+) -> anyhow::Result<Vec<DepthSnapshot>> {
+    let held = (args.hold / FRAME_SECONDS).round() as usize;
+    let shown = source.len() * usize::from(args.loops);
+    let all = held + shown;
+    let bar = output::progress_bar(all, "frames");
+    let mut snapshots = vec![simulation.snapshot(1)?];
+    let order = std::iter::repeat_n(0, held).chain((0..shown).map(|k| k % source.len()));
+    for (k, index) in order.enumerate() {
+        let frame = source.frame(index)?;
+        (simulation.take_frame(&frame)).with_context(|| format!("{} failed", frame.name))?;
+        if k == all * 3 / 5 || k + 1 == all {
+            snapshots.push(simulation.snapshot(1)?);
+        } else if args.animate && k % ANIMATION_FRAMES == 0 {
+            snapshots.push(simulation.snapshot(ANIMATION_POINT_STEP)?);
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(snapshots)
+}
+
+fn draw(
+    simulation: &DepthSimulation,
+    up: Vec3,
+    snapshots: &[DepthSnapshot],
+    args: &Args,
+) -> anyhow::Result<()> {
+    let clouds: Vec<&PointCloud<'static>> = simulation.clouds().collect();
+    let picture = |snapshot: &DepthSnapshot, camera: &VirtualCamera| -> Picture {
+        scene_of(&clouds, up, snapshot).draw(camera, &snapshot.contacts)
+    };
+    let [initial, last] = [&snapshots[0], &snapshots[snapshots.len() - 1]];
+    // Bodies that fell off are not followed.
+    let start = &initial.world_from_body;
+    let near =
+        |pose: &Pose3| (start.iter()).any(|from| from.translation.distance(pose.translation) < 1.0);
+    let places: Vec<Vec3> = (snapshots.iter())
+        .flat_map(|snapshot| snapshot.world_from_body.iter())
+        .filter(|pose| near(pose))
+        .map(|pose| pose.translation)
+        .collect();
+    let camera = |size| {
+        let shown = scene_of(&clouds, up, initial);
+        viewpoint::choose(&shown, &places, size)
+    };
+    output::make_folder(&args.out)?;
+    let large = camera(PICTURE_SIZE);
+    let mid = &snapshots[(snapshots.len() * 3 / 5).min(snapshots.len() - 2)];
+    for (snapshot, name) in [
+        (initial, "initial.png"),
+        (mid, "mid.png"),
+        (last, "final.png"),
+    ] {
+        output::write_file(&args.out.join(name), &picture(snapshot, &large).to_png()?)?;
+    }
+    if args.animate {
+        let small = camera(ANIMATION_SIZE);
+        let bar = output::progress_bar(snapshots.len(), "pictures");
+        let mut pictures = Vec::new();
+        for snapshot in snapshots {
+            pictures.push(picture(snapshot, &small));
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        let seconds = ANIMATION_FRAMES as f32 * FRAME_SECONDS;
+        let bytes = animation::to_apng(&pictures, seconds)?;
+        output::write_file(&args.out.join("motion.png"), &bytes)?;
+    }
+    eprintln!("pictures are in {}", args.out.display());
+    Ok(())
+}
+
+fn scene_of<'a>(
+    clouds: &[&'a PointCloud<'static>],
+    up: Vec3,
+    snapshot: &'a DepthSnapshot,
+) -> Scene<'a> {
+    let frame = Item {
+        cloud: &snapshot.frame,
+        scene_from_cloud: Pose3::IDENTITY,
+        paint: Paint::Scan,
+    };
+    let bodies = (clouds
+        .iter()
+        .zip(&snapshot.world_from_body)
+        .zip(BODY_COLORS.iter().cycle()))
+    .map(|((cloud, pose), color)| Item {
+        cloud,
+        scene_from_cloud: *pose,
+        paint: Paint::Body(*color),
+    });
+    let sizes = clouds.iter().map(|cloud| cloud.bounds().extents().length());
+    Scene {
+        items: std::iter::once(frame).chain(bodies).collect(),
+        up,
+        detail: sizes.fold(0.1, f32::max),
+    }
+}

@@ -1,0 +1,248 @@
+//! A robot whose links are point clouds moves in a scan that is a point cloud.
+
+use anyhow::{Context, bail};
+use clap::Parser;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{PointCloud, VirtualCamera};
+use tldi_examples::cli::{Common, Triple};
+use tldi_examples::render::{BODY_COLORS, Item, Paint, Picture, Scene};
+use tldi_examples::robot::{
+    BUILT_IN, Base, DT, Description, RobotScene, RobotSimulation, RobotSnapshot,
+};
+use tldi_examples::scan::{ScanSource, choose_up, load_scan};
+use tldi_examples::{animation, load, output, viewpoint};
+
+/// A robot whose links are point clouds moves in a scan that is a point cloud
+///
+/// An arm reaches through loose bodies and onto the scan; a robot on wheels or legs drives or steps.
+/// Without files, a built-in arm and a generated room are used. Ends with 0 if every step was taken
+/// and the robot did not fall out of the scan, with 1 if not, with 2 if the options cannot be used.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// Robot; links become clouds of their collision, else their visual geometry
+    #[arg(long, value_name = "FILE")]
+    urdf: Option<PathBuf>,
+    #[command(flatten)]
+    source: ScanSource,
+    /// Where the robot stands, in the frame of the scan, metres; found if left out
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    place: Option<Triple>,
+    /// Whether the robot's root is fixed to the scan
+    #[arg(long, value_enum, default_value_t = Base::Auto)]
+    base: Base,
+    /// Loose bodies in the reach of an arm, at most
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    bodies: usize,
+    /// Number of steps of 1/60 s; if left out, as long as the motion takes, at most 20 s
+    #[arg(long, value_name = "N")]
+    steps: Option<usize>,
+    /// Standard deviation of the scan's points in metres, for the self-filter
+    #[arg(long, value_name = "M", default_value_t = 0.003)]
+    sensor_noise: f32,
+    /// The scan comes anew 30 times a second, from a camera that sees the robot too
+    #[arg(long)]
+    own_camera: bool,
+    /// Leave points of the scan that lie on the robot where they are
+    #[arg(long)]
+    no_self_filter: bool,
+    /// Folder for initial.png, mid.png and final.png
+    #[arg(long, value_name = "DIR", default_value = "out/robot_in_scan")]
+    out: PathBuf,
+    /// Also write motion.png, an animated PNG
+    #[arg(long)]
+    animate: bool,
+    #[command(flatten)]
+    common: Common,
+}
+
+const PICTURE_SIZE: [u32; 2] = [1280, 720];
+const ANIMATION_SIZE: [u32; 2] = [640, 360];
+/// Steps from one picture of the animation to the next.
+const ANIMATION_STEPS: usize = 6;
+/// Seconds of a motion without an end, and at most of any.
+const LONGEST_SECONDS: f32 = 20.0;
+const ENDLESS_SECONDS: f32 = 8.0;
+/// Radius in mean radii up to which points of the scan are drawn: lone ones would hide the rest.
+const LARGEST_DRAWN_RADIUS: f32 = 3.0;
+/// Colours of links, and of links that touch something.
+const LINK_COLORS: [[f32; 3]; 2] = [[0.90, 0.90, 0.88], [0.30, 0.34, 0.40]];
+const TOUCHING_COLOR: [f32; 3] = [0.92, 0.30, 0.16];
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> anyhow::Result<()> {
+    if !(args.sensor_noise.is_finite() && args.sensor_noise >= 0.0) {
+        bail!("--sensor-noise must be a number that is not negative");
+    }
+    let robot = load_robot(args.urdf.as_deref())?;
+    let scan = load_scan(&args.source, args.common.seed)?;
+    let up = choose_up(args.source.up, &scan);
+    let scene = RobotScene {
+        scan,
+        up,
+        robot,
+        base: args.base,
+        at: args.place.map(|Triple(place)| place),
+        bodies: args.bodies,
+        sensor_noise: args.sensor_noise,
+        own_camera: args.own_camera,
+        self_filter: !args.no_self_filter,
+        seed: args.common.seed,
+    };
+    let mut simulation = RobotSimulation::new(scene, args.common.backend.open()?)?;
+    if simulation.tip().is_none() && simulation.report().driven_joints == 0 {
+        eprintln!("the robot has no joint that moves: it just stands there");
+    }
+    let snapshots = simulate(&mut simulation, args.steps)?;
+    let report = simulation.report();
+    draw(&simulation, up, &snapshots, args)?;
+    if let Some(path) = &args.common.json {
+        output::write_json(path, &report)?;
+    }
+    report.write_table(&mut io::stdout().lock())?;
+    if !simulation.is_on_scan() {
+        bail!("the robot fell out of the scan");
+    }
+    Ok(())
+}
+
+fn load_robot(path: Option<&Path>) -> anyhow::Result<Description> {
+    let robot = match path {
+        Some(path) => {
+            eprintln!("reading {}", path.display());
+            Description::from_file(path)
+                .with_context(|| format!("cannot use the robot {}", path.display()))?
+        }
+        None => Description::from_text(BUILT_IN, Path::new(""))?,
+    };
+    for warning in &robot.warnings {
+        eprintln!("warning: {warning}");
+    }
+    Ok(robot)
+}
+
+/// Takes all steps; a snapshot before the first, and after every [`ANIMATION_STEPS`].
+fn simulate(
+    simulation: &mut RobotSimulation,
+    steps: Option<usize>,
+) -> anyhow::Result<Vec<RobotSnapshot>> {
+    let seconds = match simulation.motion_seconds() {
+        seconds if seconds.is_finite() => (seconds + 0.5).min(LONGEST_SECONDS),
+        _ => ENDLESS_SECONDS,
+    };
+    let steps = steps.unwrap_or((seconds / DT).ceil() as usize);
+    let bar = output::progress_bar(steps, "steps");
+    let mut snapshots = vec![simulation.snapshot()];
+    for step in 1..=steps {
+        (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
+        if step % ANIMATION_STEPS == 0 || step == steps {
+            snapshots.push(simulation.snapshot());
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(snapshots)
+}
+
+fn draw(
+    simulation: &RobotSimulation,
+    up: Vec3,
+    snapshots: &[RobotSnapshot],
+    args: &Args,
+) -> anyhow::Result<()> {
+    let scan = simulation.scan();
+    let most = LARGEST_DRAWN_RADIUS * scan.mean_radius();
+    let drawn_scan = load::derived(scan, 1, |p| p, |radius| radius.min(most))?;
+    let [initial, last] = [&snapshots[0], &snapshots[snapshots.len() - 1]];
+    // The moment with the most contacts is the one worth a picture.
+    let mid = (snapshots
+        .iter()
+        .max_by_key(|snapshot| snapshot.contacts.len()))
+    .unwrap_or(last);
+    let places: Vec<Vec3> = (snapshots.iter().step_by(4))
+        .flat_map(|snapshot| snapshot.scan_from_link.iter().map(|pose| pose.translation))
+        .collect();
+    let scene = |snapshot: &RobotSnapshot| scene_of(simulation, &drawn_scan, up, snapshot);
+    let camera = |size| viewpoint::choose(&scene(initial), &places, size);
+    let picture = |snapshot: &RobotSnapshot, camera: &VirtualCamera| -> Picture {
+        scene(snapshot).draw(camera, &snapshot.contacts)
+    };
+    output::make_folder(&args.out)?;
+    let large = camera(PICTURE_SIZE);
+    for (snapshot, name) in [
+        (initial, "initial.png"),
+        (mid, "mid.png"),
+        (last, "final.png"),
+    ] {
+        output::write_file(&args.out.join(name), &picture(snapshot, &large).to_png()?)?;
+    }
+    if args.animate {
+        let small = camera(ANIMATION_SIZE);
+        let bar = output::progress_bar(snapshots.len(), "pictures");
+        let pictures: Vec<Picture> = (snapshots.iter())
+            .map(|snapshot| {
+                bar.inc(1);
+                picture(snapshot, &small)
+            })
+            .collect();
+        bar.finish_and_clear();
+        let bytes = animation::to_apng(&pictures, ANIMATION_STEPS as f32 * DT)?;
+        output::write_file(&args.out.join("motion.png"), &bytes)?;
+    }
+    eprintln!("pictures are in {}", args.out.display());
+    Ok(())
+}
+
+fn scene_of<'a>(
+    simulation: &'a RobotSimulation,
+    drawn_scan: &'a PointCloud<'a>,
+    up: Vec3,
+    snapshot: &RobotSnapshot,
+) -> Scene<'a> {
+    let scan = Item {
+        cloud: drawn_scan,
+        scene_from_cloud: Pose3::IDENTITY,
+        paint: Paint::Scan,
+    };
+    let links = simulation.links().iter().enumerate().map(|(k, link)| Item {
+        cloud: &link.cloud,
+        scene_from_cloud: snapshot.scan_from_link[k],
+        paint: Paint::Body(if snapshot.link_touches[k] {
+            TOUCHING_COLOR
+        } else {
+            LINK_COLORS[k % 2]
+        }),
+    });
+    let colors = BODY_COLORS[1..].iter().cycle();
+    let bodies = (simulation
+        .loose_clouds()
+        .zip(&snapshot.scan_from_body)
+        .zip(colors))
+    .map(|((cloud, pose), color)| Item {
+        cloud,
+        scene_from_cloud: *pose,
+        paint: Paint::Body(*color),
+    });
+    let sizes = simulation
+        .links()
+        .iter()
+        .map(|link| link.cloud.bounds().extents().length());
+    Scene {
+        items: std::iter::once(scan).chain(links).chain(bodies).collect(),
+        up,
+        detail: 0.3 * sizes.fold(0.0, f32::max),
+    }
+}

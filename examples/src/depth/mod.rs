@@ -1,0 +1,13 @@
+//! Depth frames as a collider that is new in every frame.
+
+mod camera_up;
+mod generated;
+mod report;
+mod simulation;
+mod source;
+
+pub use camera_up::camera_up;
+pub use generated::GeneratedCamera;
+pub use report::{DepthReport, FrameReport};
+pub use simulation::{DepthScene, DepthSimulation, DepthSnapshot};
+pub use source::{FrameSource, TimedFrame};

@@ -1,0 +1,155 @@
+//! What a run of `depth_camera` found.
+
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// As written to `--json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct DepthReport {
+    /// Name of the backend that compared the clouds.
+    pub backend: String,
+    /// Name of the GPU, if one did the work.
+    pub adapter: Option<String>,
+    /// Why the CPU had to do though a GPU would have been taken.
+    pub fallback: Option<String>,
+    /// Steps simulated.
+    pub steps: usize,
+    /// Length of a step in seconds.
+    pub dt: f32,
+    /// Frames per second of the camera, in simulated time.
+    pub frame_rate: f32,
+    /// Wall-clock time of frames and steps in seconds, without decoding.
+    pub wall_seconds: f64,
+    /// Simulated time by wall-clock time.
+    pub real_time_factor: f64,
+    /// Up direction, in the frame of the world.
+    pub up: [f32; 3],
+    /// Steps in which a body touched the frame or another body.
+    pub contact_steps: usize,
+    /// Deepest penetration in metres over all steps.
+    pub max_penetration: f32,
+    /// Pairs compared in batches, over all steps.
+    pub pairs_batched: usize,
+    /// Pairs compared on the spot, over all steps.
+    pub pairs_missed: usize,
+    /// Frames that are listed but not there.
+    pub missing_frames: Vec<String>,
+    /// Median of the frames' `latency_ms`.
+    pub median_latency_ms: f64,
+    /// Largest of the frames' `latency_ms`.
+    pub max_latency_ms: f64,
+    /// The frames, in the order in which they came.
+    pub frames: Vec<FrameReport>,
+    /// The bodies.
+    pub bodies: Vec<DepthBodyReport>,
+}
+
+/// One frame. Times are milliseconds of wall-clock time.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameReport {
+    /// Name of the file.
+    pub name: String,
+    /// Points.
+    pub points: usize,
+    /// Pixels without a measurement.
+    pub empty_pixels: usize,
+    /// Pixels dropped at jumps in depth.
+    pub flying_pixels: usize,
+    /// Points of earlier frames that are remembered.
+    pub remembered_points: usize,
+    /// Reading and decoding the file; not part of the latency, as a camera does not do it.
+    pub decode_ms: f64,
+    /// Points, radii and normals from depths.
+    pub unproject_ms: f64,
+    /// Making the cloud and giving it to the collider.
+    pub update_ms: f64,
+    /// The step that follows: batch, contacts, solver.
+    pub step_ms: f64,
+    /// From the depth image to the contacts: the three times above.
+    pub latency_ms: f64,
+    /// Pairs in contact after that step.
+    pub contacts: usize,
+}
+
+/// One body after the last step.
+#[derive(Clone, Debug, Serialize)]
+pub struct DepthBodyReport {
+    /// What it is, and its number.
+    pub name: String,
+    /// Number of points.
+    pub points: usize,
+    /// Position in the frame of the world, metres.
+    pub translation: [f32; 3],
+    /// How far it is from where it first came to rest or, if it never did, from its start, metres.
+    pub displacement: f32,
+    /// Speed in m/s.
+    pub linear_speed: f32,
+    /// Whether it sleeps.
+    pub sleeping: bool,
+    /// Simulated seconds after which it was first slower than 3 cm/s for a quarter of a second; null
+    /// if it never was.
+    pub first_rested_at_seconds: Option<f32>,
+}
+
+/// A number of a frame.
+type Column<'a> = &'a dyn Fn(&FrameReport) -> f64;
+
+impl DepthReport {
+    /// Writes the results as tables for people.
+    ///
+    /// # Errors
+    /// Those of writing.
+    pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
+        let column = |value: Column<'_>| {
+            let mut values: Vec<f64> = self.frames.iter().map(value).collect();
+            values.sort_by(f64::total_cmp);
+            let last = values.len().saturating_sub(1);
+            let at = |k: usize| values.get(k).copied().unwrap_or(0.0);
+            [at(last / 2), at(last)]
+        };
+        writeln!(out, "{:<22} {:>10} {:>10}", "of a frame", "median", "most")?;
+        let rows: [(&str, Column<'_>); 7] = [
+            ("points", &|f| f.points as f64),
+            ("flying pixels", &|f| f.flying_pixels as f64),
+            ("decode ms", &|f| f.decode_ms),
+            ("unproject ms", &|f| f.unproject_ms),
+            ("update ms", &|f| f.update_ms),
+            ("step ms", &|f| f.step_ms),
+            ("latency ms", &|f| f.latency_ms),
+        ];
+        for (name, value) in rows {
+            let [median, most] = column(value);
+            let digits = if name.ends_with("ms") { 2 } else { 0 };
+            writeln!(out, "{name:<22} {median:>10.digits$} {most:>10.digits$}")?;
+        }
+        writeln!(
+            out,
+            "{:<22} {:>10} {:>10} {:>12}",
+            "body", "rests at", "speed m/s", "moved since m"
+        )?;
+        for body in &self.bodies {
+            let rested =
+                (body.first_rested_at_seconds).map_or("never".to_owned(), |s| format!("{s:.2} s"));
+            writeln!(
+                out,
+                "{:<22} {rested:>10} {:>10.3} {:>12.3}",
+                body.name, body.linear_speed, body.displacement
+            )?;
+        }
+        writeln!(
+            out,
+            "{} frames, {} steps of {:.4} s in {:.2} s ({:.1} x real time) on {}; contacts in {} \
+             steps, at most {:.2} mm deep; {} pairs batched, {} missed",
+            self.frames.len(),
+            self.steps,
+            self.dt,
+            self.wall_seconds,
+            self.real_time_factor,
+            self.backend,
+            self.contact_steps,
+            1e3 * self.max_penetration,
+            self.pairs_batched,
+            self.pairs_missed
+        )
+    }
+}

@@ -1,0 +1,326 @@
+//! Bodies on a surface that a depth camera sees anew in every frame.
+
+use super::report::{DepthBodyReport, DepthReport, FrameReport};
+use super::source::TimedFrame;
+use crate::devices::Devices;
+use crate::load;
+use crate::simulation::NamedCloud;
+use crate::spots::Spot;
+use anyhow::Context;
+use fastrand::Rng;
+use rapier3d::prelude::*;
+use rapier3d_tldi::prelude::*;
+use std::collections::VecDeque;
+use std::time::Instant;
+use tldi::Backend;
+use tldi::glamx::{Pose3, Quat, Vec3};
+use tldi_sources::depth::{DepthCamera, DepthCloud};
+
+/// Length of a step in seconds, and steps from one frame to the next: 30 frames a second.
+const DT: f32 = 1.0 / 60.0;
+const STEPS_PER_FRAME: usize = 2;
+const GRAVITY: f32 = 9.81;
+/// Mass per volume of the bodies in kg/m³.
+const DENSITY: f32 = 300.0;
+/// Height of a body over its spot at the start, metres.
+const DROP: f32 = 0.08;
+
+/// Speed in m/s below which a body rests, and for how many steps: a surface that is new in every
+/// frame does not let it sleep.
+const REST_SPEED: f32 = 0.03;
+const REST_STEPS: usize = 15;
+
+/// What a simulation is made of.
+pub struct DepthScene {
+    /// The camera.
+    pub camera: DepthCamera,
+    /// Against gravity, unit length.
+    pub up: Vec3,
+    /// Bodies, their y axis up.
+    pub bodies: Vec<NamedCloud>,
+    /// Where they are dropped.
+    pub spots: Vec<Spot>,
+    /// Frames whose points are remembered where the present one does not see.
+    pub memory: usize,
+    /// Seed of the bodies' turns.
+    pub seed: u64,
+}
+
+/// Poses and contacts at one moment.
+#[derive(Clone, Debug)]
+pub struct DepthSnapshot {
+    /// What the collider is.
+    pub frame: PointCloud<'static>,
+    /// From the frame of each body into that of the world.
+    pub world_from_body: Vec<Pose3>,
+    /// Points where surfaces touch, metres.
+    pub contacts: Vec<Vec3>,
+}
+
+/// The simulation.
+pub struct DepthSimulation {
+    world: PhysicsWorld,
+    tldi: TldiPipeline,
+    camera: DepthCamera,
+    up: Vec3,
+    surface: ColliderHandle,
+    bodies: Vec<Body>,
+    memory: usize,
+    remembered: VecDeque<DepthCloud>,
+    frames: Vec<FrameReport>,
+    devices: Devices,
+    steps: usize,
+    contact_steps: usize,
+    pairs_batched: usize,
+    pairs_missed: usize,
+    max_penetration: f32,
+    wall_seconds: f64,
+}
+
+struct Body {
+    named: NamedCloud,
+    handle: RigidBodyHandle,
+    /// Where it started or, once it has come to rest, where it first did.
+    home: Vec3,
+    /// Steps in a row in which it was slow.
+    slow_steps: usize,
+    first_rested_at_step: Option<usize>,
+}
+
+impl DepthSimulation {
+    /// Bodies over their spots, and a first frame.
+    ///
+    /// # Errors
+    /// Where the frame holds no points.
+    pub fn new(
+        scene: DepthScene,
+        first: &TimedFrame,
+        backend: Box<dyn Backend>,
+    ) -> anyhow::Result<Self> {
+        let mut camera = scene.camera;
+        let points = camera.points(&first.depths, &first.world_from_camera);
+        let cloud = points.into_builder().build()?.into_owned();
+        let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
+        let mut world = PhysicsWorld {
+            gravity: -GRAVITY * scene.up,
+            ..PhysicsWorld::default()
+        };
+        world.integration_parameters.dt = DT;
+        tldi.attach(&mut world);
+        // Its mass is never asked for: it is fixed.
+        let collider = tldi.collider(cloud).density(0.0);
+        let (_, surface) = world.insert(RigidBodyBuilder::fixed(), collider);
+        let mut rng = Rng::with_seed(scene.seed);
+        let upright = Quat::from_rotation_arc(Vec3::Y, scene.up);
+        let bodies = (scene.bodies.into_iter().zip(&scene.spots))
+            .map(|(named, spot)| {
+                let turn = Quat::from_rotation_y(rng.f32() * std::f32::consts::TAU);
+                let height = 0.5 * named.cloud.bounds().extents().y + DROP;
+                let lift = height * (1.0 + 2.0 * spot.level as f32);
+                let pose = Pose3::from_parts(spot.surface + lift * scene.up, upright * turn);
+                let (handle, _) = world.insert(
+                    RigidBodyBuilder::dynamic().pose(pose).angular_damping(1.0),
+                    tldi.collider(named.cloud.clone()).density(DENSITY),
+                );
+                Body {
+                    named,
+                    handle,
+                    home: pose.translation,
+                    slow_steps: 0,
+                    first_rested_at_step: None,
+                }
+            })
+            .collect();
+        Ok(Self {
+            world,
+            tldi,
+            camera,
+            up: scene.up,
+            surface,
+            bodies,
+            memory: scene.memory,
+            remembered: VecDeque::new(),
+            frames: Vec::new(),
+            devices: Devices::default(),
+            steps: 0,
+            contact_steps: 0,
+            pairs_batched: 0,
+            pairs_missed: 0,
+            max_penetration: 0.0,
+            wall_seconds: 0.0,
+        })
+    }
+
+    /// A frame arrives and becomes the surface; then time goes on until the next.
+    ///
+    /// # Errors
+    /// Where the frame holds no points, and those of the pipeline.
+    pub fn take_frame(&mut self, frame: &TimedFrame) -> anyhow::Result<()> {
+        let start = Instant::now();
+        let points = self.camera.points(&frame.depths, &frame.world_from_camera);
+        let unprojected = start.elapsed();
+        let mut report = FrameReport {
+            name: frame.name.clone(),
+            points: points.points.len(),
+            empty_pixels: points.empty,
+            flying_pixels: points.flying,
+            remembered_points: 0,
+            decode_ms: 1e3 * frame.decode_seconds,
+            unproject_ms: 1e3 * unprojected.as_secs_f64(),
+            update_ms: 0.0,
+            step_ms: 0.0,
+            latency_ms: 0.0,
+            contacts: 0,
+        };
+        let whole = if self.memory > 0 {
+            self.with_memory(points, &frame.world_from_camera)
+        } else {
+            points
+        };
+        report.remembered_points = whole.points.len() - report.points;
+        let cloud = whole.into_builder().build()?.into_owned();
+        (self.tldi).set_cloud(&mut self.world, self.surface, cloud)?;
+        let updated = start.elapsed();
+        report.contacts = self.step()?;
+        let stepped = start.elapsed();
+        report.update_ms = 1e3 * (updated - unprojected).as_secs_f64();
+        report.step_ms = 1e3 * (stepped - updated).as_secs_f64();
+        report.latency_ms = 1e3 * stepped.as_secs_f64();
+        self.frames.push(report);
+        for _ in 1..STEPS_PER_FRAME {
+            self.step()?;
+        }
+        self.wall_seconds += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// The frame and what earlier ones saw where it does not: hidden or out of view. What it sees
+    /// through is gone.
+    fn with_memory(&mut self, frame: DepthCloud, world_from_camera: &Pose3) -> DepthCloud {
+        let camera_from_world = world_from_camera.inverse();
+        let mut whole = frame.clone();
+        for old in &mut self.remembered {
+            let keeps: Vec<bool> = (old.points.iter())
+                .map(|p| {
+                    !self.camera.sees_through(*p, &camera_from_world)
+                        && !self.camera.sees(*p, &camera_from_world)
+                })
+                .collect();
+            old.points = kept(&old.points, &keeps);
+            old.radii = kept(&old.radii, &keeps);
+            old.normals = kept(&old.normals, &keeps);
+            whole.points.extend_from_slice(&old.points);
+            whole.radii.extend_from_slice(&old.radii);
+            whole.normals.extend_from_slice(&old.normals);
+        }
+        self.remembered.push_back(frame);
+        if self.remembered.len() > self.memory {
+            self.remembered.pop_front();
+        }
+        whole
+    }
+
+    /// One step; gives the pairs in contact.
+    fn step(&mut self) -> Result<usize, TldiError> {
+        let report = self.tldi.step(&mut self.world)?;
+        self.steps += 1;
+        self.pairs_batched += report.pairs_batched;
+        self.pairs_missed += report.pairs_missed;
+        self.max_penetration = self.max_penetration.max(report.max_penetration);
+        self.contact_steps += usize::from(report.pairs_in_contact > 0);
+        self.devices.note(&report);
+        for body in &mut self.bodies {
+            let rigid_body = &self.world.bodies[body.handle];
+            let is_slow = rigid_body.linvel().length() < REST_SPEED;
+            body.slow_steps = if is_slow { body.slow_steps + 1 } else { 0 };
+            if body.slow_steps == REST_STEPS && body.first_rested_at_step.is_none() {
+                body.first_rested_at_step = Some(self.steps);
+                body.home = rigid_body.translation();
+            }
+        }
+        Ok(report.pairs_in_contact)
+    }
+
+    /// The clouds of the bodies, each in its own frame.
+    pub fn clouds(&self) -> impl Iterator<Item = &PointCloud<'static>> {
+        self.bodies.iter().map(|body| &body.named.cloud)
+    }
+
+    /// Where everything is now, with every `step`-th point of the frame.
+    ///
+    /// # Errors
+    /// None that a frame gives which was taken.
+    pub fn snapshot(&self, step: usize) -> anyhow::Result<DepthSnapshot> {
+        let surface = self.world.colliders[self.surface].shape();
+        let frame = (surface.as_shape::<PointCloudShape>()).context("the frame is a cloud")?;
+        // The fewer points, the larger their discs, so that they cover as much.
+        let grown = |radius| radius * (step as f32).sqrt();
+        let frame = load::derived(frame.cloud(), step, |p| p, grown)?;
+        let contacts = self
+            .tldi
+            .contacts(&self.world.narrow_phase, &self.world.colliders);
+        Ok(DepthSnapshot {
+            world_from_body: (self.bodies.iter())
+                .map(|body| *self.world.bodies[body.handle].position())
+                .collect(),
+            contacts: contacts
+                .filter(|contact| contact.depth > -0.2 * frame.mean_radius())
+                .map(|contact| contact.point)
+                .collect(),
+            frame,
+        })
+    }
+
+    /// What happened so far.
+    pub fn report(&self, missing_frames: Vec<String>) -> DepthReport {
+        let mut latencies: Vec<f64> = self.frames.iter().map(|frame| frame.latency_ms).collect();
+        latencies.sort_by(f64::total_cmp);
+        let last = latencies.len().saturating_sub(1);
+        let latency = |k: usize| latencies.get(k).copied().unwrap_or(0.0);
+        DepthReport {
+            backend: self.devices.backend.clone(),
+            adapter: self.devices.adapter.clone(),
+            fallback: self.devices.fallback.clone(),
+            steps: self.steps,
+            dt: DT,
+            frame_rate: 1.0 / (DT * STEPS_PER_FRAME as f32),
+            wall_seconds: self.wall_seconds,
+            real_time_factor: f64::from(DT) * self.steps as f64 / self.wall_seconds.max(1e-9),
+            up: self.up.to_array(),
+            contact_steps: self.contact_steps,
+            max_penetration: self.max_penetration,
+            pairs_batched: self.pairs_batched,
+            pairs_missed: self.pairs_missed,
+            missing_frames,
+            median_latency_ms: latency(last / 2),
+            max_latency_ms: latency(last),
+            frames: self.frames.clone(),
+            bodies: self
+                .bodies
+                .iter()
+                .map(|body| self.body_report(body))
+                .collect(),
+        }
+    }
+
+    fn body_report(&self, body: &Body) -> DepthBodyReport {
+        let rigid_body = &self.world.bodies[body.handle];
+        DepthBodyReport {
+            name: body.named.name.clone(),
+            points: body.named.cloud.len(),
+            translation: rigid_body.translation().to_array(),
+            displacement: rigid_body.translation().distance(body.home),
+            linear_speed: rigid_body.linvel().length(),
+            sleeping: rigid_body.is_sleeping(),
+            first_rested_at_seconds: body.first_rested_at_step.map(|step| step as f32 * DT),
+        }
+    }
+}
+
+fn kept<T: Copy>(values: &[T], keeps: &[bool]) -> Vec<T> {
+    let pairs = values.iter().zip(keeps);
+    pairs
+        .filter(|(_, keep)| **keep)
+        .map(|(value, _)| *value)
+        .collect()
+}

@@ -1,0 +1,214 @@
+//! From a robot's description to rapier's bodies, joints and motors.
+
+use super::Motion;
+use super::description::Description;
+use super::kinematics::{JointKind, Kinematics};
+use super::links::{LinkCloud, collision_groups, silent_pairs};
+use super::placing::Placement;
+use super::plan::Build;
+use rapier3d::prelude::*;
+use rapier3d_tldi::prelude::*;
+use rapier3d_urdf::{UrdfLoaderOptions, UrdfMultibodyOptions, UrdfRobot};
+use std::collections::HashMap;
+use std::path::Path;
+use tldi::glamx::Vec3;
+
+/// Mass per volume of links without a mass of their own, kg/m³: what robot arms weigh by their hull.
+const LINK_DENSITY: f32 = 1000.0;
+/// Mass in kg of links without mass and surface, and what is added to the inertia of each joint, in
+/// kg·m² or kg: gears. It keeps the equations of light links well-conditioned.
+const LEAST_MASS: f32 = 1e-3;
+const ARMATURE: f32 = 5e-3;
+/// Stiffness and damping of the motors, per second² and per second: critically damped, so that a
+/// joint is where it should be within a tenth of a second.
+const STIFFNESS: f32 = 900.0;
+const DAMPING: f32 = 60.0;
+/// Damping of wheels' motors, per second: stiff, since rolling over rough points costs torque.
+const WHEEL_DAMPING: f32 = 200.0;
+
+/// A robot in rapier's sets.
+pub(super) struct Assembled {
+    /// The body of each link of the URDF.
+    pub(super) links: Vec<RigidBodyHandle>,
+    /// Index of the cloud of each of the robot's colliders.
+    pub(super) cloud_of_collider: HashMap<ColliderHandle, usize>,
+    /// Joints with a motor: index in the URDF, handle.
+    driven: Vec<(usize, MultibodyJointHandle)>,
+}
+
+/// Puts the robot into the world: multibody joints, motors, mimic joints, start pose.
+#[allow(clippy::too_many_arguments, reason = "all that a robot is made of")]
+pub(super) fn assemble(
+    world: &mut PhysicsWorld,
+    tldi: &TldiPipeline,
+    robot: &Description,
+    clouds: &[LinkCloud],
+    build: &Build,
+    placement: &Placement,
+    start: &[f32],
+) -> anyhow::Result<Assembled> {
+    let kinematics = &robot.kinematics;
+    let options = UrdfLoaderOptions {
+        create_colliders_from_collision_shapes: false,
+        create_colliders_from_visual_shapes: false,
+        make_roots_fixed: build.is_fixed,
+        shift: placement.scan_from_root,
+        // Links and joints are found by their index in the URDF.
+        squeeze_empty_fixed_links: false,
+        // An arm's controller holds it against gravity.
+        rigid_body_blueprint: RigidBodyBuilder::dynamic()
+            .gravity_scale(if build.is_fixed { 0.0 } else { 1.0 })
+            .can_sleep(false),
+        ..UrdfLoaderOptions::default()
+    };
+    let urdf = UrdfRobot::from_robot(&robot.urdf, options, Path::new(""));
+    let handles = urdf.insert_using_multibody_joints(
+        &mut world.bodies,
+        &mut world.colliders,
+        &mut world.multibody_joints,
+        UrdfMultibodyOptions::empty(),
+    );
+    let links: Vec<RigidBodyHandle> = handles.links.iter().map(|link| link.body).collect();
+    let root_from_link = kinematics.poses(start);
+    let silent = silent_pairs(kinematics, clouds, &root_from_link);
+    let groups = collision_groups(clouds.len(), &silent);
+    let mut cloud_of_collider = HashMap::new();
+    for (k, (link, groups)) in clouds.iter().zip(groups).enumerate() {
+        let own_mass = robot.urdf.links[link.link].inertial.mass.value > 0.0;
+        let collider = tldi
+            .collider(link.cloud.clone())
+            .density(if own_mass { 0.0 } else { LINK_DENSITY })
+            .collision_groups(groups);
+        let body = links[link.link];
+        let handle = (world.colliders).insert_with_parent(collider, body, &mut world.bodies);
+        cloud_of_collider.insert(handle, k);
+    }
+    for body in &links {
+        let body = &mut world.bodies[*body];
+        body.recompute_mass_properties_from_colliders(&world.colliders);
+        if body.mass() <= 0.0 && body.is_dynamic() {
+            let inertia = Vec3::splat(LEAST_MASS * 1e-2);
+            let least = MassProperties::new(Vector::ZERO, LEAST_MASS, inertia);
+            body.set_additional_mass_properties(least, false);
+            body.recompute_mass_properties_from_colliders(&world.colliders);
+        }
+    }
+    let joints: Vec<Option<MultibodyJointHandle>> =
+        handles.joints.iter().map(|joint| joint.joint).collect();
+    let mass: f32 = links.iter().map(|body| world.bodies[*body].mass()).sum();
+    let mut assembled = Assembled {
+        links,
+        cloud_of_collider,
+        driven: Vec::new(),
+    };
+    assembled.set_up_joints(world, kinematics, &joints, start, mass * 9.81 * build.size);
+    Ok(assembled)
+}
+
+impl Assembled {
+    /// Number of joints with a motor.
+    pub(super) fn driven_joints(&self) -> usize {
+        self.driven.len()
+    }
+
+    /// Motors, couplings and start positions. `default_effort` is what motors have whose limits the
+    /// URDF does not tell, N·m or N.
+    fn set_up_joints(
+        &mut self,
+        world: &mut PhysicsWorld,
+        kinematics: &Kinematics,
+        joints: &[Option<MultibodyJointHandle>],
+        start: &[f32],
+        default_effort: f32,
+    ) {
+        let set = &mut world.multibody_joints;
+        let mut a_joint = None;
+        for (k, joint) in kinematics.joints.iter().enumerate() {
+            let Some(handle) = joints[k].filter(|_| joint.kind.is_driven()) else {
+                continue;
+            };
+            a_joint = Some(handle);
+            if let Some((multibody, id)) = set.get_mut(handle)
+                && let Some(link) = multibody.link_mut(id)
+            {
+                link.joint.apply_displacement(&[start[k]]);
+                let axis = joint_axis(joint.kind);
+                let effort = joint.max_effort.unwrap_or(default_effort);
+                let data = &mut link.joint.data;
+                data.set_motor_model(axis, MotorModel::AccelerationBased);
+                data.set_motor_max_force(axis, effort);
+            }
+            let leader = joint.mimic.and_then(|(leader, coeff, offset)| {
+                let (_, id1) = set.get(joints[leader]?)?;
+                Some((leader, id1, coeff, offset))
+            });
+            match leader {
+                Some((leader, link1, coeff, offset)) => {
+                    if let Some((multibody, link2)) = set.get_mut(handle) {
+                        multibody.add_dof_coupling(MultibodyDofCoupling {
+                            link1,
+                            dof1: 0,
+                            axis1: joint_axis(kinematics.joints[leader].kind) as usize,
+                            link2,
+                            dof2: 0,
+                            axis2: joint_axis(joint.kind) as usize,
+                            coeff,
+                            offset,
+                        });
+                    }
+                }
+                None => self.driven.push((k, handle)),
+            }
+        }
+        if let Some((multibody, _)) = a_joint.and_then(|handle| set.get_mut(handle)) {
+            multibody.forward_kinematics(&world.bodies, true);
+            multibody.update_rigid_bodies(&mut world.bodies, true);
+            let root_freedom = multibody.root().joint().ndofs();
+            for value in multibody
+                .armature_mut()
+                .as_mut_slice()
+                .iter_mut()
+                .skip(root_freedom)
+            {
+                *value = ARMATURE;
+            }
+        }
+    }
+
+    /// Tells the motors where the joints should be, or how fast they should roll.
+    pub(super) fn drive(
+        &self,
+        world: &mut PhysicsWorld,
+        kinematics: &Kinematics,
+        targets: &[f32],
+        motion: &Motion,
+    ) {
+        for (k, handle) in &self.driven {
+            let Some((multibody, id)) = world.multibody_joints.get_mut(*handle) else {
+                continue;
+            };
+            let Some(link) = multibody.link_mut(id) else {
+                continue;
+            };
+            let axis = joint_axis(kinematics.joints[*k].kind);
+            match motion.rolling(*k) {
+                Some(speed) => link
+                    .joint
+                    .data
+                    .set_motor_velocity(axis, speed, WHEEL_DAMPING),
+                None => link
+                    .joint
+                    .data
+                    .set_motor_position(axis, targets[*k], STIFFNESS, DAMPING),
+            };
+        }
+    }
+}
+
+fn joint_axis(kind: JointKind) -> JointAxis {
+    if kind == JointKind::Prismatic {
+        JointAxis::LinX
+    } else {
+        JointAxis::AngX
+    }
+}

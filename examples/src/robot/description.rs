@@ -1,0 +1,263 @@
+//! Reads a URDF: links, joints, and where its meshes lie.
+
+use super::geometry::{Mesh, mesh_of};
+use super::kinematics::{JointKind, JointModel, Kinematics};
+use rapier3d_urdf::urdf_rs;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+use tldi::glamx::{EulerRot, Pose3, Quat, Vec3};
+
+/// The robot that is used where none is given: an arm with a gripper, of boxes, cylinders and
+/// spheres.
+pub const BUILT_IN: &str = include_str!("built_in.urdf");
+
+/// A robot that was read.
+pub struct Description {
+    /// As in the file.
+    pub urdf: urdf_rs::Robot,
+    /// Its joints.
+    pub kinematics: Kinematics,
+    /// The surface of each link in the link's frame, metres; empty where it has none.
+    pub meshes: Vec<Mesh>,
+    /// What could not be used, for people.
+    pub warnings: Vec<String>,
+}
+
+/// Why a URDF cannot be used.
+#[derive(Debug, Error)]
+pub enum DescriptionError {
+    /// The file cannot be read.
+    #[error("the URDF {path} cannot be read: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// It is not URDF.
+    #[error("this is not a URDF that can be used ({0}): expand xacro files first")]
+    Syntax(String),
+    /// Two links or two joints have one name.
+    #[error("the name {0} is given twice: names of links and of joints must be unique")]
+    Twice(String),
+    /// A joint connects links that do not exist.
+    #[error("joint {joint} connects to link {link}, which does not exist")]
+    NoSuchLink {
+        /// The joint.
+        joint: String,
+        /// The link that is missing.
+        link: String,
+    },
+    /// The links do not form one tree.
+    #[error("the links do not form one tree: {0}")]
+    NotATree(String),
+    /// A number is not finite.
+    #[error("{0} has a number that is not finite")]
+    NotFinite(String),
+    /// Not one link has a surface.
+    #[error("no link has a geometry that could be used: {}", .0.join("; "))]
+    NoGeometry(Vec<String>),
+}
+
+impl Description {
+    /// Reads the file at `path`; meshes are looked for beside it, see [`from_text`](Self::from_text).
+    ///
+    /// # Errors
+    /// [`DescriptionError`].
+    pub fn from_file(path: &Path) -> Result<Self, DescriptionError> {
+        let text = std::fs::read_to_string(path).map_err(|source| DescriptionError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::from_text(&text, folder)
+    }
+
+    /// Reads a URDF. Meshes are looked for in `folder`; those of `package://NAME/…` in it and the
+    /// folders above it, with and without the name. A link's collision geometry is used or, where it
+    /// has none, its visual one. What is missing is named in the warnings.
+    ///
+    /// # Errors
+    /// [`DescriptionError`].
+    pub fn from_text(text: &str, folder: &Path) -> Result<Self, DescriptionError> {
+        let urdf = urdf_rs::read_from_string(text)
+            .map_err(|error| DescriptionError::Syntax(error.to_string()))?;
+        let mut warnings = Vec::new();
+        let kinematics = kinematics_of(&urdf, &mut warnings)?;
+        let meshes: Vec<Mesh> = (urdf.links.iter())
+            .map(|link| link_mesh(link, folder, &mut warnings))
+            .collect();
+        if meshes.iter().all(|mesh| mesh.faces.is_empty()) {
+            return Err(DescriptionError::NoGeometry(warnings));
+        }
+        Ok(Self {
+            urdf,
+            kinematics,
+            meshes,
+            warnings,
+        })
+    }
+}
+
+/// The pose that an `<origin>` stands for: roll, pitch and yaw about fixed axes.
+pub(super) fn pose_of(origin: &urdf_rs::Pose) -> Pose3 {
+    let [x, y, z] = origin.xyz.0.map(|c| c as f32);
+    let [roll, pitch, yaw] = origin.rpy.0.map(|c| c as f32);
+    Pose3::from_parts(
+        Vec3::new(x, y, z),
+        Quat::from_euler(EulerRot::ZYX, yaw, pitch, roll),
+    )
+}
+
+fn link_mesh(link: &urdf_rs::Link, folder: &Path, warnings: &mut Vec<String>) -> Mesh {
+    let collision = link.collision.iter().map(|c| (&c.geometry, &c.origin));
+    let visual = link.visual.iter().map(|v| (&v.geometry, &v.origin));
+    for parts in [collision.collect::<Vec<_>>(), visual.collect()] {
+        let mut whole = Mesh::default();
+        for (geometry, origin) in parts {
+            match mesh_of(geometry, folder) {
+                Ok(mesh) => whole.append(&mesh, &pose_of(origin)),
+                Err(problem) => warnings.push(format!("link {}: {problem}", link.name)),
+            }
+        }
+        if !whole.faces.is_empty() {
+            return whole;
+        }
+    }
+    Mesh::default()
+}
+
+fn kinematics_of(
+    urdf: &urdf_rs::Robot,
+    warnings: &mut Vec<String>,
+) -> Result<Kinematics, DescriptionError> {
+    let mut link_of = HashMap::new();
+    for (k, link) in urdf.links.iter().enumerate() {
+        if link_of.insert(link.name.as_str(), k).is_some() {
+            return Err(DescriptionError::Twice(link.name.clone()));
+        }
+    }
+    let mut joint_of = HashMap::new();
+    for (k, joint) in urdf.joints.iter().enumerate() {
+        if joint_of.insert(joint.name.as_str(), k).is_some() {
+            return Err(DescriptionError::Twice(joint.name.clone()));
+        }
+    }
+    let mut joints = Vec::new();
+    for joint in &urdf.joints {
+        let link = |name: &str| {
+            link_of
+                .get(name)
+                .copied()
+                .ok_or_else(|| DescriptionError::NoSuchLink {
+                    joint: joint.name.clone(),
+                    link: name.to_owned(),
+                })
+        };
+        let (parent, child) = (link(&joint.parent.link)?, link(&joint.child.link)?);
+        joints.push(joint_model(joint, parent, child, warnings)?);
+    }
+    for (k, joint) in urdf.joints.iter().enumerate() {
+        let Some(mimic) = &joint.mimic else { continue };
+        let leader = joint_of.get(mimic.joint.as_str()).copied();
+        match leader.filter(|&leader| leader != k && joints[leader].kind.is_driven()) {
+            Some(leader) if joints[k].kind.is_driven() => {
+                let multiplier = mimic.multiplier.unwrap_or(1.0) as f32;
+                joints[k].mimic = Some((leader, multiplier, mimic.offset.unwrap_or(0.0) as f32));
+            }
+            _ => warnings.push(format!(
+                "joint {} cannot mimic {}: it is driven by itself",
+                joint.name, mimic.joint
+            )),
+        }
+    }
+    check_tree(urdf, &joints)?;
+    Ok(Kinematics::new(urdf.links.len(), joints))
+}
+
+fn joint_model(
+    joint: &urdf_rs::Joint,
+    parent: usize,
+    child: usize,
+    warnings: &mut Vec<String>,
+) -> Result<JointModel, DescriptionError> {
+    use urdf_rs::JointType;
+    let axis = Vec3::from(joint.axis.xyz.0.map(|c| c as f32)).normalize_or(Vec3::X);
+    let mut limits = [joint.limit.lower as f32, joint.limit.upper as f32];
+    let kind = match joint.joint_type {
+        JointType::Revolute => JointKind::Revolute,
+        JointType::Continuous => JointKind::Continuous,
+        JointType::Prismatic => JointKind::Prismatic,
+        JointType::Fixed => JointKind::Fixed,
+        JointType::Floating | JointType::Planar | JointType::Spherical => {
+            warnings.push(format!(
+                "joint {} is {:?}: it moves freely, without a motor",
+                joint.name, joint.joint_type
+            ));
+            JointKind::Free
+        }
+    };
+    if kind == JointKind::Continuous {
+        limits = [f32::NEG_INFINITY, f32::INFINITY];
+    } else if limits[0] > limits[1] {
+        warnings.push(format!("joint {}: its limits are swapped", joint.name));
+        limits.swap(0, 1);
+    }
+    let origin = pose_of(&joint.origin);
+    let numbers = [joint.limit.effort, joint.limit.velocity].map(|n| n as f32);
+    let finite = origin.translation.is_finite()
+        && origin.rotation.is_finite()
+        && numbers.iter().all(|n| n.is_finite())
+        && !limits.iter().any(|limit| limit.is_nan());
+    if !finite {
+        return Err(DescriptionError::NotFinite(format!("joint {}", joint.name)));
+    }
+    Ok(JointModel {
+        name: joint.name.clone(),
+        kind,
+        parent,
+        child,
+        parent_from_joint: origin,
+        axis,
+        limits,
+        max_effort: Some(numbers[0]).filter(|effort| *effort > 0.0),
+        max_speed: Some(numbers[1]).filter(|speed| *speed > 0.0),
+        mimic: None,
+    })
+}
+
+fn check_tree(urdf: &urdf_rs::Robot, joints: &[JointModel]) -> Result<(), DescriptionError> {
+    let not_a_tree = |text: String| Err(DescriptionError::NotATree(text));
+    let mut children = HashSet::new();
+    for joint in joints {
+        if !children.insert(joint.child) {
+            let name = &urdf.links[joint.child].name;
+            return not_a_tree(format!("link {name} has two parents"));
+        }
+    }
+    let roots: Vec<usize> = (0..urdf.links.len())
+        .filter(|link| !children.contains(link))
+        .collect();
+    match roots[..] {
+        [root] => {
+            let mut reached = vec![root];
+            let mut next = 0;
+            while next < reached.len() {
+                let from = |joint: &&JointModel| joint.parent == reached[next];
+                let found: Vec<usize> = joints.iter().filter(from).map(|j| j.child).collect();
+                reached.extend(found);
+                next += 1;
+            }
+            if reached.len() < urdf.links.len() {
+                return not_a_tree("some links form a loop".to_owned());
+            }
+            Ok(())
+        }
+        [] => not_a_tree("there is no link without a parent".to_owned()),
+        _ => {
+            let names: Vec<&str> = roots.iter().map(|k| urdf.links[*k].name.as_str()).collect();
+            not_a_tree(format!("no joint leads to {}", names.join(", ")))
+        }
+    }
+}

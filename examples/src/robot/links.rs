@@ -1,0 +1,175 @@
+//! Links as point clouds, and which of them must not collide with each other.
+
+use super::description::Description;
+use super::kinematics::Kinematics;
+use crate::load;
+use crate::surface_sampling::SampledSurface;
+use anyhow::Context;
+use rapier3d::geometry::{Group, InteractionGroups, InteractionTestMode};
+use tldi::glamx::Pose3;
+use tldi::{KdTree, PointCloud};
+use tldi_sources::sample_mesh;
+
+/// The surface of one link.
+#[derive(Clone, Debug)]
+pub struct LinkCloud {
+    /// Index of the link in the URDF.
+    pub link: usize,
+    /// Name of the link.
+    pub name: String,
+    /// Points in the frame of the link, normals outward.
+    pub cloud: PointCloud<'static>,
+}
+
+/// How finely links are sampled.
+#[derive(Clone, Copy, Debug)]
+pub struct Spacing {
+    /// Mean point radius of the scan, metres.
+    pub scan_radius: f32,
+}
+
+/// Points that a link is at least across, in its second longest extent: less has no shape.
+const LEAST_ACROSS: f32 = 10.0;
+/// Points that a link is at most long: more would be finer than any contact needs.
+const MOST_ALONG: f32 = 120.0;
+/// Links that have a collision group of their own; the others share one.
+const OWN_GROUPS: usize = 30;
+
+impl Spacing {
+    /// Distance of neighbouring points in metres for a link of this size: as fine as the scan, which
+    /// sets the pixels of their comparison, but fine enough for the link's own shape.
+    ///
+    /// ```
+    /// use tldi::glamx::Vec3;
+    /// use tldi_examples::robot::Spacing;
+    /// let spacing = Spacing { scan_radius: 0.01 };
+    /// assert_eq!(spacing.of(Vec3::new(0.5, 0.2, 0.2)), 0.01);
+    /// assert_eq!(spacing.of(Vec3::new(0.02, 0.05, 0.02)), 0.002); // a finger
+    /// ```
+    pub fn of(&self, extents: tldi::glamx::Vec3) -> f32 {
+        let mut extents = extents.to_array();
+        extents.sort_by(f32::total_cmp);
+        let finest = extents[2] / MOST_ALONG;
+        self.scan_radius.min(extents[1] / LEAST_ACROSS).max(finest)
+    }
+}
+
+/// The clouds of the links that have a surface.
+///
+/// # Errors
+/// Those of building a cloud, with the link.
+pub fn clouds_of_links(
+    robot: &Description,
+    spacing: Spacing,
+    seed: u64,
+) -> anyhow::Result<Vec<LinkCloud>> {
+    let mut clouds = Vec::new();
+    for (link, mesh) in robot.meshes.iter().enumerate() {
+        if mesh.faces.is_empty() {
+            continue;
+        }
+        let name = robot.urdf.links[link].name.clone();
+        let distance = spacing.of(mesh.bounds().extents());
+        let sample = sample_mesh(&mesh.points, &mesh.faces, distance, seed ^ link as u64);
+        let surface = SampledSurface {
+            points: sample.points,
+            normals: sample.normals,
+            colors: Vec::new(),
+        };
+        let cloud = load::body_from_surface(surface)
+            .with_context(|| format!("link {name} cannot be made a cloud"))?;
+        clouds.push(LinkCloud { link, name, cloud });
+    }
+    Ok(clouds)
+}
+
+/// The pairs of clouds that must not collide with each other: neighbours along the joints, and
+/// those that touch in the pose that `root_from_link` says.
+pub(super) fn silent_pairs(
+    kinematics: &Kinematics,
+    clouds: &[LinkCloud],
+    root_from_link: &[Pose3],
+) -> Vec<[usize; 2]> {
+    let trees: Vec<KdTree> = clouds.iter().map(|link| KdTree::new(&link.cloud)).collect();
+    let touch = |i: usize, j: usize| {
+        let (a, b) = (&clouds[i], &clouds[j]);
+        let b_from_a = root_from_link[b.link].inverse() * root_from_link[a.link];
+        let reach = a.cloud.mean_radius() + b.cloud.mean_radius();
+        let b_bounds = b.cloud.bounds().loosened(reach);
+        let near = |p| {
+            let p = b_from_a * p;
+            if !b_bounds.contains(p) {
+                return false;
+            }
+            // Near the surface, or behind the nearest piece of it.
+            trees[j].nearest(p, f32::INFINITY).is_some_and(|neighbor| {
+                let k = neighbor.index;
+                let normal = b.cloud.normals().map_or(p, |normals| normals[k]);
+                neighbor.distance() < reach || (p - b.cloud.point(k)).dot(normal) < 0.0
+            })
+        };
+        a.cloud.points().any(near)
+    };
+    let mut pairs = Vec::new();
+    for i in 0..clouds.len() {
+        for j in 0..i {
+            let [a, b] = [clouds[i].link, clouds[j].link];
+            if kinematics.are_adjacent(a, b) || touch(i, j) || touch(j, i) {
+                pairs.push([j, i]);
+            }
+        }
+    }
+    pairs
+}
+
+/// Collision groups of `count` links of which `silent` pairs pass through each other. The world has
+/// the last group.
+pub(super) fn collision_groups(count: usize, silent: &[[usize; 2]]) -> Vec<InteractionGroups> {
+    let group = |k: usize| Group::from_bits_retain(1 << k.min(OWN_GROUPS));
+    (0..count)
+        .map(|k| {
+            let mut filter = Group::ALL;
+            for &[i, j] in silent {
+                if i == k {
+                    filter.remove(group(j));
+                } else if j == k {
+                    filter.remove(group(i));
+                }
+            }
+            // Links that share a group cannot be told apart.
+            if k >= OWN_GROUPS {
+                filter.remove(group(k));
+            }
+            InteractionGroups::new(group(k), filter, InteractionTestMode::And)
+        })
+        .collect()
+}
+
+/// Groups of all that is not the robot.
+pub(super) fn world_groups() -> InteractionGroups {
+    InteractionGroups::new(Group::GROUP_32, Group::ALL, InteractionTestMode::And)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_silence_pairs_and_nothing_else() {
+        let silent = [[0, 1], [1, 4], [2, 40], [31, 5]];
+        let groups = collision_groups(50, &silent);
+        let world = world_groups();
+        for i in 0..50 {
+            assert!(groups[i].test(world), "{i}");
+            for j in 0..i {
+                let is_silent = silent.contains(&[j, i]) || silent.contains(&[i, j]);
+                let collide = groups[i].test(groups[j]);
+                if is_silent {
+                    assert!(!collide, "{i} {j}");
+                } else if i < OWN_GROUPS {
+                    assert!(collide, "{i} {j}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! A robot from a URDF whose links are point clouds, in a scan.
+
+mod assembly;
+mod description;
+mod geometry;
+mod kinematics;
+mod links;
+mod motion;
+mod placing;
+mod plan;
+mod report;
+mod self_filter;
+mod simulation;
+
+pub use description::{BUILT_IN, Description, DescriptionError};
+pub use kinematics::{Aim, JointKind, JointModel, Kinematics};
+pub use links::{LinkCloud, Spacing, clouds_of_links};
+pub use motion::{Motion, Waypoint};
+pub use placing::{NoPlace, Placement, Site, place};
+pub use plan::Tip;
+pub use report::{LinkReport, LooseBodyReport, RobotReport};
+pub use self_filter::SelfFilter;
+pub use simulation::{Base, DT, RobotScene, RobotSimulation, RobotSnapshot};

@@ -1,0 +1,268 @@
+//! What kind of robot it is, how it starts and where it reaches.
+
+use super::Motion;
+use super::kinematics::{Aim, JointKind, Kinematics};
+use super::links::LinkCloud;
+use super::placing::Placement;
+use super::simulation::Base;
+use fastrand::Rng;
+use tldi::PointCloud;
+use tldi::glamx::{Pose3, Vec3};
+
+/// By how much a link must be lower than the root to carry the robot, metres.
+const LOWER: f32 = 1e-3;
+/// Radius of a base, at least: metres, and a share of the robot's size.
+const LEAST_FOOTPRINT: f32 = 0.05;
+/// Distance of points along the tip's path, as a share of its reach.
+const PATH_STEP: f32 = 0.06;
+/// How deep the tip is pushed into what stands there, as a share of its reach.
+const PRESS: f32 = 0.03;
+/// Places that are touched where nothing loose is in reach.
+const TOUCHES: usize = 3;
+
+/// The end of the longest limb.
+#[derive(Clone, Copy, Debug)]
+pub struct Tip {
+    /// Index of its link.
+    pub link: usize,
+    /// The point that reaches, in the frame of the link, metres.
+    pub point: Vec3,
+    /// A point behind it, in the frame of the link, a quarter of the reach away: where the link
+    /// comes from.
+    pub behind: Vec3,
+    /// How far it gets from the first joint of its chain, at most, metres.
+    pub reach: f32,
+    /// Height of that joint over the origin of the root, metres.
+    pub shoulder: f32,
+}
+
+/// The build of a robot. Lengths in metres.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Build {
+    /// Whether the root is fixed.
+    pub(super) is_fixed: bool,
+    /// Height of the root's origin over what the robot stands on.
+    pub(super) lift: f32,
+    /// Radius of what it stands on.
+    pub(super) footprint: f32,
+    /// Largest extent at rest.
+    pub(super) size: f32,
+    /// What reaches, where something does.
+    pub(super) tip: Option<Tip>,
+}
+
+impl Build {
+    /// Judges a robot by its links at rest.
+    pub(super) fn of(kinematics: &Kinematics, clouds: &[LinkCloud], base: Base) -> Self {
+        let poses = kinematics.poses(&kinematics.rest());
+        let root = kinematics.root();
+        let points_of = |is_meant: &dyn Fn(usize) -> bool| -> Vec<Vec3> {
+            (clouds
+                .iter()
+                .filter(|link| is_meant(kinematics.group(link.link))))
+            .flat_map(|link| link.cloud.points().map(|p| poses[link.link] * p))
+            .collect()
+        };
+        let lowest = |points: &[Vec3]| points.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
+        let (base_points, others) = (points_of(&|g| g == root), points_of(&|g| g != root));
+        let all: Vec<Vec3> = base_points.iter().chain(&others).copied().collect();
+        let is_fixed = match base {
+            Base::Fixed => true,
+            Base::Floating => false,
+            Base::Auto => base_points.is_empty() || lowest(&base_points) <= lowest(&others) + LOWER,
+        };
+        let bounds = (all.iter()).fold(tldi::Aabb::EMPTY, |bounds, p| bounds.including(*p));
+        let size = bounds.extents().max_element();
+        let standing = if is_fixed && !base_points.is_empty() {
+            &base_points
+        } else {
+            &all
+        };
+        let radius = |p: &Vec3| p.truncate().length();
+        let footprint = standing.iter().map(radius).fold(0.0, f32::max);
+        Self {
+            is_fixed,
+            lift: -lowest(standing),
+            footprint: footprint.clamp(LEAST_FOOTPRINT.min(0.5 * size), size),
+            size,
+            tip: if is_fixed {
+                tip_of(kinematics, clouds)
+            } else {
+                None
+            },
+        }
+    }
+
+    /// By how much the clouds of links miss their surface between samples, metres.
+    pub(super) fn model_error(&self, clouds: &[LinkCloud]) -> f32 {
+        let radii = clouds.iter().map(|link| link.cloud.mean_radius());
+        0.5 * radii.fold(0.0, f32::max)
+    }
+}
+
+/// The link with a surface that most joints move, and its point farthest from its joint.
+fn tip_of(kinematics: &Kinematics, clouds: &[LinkCloud]) -> Option<Tip> {
+    let driven = |link: usize| -> Vec<usize> {
+        let chain = kinematics.chain(link).into_iter();
+        chain
+            .filter(|k| kinematics.joints[*k].kind.is_driven())
+            .collect()
+    };
+    let (link, chain) = (clouds.iter())
+        .map(|link| (link, driven(link.link)))
+        .max_by_key(|(link, chain)| (chain.len(), std::cmp::Reverse(link.link)))?;
+    let first = *chain.first()?;
+    let point = (link.cloud.points()).max_by(|a, b| a.length().total_cmp(&b.length()))?;
+    let chain = kinematics.chain(link.link);
+    let beyond = chain.iter().skip_while(|k| **k != first).skip(1);
+    let reach: f32 = beyond
+        .map(|k| {
+            let joint = &kinematics.joints[*k];
+            let slide = match joint.kind {
+                JointKind::Prismatic => joint.limits[1].abs().max(joint.limits[0].abs()),
+                _ => 0.0,
+            };
+            joint.parent_from_joint.translation.length() + slide
+        })
+        .sum();
+    let rest = kinematics.poses(&kinematics.rest());
+    let carrier = &kinematics.joints[first];
+    let shoulder = rest[carrier.parent] * carrier.parent_from_joint.translation;
+    let reach = reach + point.length();
+    Some(Tip {
+        link: link.link,
+        point,
+        behind: point - BEHIND * reach * point.normalize_or(Vec3::Z),
+        reach,
+        shoulder: shoulder.z,
+    })
+}
+
+/// Distance of the point behind the tip, as a share of the reach, and how much less it counts.
+const BEHIND: f32 = 0.25;
+const BEHIND_WEIGHT: f32 = 0.15;
+
+impl Tip {
+    /// Brings the tip to a target in the frame of the root, from above and from the robot's side, so
+    /// that it points at what it touches.
+    fn aims(&self, target: Vec3) -> [Aim; 2] {
+        let outward = target.reject_from_normalized(Vec3::Z).normalize_or(Vec3::X);
+        let pointing = (outward - 1.7 * Vec3::Z).normalize();
+        [
+            Aim {
+                point: self.point,
+                target,
+                weight: 1.0,
+            },
+            Aim {
+                point: self.behind,
+                target: target - BEHIND * self.reach * pointing,
+                weight: BEHIND_WEIGHT,
+            },
+        ]
+    }
+}
+
+/// Where the joints are at the start: the tip in front and up, or at rest.
+pub(super) fn start_pose(kinematics: &Kinematics, build: &Build) -> Vec<f32> {
+    let rest = kinematics.rest();
+    let Some(tip) = build.tip else {
+        return rest;
+    };
+    // A little bent: a stretched arm does not know which way to bend.
+    let bent: Vec<f32> = (kinematics.joints.iter().zip(&rest))
+        .map(|(joint, rest)| {
+            let [low, high] = joint.limits;
+            let middle = if (high - low).is_finite() {
+                0.5 * (low + high)
+            } else {
+                *rest
+            };
+            rest + 0.3 * (middle - rest).clamp(-1.5, 1.5)
+        })
+        .collect();
+    let ahead = Vec3::new(0.4 * tip.reach, 0.0, tip.shoulder + 0.35 * tip.reach);
+    kinematics.reach(tip.link, &tip.aims(ahead), &bent).0
+}
+
+/// The reaching motion through the bodies, or onto the scan where there are none; a gait for a robot
+/// that is not fixed.
+#[allow(clippy::too_many_arguments, reason = "all that a plan depends on")]
+pub(super) fn plan_motion(
+    kinematics: &Kinematics,
+    clouds: &[LinkCloud],
+    build: &Build,
+    start: &[f32],
+    placement: &Placement,
+    scan: &PointCloud<'_>,
+    up: Vec3,
+    body_size: f32,
+    seed: u64,
+) -> Motion {
+    let Some(tip) = build.tip else {
+        let wheel_radius = |link: usize| {
+            let cloud = clouds.iter().find(|cloud| cloud.link == link);
+            let mut extents = cloud.map_or([0.0; 3], |c| c.cloud.bounds().extents().to_array());
+            extents.sort_by(f32::total_cmp);
+            0.5 * extents[1]
+        };
+        return Motion::gait(kinematics, start, wheel_radius);
+    };
+    let root_from_scan = placement.scan_from_root.inverse();
+    let home = kinematics.poses(start)[tip.link] * tip.point;
+    let mut corners = vec![home];
+    if placement.bodies.is_empty() {
+        for touch in touchable(scan, &root_from_scan, &tip, seed) {
+            let into = (touch - tip.shoulder * Vec3::Z).normalize_or(Vec3::X);
+            corners.extend([
+                touch - 0.15 * tip.reach * into,
+                touch + PRESS * tip.reach * into,
+            ]);
+            corners.push(touch - 0.15 * tip.reach * into);
+        }
+    }
+    for (k, surface) in placement.bodies.iter().enumerate() {
+        let middle = root_from_scan * (*surface + 0.3 * body_size * up);
+        let side = if k % 2 == 0 { 1.0 } else { -1.0 };
+        let across = side * Vec3::Z.cross(middle).normalize_or(Vec3::Y);
+        let over = 0.8 * body_size.max(0.12 * tip.reach) * Vec3::Z;
+        let [before, after] = [-1.6, 1.3].map(|share| middle + share * body_size * across);
+        corners.extend([before + over, before, after, after + over]);
+        // Then down onto what it stood on.
+        let ground = root_from_scan * *surface;
+        corners.extend([
+            ground + over,
+            ground - PRESS * tip.reach * Vec3::Z,
+            ground + over,
+        ]);
+    }
+    corners.push(home);
+    let path = polyline(&corners, PATH_STEP * tip.reach);
+    let stations = path.into_iter().map(|target| tip.aims(target));
+    Motion::reaching(kinematics, tip.link, stations, start)
+}
+
+/// Points of the scan in front of the robot and in reach, in the frame of the root.
+fn touchable(scan: &PointCloud<'_>, root_from_scan: &Pose3, tip: &Tip, seed: u64) -> Vec<Vec3> {
+    let mut points: Vec<Vec3> = (scan.points().map(|p| *root_from_scan * p))
+        .filter(|p| {
+            let distance = (*p - tip.shoulder * Vec3::Z).length() / tip.reach;
+            (0.4..0.75).contains(&distance) && p.x > 0.3 * tip.reach
+        })
+        .collect();
+    Rng::with_seed(seed).shuffle(&mut points);
+    points.truncate(TOUCHES);
+    points
+}
+
+/// Points along the lines between corners, the first corner left out.
+fn polyline(corners: &[Vec3], step: f32) -> Vec<Vec3> {
+    let mut path = Vec::new();
+    for pair in corners.windows(2) {
+        let pieces = (pair[0].distance(pair[1]) / step).ceil().max(1.0) as usize;
+        for k in 1..=pieces {
+            path.push(pair[0].lerp(pair[1], k as f32 / pieces as f32));
+        }
+    }
+    path
+}

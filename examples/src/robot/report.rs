@@ -1,0 +1,135 @@
+//! What a run of `robot_in_scan` found.
+
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// As written to `--json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct RobotReport {
+    /// Name of the backend that compared the clouds.
+    pub backend: String,
+    /// Name of the GPU, if one did the work.
+    pub adapter: Option<String>,
+    /// Why the CPU had to do though a GPU would have been taken.
+    pub fallback: Option<String>,
+    /// Steps simulated.
+    pub steps: usize,
+    /// Length of a step in seconds.
+    pub dt: f32,
+    /// Wall-clock time of the simulation in seconds.
+    pub wall_seconds: f64,
+    /// Simulated time by wall-clock time.
+    pub real_time_factor: f64,
+    /// Points of the scan.
+    pub scan_points: usize,
+    /// Points of the scan, or of the last frame of the robot's camera, that lay on the robot and
+    /// were taken out.
+    pub self_filtered_points: usize,
+    /// Mean point radius in metres of the scan.
+    pub mean_radius: f32,
+    /// Up direction, in the frame of the scan.
+    pub up: [f32; 3],
+    /// Whether the robot's root is fixed to the scan.
+    pub base_fixed: bool,
+    /// Position of the root in the frame of the scan after the last step, metres.
+    pub base: [f32; 3],
+    /// Joints with a motor.
+    pub driven_joints: usize,
+    /// The links that have a surface.
+    pub links: Vec<LinkReport>,
+    /// Number of `links`.
+    pub link_count: usize,
+    /// Steps in which the robot touched the scan or a loose body.
+    pub contact_steps: usize,
+    /// Deepest penetration in metres over all steps and contacts of clouds.
+    pub max_penetration: f32,
+    /// Pairs compared in batches, over all steps.
+    pub pairs_batched: usize,
+    /// Pairs compared on the spot, over all steps.
+    pub pairs_missed: usize,
+    /// Loose bodies.
+    pub bodies: Vec<LooseBodyReport>,
+    /// What of the URDF could not be used.
+    pub warnings: Vec<String>,
+}
+
+/// One link.
+#[derive(Clone, Debug, Serialize)]
+pub struct LinkReport {
+    /// Name in the URDF.
+    pub name: String,
+    /// Number of points.
+    pub points: usize,
+    /// Steps in which it touched the scan, a loose body or another link.
+    pub contact_steps: usize,
+    /// Largest contact force in one step, N.
+    pub max_force: f32,
+    /// Mean contact force over the steps with contact, N.
+    pub mean_force: f32,
+}
+
+/// One loose body.
+#[derive(Clone, Debug, Serialize)]
+pub struct LooseBodyReport {
+    /// What it is, and its number.
+    pub name: String,
+    /// Number of points.
+    pub points: usize,
+    /// Position after the last step, in the frame of the scan, metres.
+    pub translation: [f32; 3],
+    /// How far it was moved, metres.
+    pub displacement: f32,
+    /// Whether the robot touched it.
+    pub touched: bool,
+    /// Whether it sleeps.
+    pub sleeping: bool,
+}
+
+impl RobotReport {
+    /// Writes the results as tables for people.
+    ///
+    /// # Errors
+    /// Those of writing.
+    pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
+        writeln!(
+            out,
+            "{:<28} {:>8} {:>14} {:>12} {:>12}",
+            "link", "points", "contact steps", "max force N", "mean force N"
+        )?;
+        for link in &self.links {
+            writeln!(
+                out,
+                "{:<28} {:>8} {:>14} {:>12.1} {:>12.1}",
+                link.name, link.points, link.contact_steps, link.max_force, link.mean_force
+            )?;
+        }
+        for body in &self.bodies {
+            let touched = if body.touched {
+                ", touched by the robot"
+            } else {
+                ""
+            };
+            writeln!(
+                out,
+                "{:<28} {:>8} moved {:.3} m{touched}",
+                body.name, body.points, body.displacement
+            )?;
+        }
+        writeln!(
+            out,
+            "{} steps of {:.4} s in {:.2} s ({:.1} x real time) on {}; {} scan points, {} of them on \
+             the robot left out; contacts in {} steps, at most {:.2} mm deep; {} pairs batched, {} missed",
+            self.steps,
+            self.dt,
+            self.wall_seconds,
+            self.real_time_factor,
+            self.backend,
+            self.scan_points,
+            self.self_filtered_points,
+            self.contact_steps,
+            1e3 * self.max_penetration,
+            self.pairs_batched,
+            self.pairs_missed
+        )
+    }
+}

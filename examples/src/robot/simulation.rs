@@ -1,0 +1,527 @@
+//! A robot of clouds moves in a scan.
+
+use super::assembly::{Assembled, assemble};
+use super::description::Description;
+use super::links::{LinkCloud, Spacing, clouds_of_links, world_groups};
+use super::placing::{Placement, Site, place};
+use super::plan::{Build, Tip, plan_motion, start_pose};
+use super::report::{LinkReport, LooseBodyReport, RobotReport};
+use super::{Motion, SelfFilter};
+use crate::devices::Devices;
+use crate::load;
+use crate::scene::BodyShape;
+use anyhow::bail;
+use fastrand::Rng;
+use rapier3d::prelude::*;
+use rapier3d_tldi::prelude::*;
+use std::collections::HashMap;
+use std::time::Instant;
+use tldi::Backend;
+use tldi::glamx::{Pose3, Quat, Vec3};
+
+/// Length of a step in seconds.
+pub const DT: f32 = 1.0 / 60.0;
+/// Steps from one frame of the robot's camera to the next: 30 frames a second.
+const STEPS_PER_FRAME: usize = 2;
+const GRAVITY: f32 = 9.81;
+/// Speed in m/s at which penetrations are pushed out: an arm that motors press into a scan does not
+/// jump back.
+const PUSH_OUT_SPEED: f32 = 0.5;
+/// Mass per volume of the loose bodies in kg/m³: cardboard boxes with something in them.
+const LOOSE_DENSITY: f32 = 150.0;
+/// Width of a loose body in metres, and at least this many mean radii of the scan.
+const LOOSE_SIZE: f32 = 0.12;
+const LOOSE_RADII: f32 = 10.0;
+/// Distance of the points of a loose body, as a share of its width.
+const LOOSE_SPACING: f32 = 0.04;
+/// Height of a loose body over its surface at the start, metres.
+const LOOSE_DROP: f32 = 0.01;
+/// Height of a robot that is not fixed over its surface at the start, metres.
+const ROBOT_DROP: f32 = 0.005;
+/// Distance within which a place counts as blocked by a point of the scan, metres.
+const CLEARANCE: f32 = 0.03;
+/// Standard deviations of the sensor's noise within which a point is on the robot.
+const NOISE_MARGIN: f32 = 3.0;
+/// Distance from the middle of the scan, in its diagonals, at which a robot is lost.
+const FAR_AWAY: f32 = 10.0;
+/// Gap up to which surfaces are drawn as touching, in mean radii of the scan.
+const TOUCHING_GAP: f32 = 0.2;
+
+/// Whether the robot's root is fixed to the scan.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Base {
+    /// Fixed, unless wheels, feet or other links that move are lower than the root.
+    Auto,
+    /// Fixed: an arm that is screwed down.
+    Fixed,
+    /// Free: a robot that stands, drives or walks.
+    Floating,
+}
+
+/// What a simulation is made of.
+pub struct RobotScene {
+    /// Fixed surroundings; its frame is that of the world.
+    pub scan: PointCloud<'static>,
+    /// Against gravity, unit length.
+    pub up: Vec3,
+    /// The robot.
+    pub robot: Description,
+    /// How it stands.
+    pub base: Base,
+    /// Where it stands, if not to be found; in the frame of the scan, metres.
+    pub at: Option<Vec3>,
+    /// Loose bodies in its reach, at most.
+    pub bodies: usize,
+    /// Standard deviation of the scan's points, metres.
+    pub sensor_noise: f32,
+    /// Whether the scan comes anew 30 times a second from a camera that also sees the robot.
+    pub own_camera: bool,
+    /// Whether what lies on the robot is taken out of the scan.
+    pub self_filter: bool,
+    /// Seed of all choices.
+    pub seed: u64,
+}
+
+/// Poses and contacts at one moment.
+#[derive(Clone, Debug)]
+pub struct RobotSnapshot {
+    /// From the frame of each link cloud into that of the scan.
+    pub scan_from_link: Vec<Pose3>,
+    /// Whether each link touches something.
+    pub link_touches: Vec<bool>,
+    /// From the frame of each loose body into that of the scan.
+    pub scan_from_body: Vec<Pose3>,
+    /// Points where surfaces touch, in the frame of the scan, metres.
+    pub contacts: Vec<Vec3>,
+}
+
+/// The simulation.
+pub struct RobotSimulation {
+    world: PhysicsWorld,
+    tldi: TldiPipeline,
+    scan: PointCloud<'static>,
+    scan_collider: ColliderHandle,
+    up: Vec3,
+    robot: Description,
+    build: Build,
+    clouds: Vec<LinkCloud>,
+    assembled: Assembled,
+    tally: Vec<LinkTally>,
+    loose: Vec<LooseBody>,
+    motion: Motion,
+    filter: Option<SelfFilter>,
+    own_camera: Option<OwnCamera>,
+    self_filtered: usize,
+    devices: Devices,
+    steps: usize,
+    contact_steps: usize,
+    pairs_batched: usize,
+    pairs_missed: usize,
+    max_penetration: f32,
+    wall_seconds: f64,
+}
+
+/// Contacts of a link so far.
+#[derive(Clone, Copy, Default)]
+struct LinkTally {
+    touches: bool,
+    contact_steps: usize,
+    max_force: f32,
+    force_sum: f64,
+}
+
+struct LooseBody {
+    name: String,
+    cloud: PointCloud<'static>,
+    handle: RigidBodyHandle,
+    collider: ColliderHandle,
+    start: Vec3,
+    touched: bool,
+}
+
+/// A camera that sees the scan and the robot.
+struct OwnCamera {
+    noise: f32,
+    rng: Rng,
+}
+
+impl RobotSimulation {
+    /// Samples the links, finds a place, lays the bodies, and plans the motion.
+    ///
+    /// # Errors
+    /// Where there is no place, or a cloud cannot be made.
+    pub fn new(scene: RobotScene, backend: Box<dyn Backend>) -> anyhow::Result<Self> {
+        let RobotScene {
+            robot, up, seed, ..
+        } = scene;
+        let scan_radius = scene.scan.mean_radius();
+        let clouds = clouds_of_links(&robot, Spacing { scan_radius }, seed)?;
+        let build = Build::of(&robot.kinematics, &clouds, scene.base);
+        let start = start_pose(&robot.kinematics, &build);
+        let root_from_link = robot.kinematics.poses(&start);
+        let margin = NOISE_MARGIN * scene.sensor_noise;
+        let loose_size = LOOSE_SIZE.max(LOOSE_RADII * scan_radius);
+        let site = Site {
+            footprint: build.footprint,
+            lift: build.lift + if build.is_fixed { 0.0 } else { ROBOT_DROP },
+            reach: build.tip.map_or(0.0, |tip| tip.reach),
+            body_radius: 0.6 * loose_size,
+            bodies: if build.is_fixed { scene.bodies } else { 0 },
+            seed,
+        };
+        let points: Vec<Vec3> = scene.scan.points().collect();
+        let obstacles = SelfFilter::new(&clouds, if build.is_fixed { CLEARANCE } else { 0.0 });
+        let placement = place(&scene.scan, up, &site, scene.at, |scan_from_root| {
+            let poses: Vec<Pose3> = root_from_link
+                .iter()
+                .map(|p| *scan_from_root * *p)
+                .collect();
+            count(&obstacles.on_robot(&points, &poses))
+        })?;
+        let scan_from_link: Vec<Pose3> = (root_from_link.iter())
+            .map(|pose| placement.scan_from_root * *pose)
+            .collect();
+
+        // What stands on its own feet keeps the ground under them.
+        let kept_margin = if build.is_fixed { margin } else { 0.0 };
+        let filter = (scene.self_filter)
+            .then(|| SelfFilter::new(&clouds, kept_margin + build.model_error(&clouds)));
+        let on_robot = match &filter {
+            Some(filter) if build.is_fixed => filter.on_robot(&points, &scan_from_link),
+            _ => vec![false; points.len()],
+        };
+        let self_filtered = count(&on_robot);
+        let kept: Vec<usize> = (0..points.len()).filter(|i| !on_robot[*i]).collect();
+        let scan = load::subset(&scene.scan, &kept, |p| p, |r| r)?;
+
+        let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
+        let mut world = PhysicsWorld {
+            gravity: -GRAVITY * up,
+            ..PhysicsWorld::default()
+        };
+        world.integration_parameters.dt = DT;
+        world
+            .integration_parameters
+            .normalized_max_corrective_velocity = PUSH_OUT_SPEED;
+        tldi.attach(&mut world);
+        let scan_shape = if scene.own_camera {
+            // Every frame has other points: one radius for all, and normals found on the way.
+            let bare = PointCloud::builder(scan.points().collect::<Vec<_>>());
+            bare.radius(scan_radius).build()?.into_owned()
+        } else {
+            scan.clone()
+        };
+        let collider = tldi.collider(scan_shape).collision_groups(world_groups());
+        let (_, scan_collider) = world.insert(RigidBodyBuilder::fixed(), collider);
+        let assembled = assemble(
+            &mut world, &tldi, &robot, &clouds, &build, &placement, &start,
+        )?;
+        let loose = lay_bodies(&mut world, &tldi, up, loose_size, &placement, seed)?;
+        let motion = plan_motion(
+            &robot.kinematics,
+            &clouds,
+            &build,
+            &start,
+            &placement,
+            &scan,
+            up,
+            loose_size,
+            seed,
+        );
+        Ok(Self {
+            tally: vec![LinkTally::default(); clouds.len()],
+            own_camera: scene.own_camera.then(|| OwnCamera {
+                noise: scene.sensor_noise,
+                rng: Rng::with_seed(seed ^ 0x6361_6d65),
+            }),
+            world,
+            tldi,
+            scan,
+            scan_collider,
+            up,
+            robot,
+            build,
+            clouds,
+            assembled,
+            loose,
+            motion,
+            filter,
+            self_filtered,
+            devices: Devices::default(),
+            steps: 0,
+            contact_steps: 0,
+            pairs_batched: 0,
+            pairs_missed: 0,
+            max_penetration: 0.0,
+            wall_seconds: 0.0,
+        })
+    }
+
+    /// Seconds that the planned motion takes; infinite for one that goes on for ever.
+    pub fn motion_seconds(&self) -> f32 {
+        self.motion.seconds()
+    }
+
+    /// The tip that reaches, if the robot has one.
+    pub fn tip(&self) -> Option<Tip> {
+        self.build.tip
+    }
+
+    /// Takes one step of 1/60 s.
+    ///
+    /// # Errors
+    /// Those of the pipeline, and a robot that is nowhere any more.
+    pub fn step(&mut self) -> anyhow::Result<()> {
+        let start = Instant::now();
+        if self.steps.is_multiple_of(STEPS_PER_FRAME) {
+            self.take_frame()?;
+        }
+        let time = self.steps as f32 * DT;
+        let targets = self.motion.positions(time);
+        (self.assembled).drive(
+            &mut self.world,
+            &self.robot.kinematics,
+            &targets,
+            &self.motion,
+        );
+        let report = self.tldi.step(&mut self.world)?;
+        self.wall_seconds += start.elapsed().as_secs_f64();
+        self.steps += 1;
+        self.pairs_batched += report.pairs_batched;
+        self.pairs_missed += report.pairs_missed;
+        self.max_penetration = self.max_penetration.max(report.max_penetration);
+        self.devices.note(&report);
+        self.count_contacts();
+        let bounds = self.scan.bounds();
+        let farthest = FAR_AWAY * bounds.extents().length().max(self.build.size);
+        let is_lost = |pose: &Pose3| {
+            let distance = pose.translation.distance(bounds.center());
+            distance.is_nan() || distance > farthest
+        };
+        if let Some(k) = self.scan_from_link().iter().position(is_lost) {
+            bail!(
+                "link {} was thrown out of the scan: do the robot's links start inside it, or is the robot's own image in it?",
+                self.clouds[k].name
+            );
+        }
+        Ok(())
+    }
+
+    /// What the robot's camera sees becomes the scan, without the robot.
+    fn take_frame(&mut self) -> anyhow::Result<()> {
+        let Some(camera) = &mut self.own_camera else {
+            return Ok(());
+        };
+        let world_from_link: Vec<Pose3> = (self.assembled.links.iter())
+            .map(|body| *self.world.bodies[*body].position())
+            .collect();
+        let mut frame: Vec<Vec3> = self.scan.points().collect();
+        for link in &self.clouds {
+            let pose = world_from_link[link.link];
+            frame.extend(link.cloud.points().map(|p| pose * p + camera.error()));
+        }
+        if let Some(filter) = &self.filter {
+            let on_robot = filter.on_robot(&frame, &world_from_link);
+            self.self_filtered = count(&on_robot);
+            let mut on = on_robot.into_iter();
+            frame.retain(|_| !on.next().unwrap_or(false));
+        }
+        (self.tldi).set_points(&mut self.world, self.scan_collider, &frame, None)?;
+        Ok(())
+    }
+
+    fn count_contacts(&mut self) {
+        let link_of: &HashMap<ColliderHandle, usize> = &self.assembled.cloud_of_collider;
+        let mut impulses = vec![Vec3::ZERO; self.clouds.len()];
+        let mut touches_world = false;
+        for tally in &mut self.tally {
+            tally.touches = false;
+        }
+        for pair in self.world.narrow_phase.contact_pairs() {
+            let links = [pair.collider1, pair.collider2].map(|c| link_of.get(&c).copied());
+            if links == [None, None] || pair.total_impulse_magnitude() <= 0.0 {
+                continue;
+            }
+            for (link, sign) in links.iter().zip([-1.0, 1.0]) {
+                if let Some(link) = *link {
+                    impulses[link] += sign * pair.total_impulse();
+                    self.tally[link].touches = true;
+                }
+            }
+            let other = match links {
+                [None, Some(_)] => pair.collider1,
+                [Some(_), None] => pair.collider2,
+                _ => continue,
+            };
+            touches_world = true;
+            if let Some(body) = self.loose.iter_mut().find(|body| body.collider == other) {
+                body.touched = true;
+            }
+        }
+        self.contact_steps += usize::from(touches_world);
+        for (tally, impulse) in self.tally.iter_mut().zip(impulses) {
+            if tally.touches {
+                let force = impulse.length() / DT;
+                tally.contact_steps += 1;
+                tally.max_force = tally.max_force.max(force);
+                tally.force_sum += f64::from(force);
+            }
+        }
+    }
+
+    fn scan_from_link(&self) -> Vec<Pose3> {
+        let pose =
+            |link: &LinkCloud| *self.world.bodies[self.assembled.links[link.link]].position();
+        self.clouds.iter().map(pose).collect()
+    }
+
+    /// The scan without what lay on the robot at the start.
+    pub fn scan(&self) -> &PointCloud<'static> {
+        &self.scan
+    }
+
+    /// The robot's links.
+    pub fn links(&self) -> &[LinkCloud] {
+        &self.clouds
+    }
+
+    /// The clouds of the loose bodies, each in its own frame.
+    pub fn loose_clouds(&self) -> impl Iterator<Item = &PointCloud<'static>> {
+        self.loose.iter().map(|body| &body.cloud)
+    }
+
+    /// Where everything is now.
+    pub fn snapshot(&self) -> RobotSnapshot {
+        let contacts = self
+            .tldi
+            .contacts(&self.world.narrow_phase, &self.world.colliders);
+        let link_of = &self.assembled.cloud_of_collider;
+        RobotSnapshot {
+            scan_from_link: self.scan_from_link(),
+            link_touches: self.tally.iter().map(|tally| tally.touches).collect(),
+            scan_from_body: (self.loose.iter())
+                .map(|body| *self.world.bodies[body.handle].position())
+                .collect(),
+            contacts: contacts
+                .filter(|contact| {
+                    let colliders = [contact.collider1, contact.collider2];
+                    colliders.iter().any(|c| link_of.contains_key(c))
+                        && contact.depth > -TOUCHING_GAP * self.scan.mean_radius()
+                })
+                .map(|contact| contact.point)
+                .collect(),
+        }
+    }
+
+    /// What happened so far.
+    pub fn report(&self) -> RobotReport {
+        let root = self.assembled.links[self.robot.kinematics.root()];
+        let link = |(link, tally): (&LinkCloud, &LinkTally)| LinkReport {
+            name: link.name.clone(),
+            points: link.cloud.len(),
+            contact_steps: tally.contact_steps,
+            max_force: tally.max_force,
+            mean_force: (tally.force_sum / tally.contact_steps.max(1) as f64) as f32,
+        };
+        let links: Vec<LinkReport> = self.clouds.iter().zip(&self.tally).map(link).collect();
+        RobotReport {
+            backend: self.devices.backend.clone(),
+            adapter: self.devices.adapter.clone(),
+            fallback: self.devices.fallback.clone(),
+            steps: self.steps,
+            dt: DT,
+            wall_seconds: self.wall_seconds,
+            real_time_factor: f64::from(DT) * self.steps as f64 / self.wall_seconds.max(1e-9),
+            scan_points: self.scan.len(),
+            self_filtered_points: self.self_filtered,
+            mean_radius: self.scan.mean_radius(),
+            up: self.up.to_array(),
+            base_fixed: self.build.is_fixed,
+            base: self.world.bodies[root].translation().to_array(),
+            driven_joints: self.assembled.driven_joints(),
+            link_count: links.len(),
+            links,
+            contact_steps: self.contact_steps,
+            max_penetration: self.max_penetration,
+            pairs_batched: self.pairs_batched,
+            pairs_missed: self.pairs_missed,
+            bodies: self
+                .loose
+                .iter()
+                .map(|body| self.loose_report(body))
+                .collect(),
+            warnings: self.robot.warnings.clone(),
+        }
+    }
+
+    fn loose_report(&self, body: &LooseBody) -> LooseBodyReport {
+        let rigid_body = &self.world.bodies[body.handle];
+        LooseBodyReport {
+            name: body.name.clone(),
+            points: body.cloud.len(),
+            translation: rigid_body.translation().to_array(),
+            displacement: rigid_body.translation().distance(body.start),
+            touched: body.touched,
+            sleeping: rigid_body.is_sleeping(),
+        }
+    }
+
+    /// Whether a robot that is not fixed is still on the scan: not below its lowest point.
+    pub fn is_on_scan(&self) -> bool {
+        let lowest = (self.scan.points().map(|p| p.dot(self.up))).fold(f32::MAX, f32::min);
+        let root = self.assembled.links[self.robot.kinematics.root()];
+        self.world.bodies[root].translation().dot(self.up) >= lowest - 0.1
+    }
+}
+
+impl OwnCamera {
+    /// A measuring error.
+    fn error(&mut self) -> Vec3 {
+        // A sum of three uniform numbers is near enough to a normal distribution (variance 1/4).
+        let mut component =
+            || 2.0 * self.noise * (self.rng.f32() + self.rng.f32() + self.rng.f32() - 1.5);
+        Vec3::new(component(), component(), component())
+    }
+}
+
+fn count(flags: &[bool]) -> usize {
+    flags.iter().filter(|flag| **flag).count()
+}
+
+/// Bodies stand where the placement has them, their y axis up.
+fn lay_bodies(
+    world: &mut PhysicsWorld,
+    tldi: &TldiPipeline,
+    up: Vec3,
+    size: f32,
+    placement: &Placement,
+    seed: u64,
+) -> anyhow::Result<Vec<LooseBody>> {
+    let shapes = [BodyShape::RoundedBox, BodyShape::Pebble, BodyShape::Star];
+    let mut bodies = Vec::new();
+    for (k, surface) in placement.bodies.iter().enumerate() {
+        let shape = shapes[k % shapes.len()];
+        let sample = load::body_from_surface(shape.sample(LOOSE_SPACING, seed))?;
+        let cloud = load::resized(&sample, size)?;
+        let half_height = 0.5 * cloud.bounds().extents().y;
+        let pose = Pose3::from_parts(
+            *surface + (half_height + LOOSE_DROP) * up,
+            Quat::from_rotation_arc(Vec3::Y, up),
+        );
+        let (handle, collider) = world.insert(
+            RigidBodyBuilder::dynamic().pose(pose).angular_damping(1.0),
+            tldi.collider(cloud.clone())
+                .density(LOOSE_DENSITY)
+                .collision_groups(world_groups()),
+        );
+        bodies.push(LooseBody {
+            name: format!("{} {}", shape.name(), k + 1),
+            cloud,
+            handle,
+            collider,
+            start: pose.translation,
+            touched: false,
+        });
+    }
+    Ok(bodies)
+}

@@ -1,0 +1,243 @@
+//! Runs the binary `depth_camera` as a user would.
+
+mod common;
+
+use common::{data, folder, json, keys, run, stderr};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_depth_camera");
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+/// Frames of a camera 1.5 m over a floor, straight down, 160 × 120 pixels; where `plate` says so, a
+/// plate of 50 cm across is 30 cm over the floor. The camera's y is the world's −y: z is up.
+fn write_frames(folder: &Path, plates: &[bool]) {
+    fs::create_dir_all(folder).unwrap();
+    fs::write(
+        folder.join("intrinsics.txt"),
+        "160 120 140 140 79.5 59.5 0.001\n",
+    )
+    .unwrap();
+    let mut poses = String::new();
+    for (k, plate) in plates.iter().enumerate() {
+        let name = format!("{k:03}.png");
+        poses += &format!("{name} 1 0 0 0 0 -1 0 0 0 0 -1 1.5 0 0 0 1\n");
+        let mut bytes = Vec::new();
+        for v in 0..120 {
+            for u in 0..160 {
+                let on_plate = *plate && (12..148).contains(&u) && (12..108).contains(&v);
+                let depth: u16 = if on_plate { 1200 } else { 1500 };
+                bytes.extend(depth.to_be_bytes());
+            }
+        }
+        let file = fs::File::create(folder.join(name)).unwrap();
+        let mut encoder = png::Encoder::new(file, 160, 120);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        encoder
+            .write_header()
+            .unwrap()
+            .write_image_data(&bytes)
+            .unwrap();
+    }
+    fs::write(folder.join("poses.txt"), poses).unwrap();
+}
+
+fn report(folder: &Path, options: &[&str]) -> Value {
+    let output = run(
+        BINARY,
+        folder,
+        &[&["--json", "report.json"], options].concat(),
+    );
+    assert!(output.status.success(), "{options:?}: {}", stderr(&output));
+    json(folder.join("report.json"))
+}
+
+/// A body lies on the plate; the plate leaves the view, and the body falls to the floor.
+#[test]
+fn what_is_gone_from_the_frame_does_not_hold() {
+    let folder = folder("depth_gone");
+    let plates: Vec<bool> = (0..60).map(|k| k < 30).collect();
+    write_frames(&folder.join("frames"), &plates);
+    // A box 20 cm long is 10 cm high: its middle rests 5 cm over what carries it, with half a
+    // centimetre for the sensor's radii.
+    let options = [
+        "--frames", "frames", "--up", "0,0,1", "--count", "1", "--size", "0.2", "--hold", "1",
+    ];
+    let height = |report: &Value| number(&report["bodies"][0]["translation"][2]);
+    write_frames(&folder.join("still"), &[true; 30]);
+    let still = report(&folder, &[&["--frames", "still"], &options[2..]].concat());
+    assert!((height(&still) - 0.35).abs() < 0.005, "{still}");
+    let gone = report(&folder, &options);
+    assert!((height(&gone) - 0.05).abs() < 0.005, "{gone}");
+    for frame in gone["frames"].as_array().unwrap() {
+        // Rims of the plate fly; nothing is remembered.
+        assert_eq!(frame["remembered_points"], 0);
+        let flying = number(&frame["flying_pixels"]);
+        assert!(
+            flying == 0.0 || (800.0..1000.0).contains(&flying),
+            "{frame}"
+        );
+        let latency = ["unproject_ms", "update_ms", "step_ms"].map(|key| number(&frame[key]));
+        let sum: f64 = latency.iter().sum();
+        assert!((number(&frame["latency_ms"]) - sum).abs() < 1e-6, "{frame}");
+    }
+    // With a memory, the floor under the plate is known once it was seen, the plate is not kept.
+    let plates: Vec<bool> = (0..20).map(|k| k >= 10).collect();
+    write_frames(&folder.join("covered"), &plates);
+    let options = [
+        "--frames", "covered", "--up", "0,0,1", "--count", "0", "--hold", "0", "--memory", "30",
+    ];
+    let covered = report(&folder, &options);
+    let frames = covered["frames"].as_array().unwrap();
+    assert_eq!(frames[9]["remembered_points"], 0);
+    // 136 × 96 pixels of the floor, once: what a frame sees again is not kept twice.
+    let remembered = number(&frames[19]["remembered_points"]);
+    assert!((12_500.0..13_500.0).contains(&remembered), "{remembered}");
+}
+
+#[test]
+fn the_generated_ball_pushes_and_equal_seeds_give_equal_reports() {
+    let folder = folder("depth_generated");
+    let run = || {
+        let mut report = report(&folder, &[]);
+        for key in [
+            "wall_seconds",
+            "real_time_factor",
+            "median_latency_ms",
+            "max_latency_ms",
+        ] {
+            assert!(number(&report[key]) > 0.0, "{key}");
+            report[key] = Value::Null;
+        }
+        for frame in report["frames"].as_array_mut().unwrap() {
+            for key in [
+                "decode_ms",
+                "unproject_ms",
+                "update_ms",
+                "step_ms",
+                "latency_ms",
+            ] {
+                frame[key] = Value::Null;
+            }
+        }
+        report
+    };
+    let first = run();
+    assert_eq!(run(), first);
+    for key in [
+        "backend",
+        "adapter",
+        "steps",
+        "frames",
+        "bodies",
+        "contact_steps",
+        "pairs_missed",
+    ] {
+        assert!(keys(&first).contains(&key), "{key}");
+    }
+    assert_eq!(first["pairs_missed"], 0);
+    let bodies = first["bodies"].as_array().unwrap();
+    // They rest on the table, the pebble after some rolling, and the ball, 22 cm wide, moves what is
+    // in its way by more than a frame's noise.
+    let has_rested = |body: &Value| !body["first_rested_at_seconds"].is_null();
+    assert!(bodies.iter().all(has_rested), "{bodies:?}");
+    assert!(
+        bodies
+            .iter()
+            .any(|body| number(&body["displacement"]) > 0.05),
+        "{bodies:?}"
+    );
+    for name in ["initial.png", "mid.png", "final.png"] {
+        let png = fs::read(folder.join("out/depth_camera").join(name)).unwrap();
+        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    let folder = folder("depth_errors");
+    write_frames(&folder.join("frames"), &[false; 3]);
+    fs::create_dir_all(folder.join("empty")).unwrap();
+    for (options, code, message) in [
+        (&["--frames", "empty"][..], 1, "holds intrinsics.txt"),
+        (&["--frames", "missing"], 1, "missing"),
+        (&["--backend", "gpu"], 2, "not built"),
+        (&["--sensor-noise", "-1"], 2, "greater than 0"),
+        (
+            &["--frames", "frames", "--size", "9"],
+            1,
+            "no level surface",
+        ),
+        (&["--hold", "-1"], 2, "unexpected argument"),
+    ] {
+        let output = run(BINARY, &folder, options);
+        assert_eq!(
+            output.status.code(),
+            Some(code),
+            "{options:?}: {}",
+            stderr(&output)
+        );
+        assert!(
+            stderr(&output).contains(message),
+            "{options:?}: {}",
+            stderr(&output)
+        );
+    }
+    // A frame that is missing is named, and passed over.
+    fs::remove_file(folder.join("frames/001.png")).unwrap();
+    let report = report(
+        &folder,
+        &[
+            "--frames",
+            "frames",
+            "--count",
+            "0",
+            "--hold",
+            "0",
+            "--animate",
+        ],
+    );
+    assert_eq!(report["missing_frames"][0], "001.png");
+    assert_eq!(report["frames"].as_array().unwrap().len(), 2);
+    // In metres, as a unit of millimetres makes them: nothing is in range.
+    fs::write(
+        folder.join("frames/intrinsics.txt"),
+        "160 120 140 140 79.5 59.5 1\n",
+    )
+    .unwrap();
+    let output = run(BINARY, &folder, &["--frames", "frames"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        stderr(&output).contains("is the depth unit right?"),
+        "{}",
+        stderr(&output)
+    );
+}
+
+#[test]
+fn bodies_rest_on_real_frames() {
+    let Some(frames) = data("kitchen_depth") else {
+        return;
+    };
+    let folder = folder("depth_kitchen");
+    let report = report(&folder, &["--frames", frames.to_str().unwrap()]);
+    assert_eq!(report["missing_frames"].as_array().unwrap().len(), 0);
+    // The data's notes give gravity as (-0.009, 0.904, 0.427); one frame tells it within 8°.
+    let up = [0, 1, 2].map(|k| number(&report["up"][k]));
+    let cos = -(-0.009 * up[0] + 0.904 * up[1] + 0.427 * up[2]);
+    assert!(cos > 0.99, "{up:?}");
+    let rested = report["bodies"].as_array().unwrap().iter();
+    assert!(
+        rested
+            .filter(|body| !body["first_rested_at_seconds"].is_null())
+            .count()
+            >= 2,
+        "{report}"
+    );
+    eprintln!("median latency {} ms", report["median_latency_ms"]);
+}

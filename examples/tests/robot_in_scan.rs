@@ -1,0 +1,407 @@
+//! Runs the binary `robot_in_scan` as a user would.
+
+mod common;
+
+use common::{data, folder, json, keys, run, stderr, write_ply};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_robot_in_scan");
+
+/// A level floor of 3 × 3 m, z up, its points 2.5 cm apart, with a block of 30 × 30 × 20 cm in a
+/// corner.
+fn write_floor(folder: &Path) {
+    let mut points = Vec::new();
+    for i in 0..120 {
+        for j in 0..120 {
+            let on_block = i < 12 && j < 12;
+            let height = if on_block { 0.2 } else { 0.0 };
+            points.push([i as f32 * 0.025, j as f32 * 0.025, height]);
+        }
+    }
+    write_ply(&folder.join("floor.ply"), &points);
+}
+
+/// A box on four wheels of 8 cm radius, axles along y.
+fn car() -> String {
+    let wheel = |name: &str, x: f32, y: f32| {
+        format!(
+            r#"<link name="{name}">
+              <collision><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.08" length="0.05"/></geometry></collision>
+              <inertial><mass value="0.5"/><inertia ixx="0.001" iyy="0.0016" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial>
+            </link>
+            <joint name="{name}_axle" type="continuous"><parent link="chassis"/><child link="{name}"/>
+              <origin xyz="{x} {y} 0"/><axis xyz="0 1 0"/></joint>"#
+        )
+    };
+    format!(
+        r#"<robot name="car"><link name="chassis">
+          <collision><origin xyz="0 0 0.05"/><geometry><box size="0.5 0.26 0.1"/></geometry></collision>
+          <inertial><mass value="5"/><origin xyz="0 0 0.05"/><inertia ixx="0.04" iyy="0.1" izz="0.12" ixy="0" ixz="0" iyz="0"/></inertial>
+        </link>{}{}{}{}</robot>"#,
+        wheel("front_left", 0.18, 0.17),
+        wheel("front_right", 0.18, -0.17),
+        wheel("rear_left", -0.18, 0.17),
+        wheel("rear_right", -0.18, -0.17)
+    )
+}
+
+/// A torso on two legs of two links each, which overlap at hips and knees, without any inertials.
+fn walker() -> String {
+    let mut legs = String::new();
+    for (name, x, y) in [
+        ("fl", 0.2, 0.12),
+        ("fr", 0.2, -0.12),
+        ("rl", -0.2, 0.12),
+        ("rr", -0.2, -0.12),
+    ] {
+        legs += &format!(
+            r#"<link name="{name}_thigh"><collision><origin xyz="0 0 -0.1"/><geometry><box size="0.06 0.06 0.26"/></geometry></collision></link>
+            <joint name="{name}_hip" type="revolute"><parent link="torso"/><child link="{name}_thigh"/>
+              <origin xyz="{x} {y} 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="60" velocity="8"/></joint>
+            <link name="{name}_shin"><collision><origin xyz="0 0 -0.1"/><geometry><capsule radius="0.03" length="0.2"/></geometry></collision></link>
+            <joint name="{name}_knee" type="revolute"><parent link="{name}_thigh"/><child link="{name}_shin"/>
+              <origin xyz="0 0 -0.2"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="60" velocity="8"/></joint>"#
+        );
+    }
+    format!(
+        r#"<robot name="walker"><link name="torso">
+          <collision><geometry><box size="0.5 0.24 0.12"/></geometry></collision></link>{legs}</robot>"#
+    )
+}
+
+fn report(folder: &Path, options: &[&str]) -> Value {
+    let output = run(
+        BINARY,
+        folder,
+        &[&["--json", "report.json"], options].concat(),
+    );
+    assert!(output.status.success(), "{options:?}: {}", stderr(&output));
+    json(folder.join("report.json"))
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+#[test]
+fn the_built_in_arm_touches_and_equal_seeds_give_equal_reports() {
+    let folder = folder("robot_built_in");
+    let run = |seed: &str| {
+        let mut report = report(&folder, &["--seed", seed, "--steps", "500"]);
+        assert!(number(&report["wall_seconds"]) > 0.0);
+        report["wall_seconds"] = Value::Null;
+        report["real_time_factor"] = Value::Null;
+        report
+    };
+    let first = run("1");
+    assert_eq!(run("1"), first);
+    for key in [
+        "backend",
+        "adapter",
+        "steps",
+        "dt",
+        "wall_seconds",
+        "real_time_factor",
+        "scan_points",
+        "links",
+        "contact_steps",
+        "max_penetration",
+        "pairs_batched",
+        "pairs_missed",
+    ] {
+        assert!(keys(&first).contains(&key), "{key}");
+    }
+    assert_eq!(first["base_fixed"], true);
+    // Six joints; the seventh mimics the sixth.
+    assert_eq!(first["driven_joints"], 6);
+    assert_eq!(first["link_count"], 8);
+    assert_eq!(first["pairs_missed"], 0);
+    assert!(number(&first["contact_steps"]) > 20.0);
+    let bodies = first["bodies"].as_array().unwrap();
+    assert!(
+        bodies
+            .iter()
+            .any(|b| b["touched"] == true && number(&b["displacement"]) > 0.05)
+    );
+    for link in first["links"].as_array().unwrap() {
+        // Its strongest motor has 80 N·m; at 20 cm that is 400 N. Contacts of a light body that is
+        // pinned to the floor, and blows, may double it.
+        assert!(number(&link["max_force"]) < 1000.0, "{link}");
+        assert!(number(&link["points"]) > 100.0, "{link}");
+    }
+    for name in ["initial.png", "mid.png", "final.png"] {
+        let png = fs::read(folder.join("out/robot_in_scan").join(name)).unwrap();
+        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+    }
+}
+
+/// Wheels of 8 cm that roll at 0.25 m/s over ground: 1.5 m in 6 s, less the start. They stand on
+/// the floor, not in it.
+#[test]
+fn a_car_drives() {
+    let folder = folder("robot_car");
+    write_floor(&folder);
+    fs::write(folder.join("car.urdf"), car()).unwrap();
+    let options = [
+        "--urdf",
+        "car.urdf",
+        "--scan",
+        "floor.ply",
+        "--up",
+        "0,0,1",
+        "--place",
+        "1.5,1.5,0",
+        "--steps",
+    ];
+    let drive = |steps: &str| report(&folder, &[&options[..], &[steps]].concat());
+    let (start, end) = (drive("30"), drive("150"));
+    assert_eq!(end["base_fixed"], false);
+    assert_eq!(end["driven_joints"], 4);
+    let place = |report: &Value| [0, 1, 2].map(|k| number(&report["base"][k]));
+    let (a, b) = (place(&start), place(&end));
+    let way = (a[0] - b[0]).hypot(a[1] - b[1]);
+    assert!((way - 0.5).abs() < 0.15, "{a:?} {b:?}");
+    // The chassis' origin is at the axles.
+    assert!((b[2] - 0.08).abs() < 0.01, "{b:?}");
+}
+
+/// Links that overlap at their joints, at rest and stepping, without inertials: it stays on its feet.
+#[test]
+fn a_walker_does_not_explode() {
+    let folder = folder("robot_walker");
+    write_floor(&folder);
+    fs::write(folder.join("walker.urdf"), walker()).unwrap();
+    let options = [
+        "--urdf",
+        "walker.urdf",
+        "--scan",
+        "floor.ply",
+        "--steps",
+        "240",
+        "--animate",
+    ];
+    let report = report(&folder, &options);
+    assert_eq!(report["base_fixed"], false);
+    assert_eq!(report["driven_joints"], 8);
+    let base = [0, 1, 2].map(|k| number(&report["base"][k]));
+    // The torso stands 0.43 m over the floor; the legs bend by up to 0.3 rad.
+    assert!((0.3..0.46).contains(&base[2]), "{base:?}");
+    assert!(number(&report["max_penetration"]) < 0.03, "{report}");
+    assert!(folder.join("out/robot_in_scan/motion.png").exists());
+}
+
+/// The robot's own image holds it where it is, unless it is taken out.
+#[test]
+fn the_self_filter_frees_the_robot_from_its_own_image() {
+    let folder = folder("robot_own_camera");
+    write_floor(&folder);
+    let options = [
+        "--scan",
+        "floor.ply",
+        "--place",
+        "1.5,1.5,0",
+        "--bodies",
+        "0",
+        "--own-camera",
+        "--steps",
+        "60",
+    ];
+    let with = report(&folder, &options);
+    let robot_points: f64 = (with["links"].as_array().unwrap().iter())
+        .map(|link| number(&link["points"]))
+        .sum();
+    let filtered = number(&with["self_filtered_points"]);
+    // All of the robot's points, and those of the floor under it.
+    assert!(
+        filtered > 0.995 * robot_points,
+        "{filtered} of {robot_points}"
+    );
+    assert!(
+        filtered < 1.1 * robot_points,
+        "{filtered} of {robot_points}"
+    );
+    assert_eq!(with["contact_steps"], 0, "{with}");
+    // In the middle of its own image, it is held or thrown out.
+    let unfiltered = [
+        &options[..],
+        &["--no-self-filter", "--json", "without.json"],
+    ]
+    .concat();
+    let output = run(BINARY, &folder, &unfiltered);
+    if output.status.success() {
+        let without = json(folder.join("without.json"));
+        assert!(number(&without["contact_steps"]) > 30.0, "{without}");
+    } else {
+        assert!(stderr(&output).contains("own image"), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn what_is_missing_is_named_and_the_rest_is_used() {
+    let folder = folder("robot_missing");
+    write_floor(&folder);
+    let arm = |mesh: &str| {
+        format!(
+            r#"<robot name="arm">
+              <link name="base"><collision><geometry><box size="0.2 0.2 0.1"/></geometry></collision></link>
+              <link name="boom"><visual><origin xyz="0 0 0.3"/><geometry><mesh filename="{mesh}" scale="0.1 0.1 0.5"/></geometry></visual></link>
+              <link name="frame"/>
+              <joint name="lift" type="revolute"><parent link="base"/><child link="boom"/><origin xyz="0 0 0.1"/>
+                <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="50" velocity="1"/></joint>
+              <joint name="tool" type="fixed"><parent link="boom"/><child link="frame"/></joint>
+              <joint name="odd" type="revolute"><parent link="boom"/><child link="lamp"/>
+                <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="5" velocity="1"/><mimic joint="none"/></joint>
+              <link name="lamp"/>
+            </robot>"#
+        )
+    };
+    let cube = "solid cube\n".to_owned()
+        + &[
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ]
+        .iter()
+        .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
+        .map(|corners| {
+            let vertex = |k: &&i32| {
+                let bit = |n: i32| f64::from(*k >> n & 1) - 0.5;
+                format!("vertex {} {} {}\n", bit(0), bit(1), bit(2))
+            };
+            let vertices: String = corners.iter().map(vertex).collect();
+            format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
+        })
+        .collect::<String>()
+        + "endsolid cube\n";
+    fs::create_dir_all(folder.join("my_robot/meshes")).unwrap();
+    fs::create_dir_all(folder.join("my_robot/urdf")).unwrap();
+    fs::write(folder.join("my_robot/meshes/cube.stl"), cube).unwrap();
+    let options = [
+        "--urdf",
+        "my_robot/urdf/arm.urdf",
+        "--scan",
+        "floor.ply",
+        "--steps",
+        "30",
+    ];
+    for (mesh, links) in [
+        ("package://my_robot/meshes/cube.stl", 2),
+        ("../meshes/cube.stl", 2),
+        ("package://my_robot/meshes/lost.dae", 1),
+    ] {
+        fs::write(folder.join("my_robot/urdf/arm.urdf"), arm(mesh)).unwrap();
+        let report = report(&folder, &options);
+        assert_eq!(report["link_count"], links, "{mesh}");
+        let warnings = report["warnings"].to_string();
+        assert!(warnings.contains("odd cannot mimic none"), "{warnings}");
+        assert_eq!(
+            warnings.contains("lost.dae was not found"),
+            links == 1,
+            "{warnings}"
+        );
+    }
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    let folder = folder("robot_errors");
+    write_floor(&folder);
+    let one_link = r#"<robot name="r"><link name="a"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>"#;
+    for (urdf, message) in [
+        ("<robot", "not a URDF"),
+        (
+            &format!(
+                r#"{one_link}<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>"#
+            ),
+            "link b, which does not exist",
+        ),
+        (
+            &format!(r#"{one_link}<link name="b"/></robot>"#),
+            "no joint leads to a, b",
+        ),
+        (
+            &format!(r#"{one_link}<link name="a"/></robot>"#),
+            "given twice",
+        ),
+        (
+            r#"<robot name="r"><link name="a"/></robot>"#,
+            "no link has a geometry",
+        ),
+    ] {
+        fs::write(folder.join("robot.urdf"), urdf).unwrap();
+        let output = run(
+            BINARY,
+            &folder,
+            &["--urdf", "robot.urdf", "--scan", "floor.ply"],
+        );
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(
+            stderr(&output).contains(message),
+            "{message}: {}",
+            stderr(&output)
+        );
+    }
+    // A single link without joints just stands there.
+    fs::write(folder.join("robot.urdf"), format!("{one_link}</robot>")).unwrap();
+    let report = report(
+        &folder,
+        &[
+            "--urdf",
+            "robot.urdf",
+            "--scan",
+            "floor.ply",
+            "--steps",
+            "10",
+        ],
+    );
+    assert_eq!(report["driven_joints"], 0);
+    for (options, code, message) in [
+        (&["--backend", "gpu"][..], 2, "not built"),
+        (&["--scan-scale", "0"], 2, "greater than 0"),
+        (&["--urdf", "missing.urdf"], 1, "missing.urdf"),
+        (
+            &["--scan", "floor.ply", "--scan-scale", "0.001"],
+            1,
+            "--scan-scale",
+        ),
+    ] {
+        let output = run(BINARY, &folder, options);
+        assert_eq!(output.status.code(), Some(code), "{options:?}");
+        assert!(
+            stderr(&output).contains(message),
+            "{options:?}: {}",
+            stderr(&output)
+        );
+    }
+}
+
+#[test]
+fn the_panda_reaches_into_the_kitchen() {
+    let (Some(urdf), Some(scan)) = (
+        data("robot_panda/panda.urdf"),
+        data("kitchen_scan_300k.ply.gz"),
+    ) else {
+        return;
+    };
+    let folder = folder("robot_panda");
+    let options = [
+        "--urdf",
+        urdf.to_str().unwrap(),
+        "--scan",
+        scan.to_str().unwrap(),
+        "--steps",
+        "400",
+    ];
+    let report = report(&folder, &options);
+    // Seven joints and one finger; the other finger mimics it.
+    assert_eq!(report["driven_joints"], 8);
+    assert_eq!(report["link_count"], 11);
+    assert!(number(&report["contact_steps"]) > 0.0);
+    assert_eq!(report["pairs_missed"], 0);
+    eprintln!("real-time factor {}", report["real_time_factor"]);
+}

@@ -1,0 +1,151 @@
+//! Runs the binary `two_clouds` as a user would.
+
+mod common;
+
+use common::{folder, json, keys, run, stderr, write_ply};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Output;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_two_clouds");
+
+/// A sphere of radius 0.1 around the origin, its points on a golden spiral some 4 mm apart.
+fn sphere() -> Vec<[f32; 3]> {
+    let count = 8000;
+    (0..count)
+        .map(|k| {
+            let z = 1.0 - (2 * k + 1) as f64 / count as f64;
+            let angle = k as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt());
+            let ring = (1.0 - z * z).sqrt();
+            [ring * angle.cos(), ring * angle.sin(), z].map(|c| (0.1 * c) as f32)
+        })
+        .collect()
+}
+
+fn ask(folder: &Path, options: &[&str]) -> Output {
+    write_ply(&folder.join("a.ply"), &sphere());
+    write_ply(&folder.join("b.ply"), &sphere());
+    let files = [
+        "a.ply",
+        "b.ply",
+        "--out",
+        "pictures",
+        "--json",
+        "answer.json",
+    ];
+    run(BINARY, folder, &[&files, options].concat())
+}
+
+fn answer(folder: &Path, options: &[&str]) -> Value {
+    let output = ask(folder, options);
+    assert!(output.status.success(), "{}", stderr(&output));
+    json(folder.join("answer.json"))
+}
+
+fn vector(value: &Value) -> [f64; 3] {
+    [0, 1, 2].map(|k| value[k].as_f64().unwrap())
+}
+
+/// Spheres whose surfaces are 2 mm deep in each other, 3 mm apart, and far apart. 0.4 mm: the
+/// spheres' points are 4 mm apart, and depths scatter by a tenth of that.
+#[test]
+fn spheres_answer_as_geometry_says() {
+    let folder = folder("two_clouds_spheres");
+    for (distance, depth) in [(0.198, 0.002), (0.203, -0.003), (0.7, -0.5)] {
+        let pose = format!("0,{distance},0");
+        let answer = answer(&folder, &["--pose", &pose]);
+        assert_eq!(answer["collides"], depth > 0.0, "{answer}");
+        let gap = answer["gap"].as_f64().unwrap();
+        assert!((gap + depth).abs() < 4e-4, "{distance}: {gap}");
+        for contact in answer["contacts"].as_array().unwrap() {
+            let found = contact["depth"].as_f64().unwrap();
+            assert!((found - depth).abs() < 4e-4, "{contact}");
+            let [x, y, z] = vector(&contact["point"]);
+            assert!(
+                (y - 0.5 * distance).abs() < 4e-4 && x.hypot(z) < 0.005,
+                "{contact}"
+            );
+            assert!(vector(&contact["normal"])[1] > 0.995, "{contact}");
+        }
+        let contacts = answer["contacts"].as_array().unwrap().len();
+        assert_eq!(contacts > 0, depth > -0.01, "{answer}");
+    }
+    for name in ["scene", "layers", "zone", "pixels"] {
+        let png = std::fs::read(folder.join(format!("pictures/{name}.png"))).unwrap();
+        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+    }
+}
+
+/// B comes from 0.7 m above at 2 m/s and meets A after 0.5 m.
+#[test]
+fn a_velocity_tells_when_they_meet() {
+    let folder = folder("two_clouds_velocity");
+    let options = ["--pose", "0,0.7,0", "--velocity", "0,-2,0", "--animate"];
+    let impact = &answer(&folder, &options)["impact"];
+    assert!(
+        (impact["time_seconds"].as_f64().unwrap() - 0.25).abs() < 4e-4,
+        "{impact}"
+    );
+    assert!(
+        (impact["distance"].as_f64().unwrap() - 0.5).abs() < 4e-4,
+        "{impact}"
+    );
+    assert!(folder.join("pictures/motion.png").exists());
+    let away = answer(&folder, &["--pose", "0,0.7,0", "--velocity", "0,2,0"]);
+    assert_eq!(away["impact"], Value::Null);
+}
+
+#[test]
+fn without_files_there_is_something_to_see_and_it_is_the_same_twice() {
+    let folder = folder("two_clouds_generated");
+    let ask = |seed: &str| {
+        let options = ["--json", "answer.json", "--seed", seed];
+        let output = run(BINARY, &folder, &options);
+        assert!(output.status.success(), "{}", stderr(&output));
+        let mut answer = json(folder.join("answer.json"));
+        assert!(answer["wall_seconds"].as_f64().unwrap() > 0.0);
+        answer["wall_seconds"] = Value::Null;
+        answer
+    };
+    let first = ask("3");
+    assert_eq!(ask("3"), first);
+    assert_ne!(ask("4"), first);
+    assert_eq!(first["collides"], true);
+    assert!(first["contacts"].as_array().unwrap().len() >= 3);
+    for key in ["collides", "gap", "contacts", "backend", "adapter"] {
+        assert!(keys(&first).contains(&key), "{key}");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    let folder = folder("two_clouds_errors");
+    for (options, code, message) in [
+        (&["--pose", "1,2"][..], 2, "three of degrees"),
+        (&["--velocity", "fast"], 2, "three numbers"),
+        (&["--backend", "gpu"], 2, "not built"),
+        (&["--animate"], 1, "give a --velocity"),
+    ] {
+        let output = ask(&folder, options);
+        assert_eq!(output.status.code(), Some(code), "{options:?}");
+        assert!(
+            stderr(&output).contains(message),
+            "{options:?}: {}",
+            stderr(&output)
+        );
+    }
+    write_ply(&folder.join("point.ply"), &[[1.0, 2.0, 3.0]; 4]);
+    for (files, message) in [
+        (&["a.ply"][..], "<B>"),
+        (&["a.ply", "missing.ply"], "missing.ply"),
+        (&["a.ply", "point.ply"], "at one position"),
+    ] {
+        let output = run(BINARY, &folder, files);
+        assert!(!output.status.success());
+        assert!(
+            stderr(&output).contains(message),
+            "{files:?}: {}",
+            stderr(&output)
+        );
+    }
+}

@@ -1,0 +1,166 @@
+//! Asks about two clouds once: do they collide, what is the gap, where do they touch.
+
+use anyhow::bail;
+use clap::Parser;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use tldi::PointCloud;
+use tldi::glamx::{Pose3, Vec3};
+use tldi_examples::cli::{Common, PoseArgument, Triple};
+use tldi_examples::query::{Answer, CloudQuery};
+use tldi_examples::scene::BodyShape;
+use tldi_examples::{animation, load, output, query_pictures};
+
+/// Asks about two clouds once: do they collide, what is the gap, where do they touch
+///
+/// Writes pictures of both layered depth images, of the contact zone and of the contact pixels.
+/// Coordinates and results are in the unit of the files, taken for metres, in the frame of A.
+/// Ends with 0 if the query was answered, whatever the answer.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// First cloud (PLY, PCD, XYZ or CSV, also as .gz)
+    #[arg(requires = "b")]
+    a: Option<PathBuf>,
+    /// Second cloud; without files, two generated ones
+    b: Option<PathBuf>,
+    /// Pose of B in the frame of A: metres, then degrees about the fixed axes x, y, z
+    #[arg(long, value_name = "X,Y,Z[,RX,RY,RZ]", allow_hyphen_values = true)]
+    pose: Option<PoseArgument>,
+    /// Velocity of B relative to A in m/s: also asks where they meet
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        default_value = "0,0,0",
+        allow_hyphen_values = true
+    )]
+    velocity: Triple,
+    /// Folder for scene.png, layers.png, zone.png and pixels.png
+    #[arg(long, value_name = "DIR", default_value = "out/two_clouds")]
+    out: PathBuf,
+    /// Also write motion.png, an animated PNG of B on its way along the velocity
+    #[arg(long)]
+    animate: bool,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Widths in metres of the generated clouds, and the distance of their points.
+const GENERATED_SIZES: [f32; 2] = [0.4, 0.3];
+const GENERATED_SPACING: f32 = 0.013;
+/// Pose of the second generated cloud: a star that lies on a ring, slanted.
+const GENERATED_POSE: &str = "0.1,0.12,0.02,12,25,-10";
+/// Ratio of sizes from which two files are suspected to have different units.
+const UNLIKE_SIZES: f32 = 100.0;
+/// Pictures of a motion, and how long each is shown, in seconds.
+const MOTION_PICTURES: usize = 24;
+const MOTION_PICTURE_SECONDS: f32 = 0.06;
+const MOTION_PICTURE_SIZE: [u32; 2] = [640, 360];
+const PICTURE_SIZE: [u32; 2] = [1280, 720];
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> anyhow::Result<()> {
+    let query = load_query(args)?;
+    let mut backend = args.common.backend.open()?;
+    let answer = query.ask(&mut *backend)?;
+    draw(&query, &answer, &args.out)?;
+    if args.animate {
+        animate(args, &query)?;
+    }
+    if let Some(path) = &args.common.json {
+        output::write_json(path, &answer.report)?;
+    }
+    answer.report.write_table(&mut io::stdout().lock())?;
+    Ok(())
+}
+
+fn load_query(args: &Args) -> anyhow::Result<CloudQuery> {
+    let generated: PoseArgument = GENERATED_POSE.parse()?;
+    let (a, b, default_pose) = match (&args.a, &args.b) {
+        (Some(a), Some(b)) => (load_cloud(a)?, load_cloud(b)?, Pose3::IDENTITY),
+        _ => {
+            let [a, b] = [BodyShape::Torus, BodyShape::Star];
+            let [size_a, size_b] = GENERATED_SIZES;
+            let seed = args.common.seed;
+            (
+                generate(a, size_a, seed)?,
+                generate(b, size_b, seed)?,
+                generated.0,
+            )
+        }
+    };
+    let [size_a, size_b] = [&a, &b].map(|cloud| cloud.bounds().extents().max_element());
+    if size_a.max(size_b) > UNLIKE_SIZES * size_a.min(size_b) {
+        eprintln!("warning: A is {size_a:.3} in size and B {size_b:.3}: have they the same unit?");
+    }
+    Ok(CloudQuery {
+        a,
+        b,
+        a_from_b: args.pose.map_or(default_pose, |PoseArgument(pose)| pose),
+        velocity: args.velocity.0,
+    })
+}
+
+fn load_cloud(path: &Path) -> anyhow::Result<PointCloud<'static>> {
+    eprintln!("reading {}", path.display());
+    load::body_from_file(path)
+}
+
+fn generate(shape: BodyShape, size: f32, seed: u64) -> anyhow::Result<PointCloud<'static>> {
+    let cloud = load::body_from_surface(shape.sample(GENERATED_SPACING, seed))?;
+    Ok(load::resized(&cloud, size)?)
+}
+
+fn draw(query: &CloudQuery, answer: &Answer, folder: &Path) -> anyhow::Result<()> {
+    output::make_folder(folder)?;
+    let camera = query_pictures::camera(query, PICTURE_SIZE);
+    for (name, picture) in [
+        ("scene.png", query_pictures::scene(query, answer, &camera)),
+        ("layers.png", query_pictures::layers(query, answer)),
+        ("zone.png", query_pictures::zone(query, answer, &camera)?),
+        ("pixels.png", query_pictures::contact_pixels(query, answer)),
+    ] {
+        output::write_file(&folder.join(name), &picture.to_png()?)?;
+    }
+    eprintln!("pictures are in {}", folder.display());
+    Ok(())
+}
+
+/// Asks again along the motion, up to the meeting or for a second.
+fn animate(args: &Args, query: &CloudQuery) -> anyhow::Result<()> {
+    if query.velocity == Vec3::ZERO {
+        bail!("--animate shows B on its way: give a --velocity");
+    }
+    let mut backend = args.common.backend.open()?;
+    let end = (query.ask(&mut *backend)?.report.impact).map_or(1.0, |impact| impact.time_seconds);
+    let bar = output::progress_bar(MOTION_PICTURES, "pictures");
+    let camera = query_pictures::camera(query, MOTION_PICTURE_SIZE);
+    let mut pictures = Vec::new();
+    for k in 0..MOTION_PICTURES {
+        let time = end * k as f32 / (MOTION_PICTURES - 1) as f32;
+        let moved = Pose3::from_translation(query.velocity * time) * query.a_from_b;
+        let later = CloudQuery {
+            a: query.a.clone(),
+            b: query.b.clone(),
+            a_from_b: moved,
+            velocity: query.velocity,
+        };
+        let answer = later.ask(&mut *backend)?;
+        pictures.push(query_pictures::scene(&later, &answer, &camera));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let bytes = animation::to_apng(&pictures, MOTION_PICTURE_SECONDS)?;
+    output::write_file(&args.out.join("motion.png"), &bytes)
+}
