@@ -5,6 +5,7 @@ pub mod animation;
 pub mod cli;
 pub mod depth;
 pub mod devices;
+pub mod gallop;
 pub mod load;
 pub mod output;
 pub mod query;

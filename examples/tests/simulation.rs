@@ -1,7 +1,7 @@
 //! How a drop starts, and what its report says.
 
-use tldi::{CpuBackend, PointCloud};
 use tldi::glamx::Vec3;
+use tldi::{CpuBackend, PointCloud};
 use tldi_examples::load;
 use tldi_examples::simulation::{DropSimulation, NamedCloud};
 use tldi_examples::spots::Spot;

@@ -1,0 +1,304 @@
+//! A deforming cloud gallops over ground that deforms as well.
+
+use anyhow::{Context, bail};
+use clap::Parser;
+use std::io;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{KdTree, PointCloud, VirtualCamera};
+use tldi_examples::cli::{Common, UpChoice};
+use tldi_examples::gallop::{
+    GallopScene, GallopSimulation, GallopSnapshot, Ground, Runner, creature,
+};
+use tldi_examples::render::{BODY_COLORS, Item, Paint, Picture, Scene};
+use tldi_examples::scan::positive;
+use tldi_examples::{animation, load, output};
+use tldi_sources::{MovingPoints, ReadOptions};
+
+/// A deforming cloud gallops over ground that deforms as well
+///
+/// Frames are interpolated in time; the last one leads into the first. It runs against the way that
+/// its lowest points go, and is red where it touches. Without files, a generated creature is used.
+/// Ends with 0 if every step was taken, with 1 if not, with 2 if the options cannot be used.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// Positions: a NumPy array of frames × points × 3 (.npy, .npy.gz) or a folder with a cloud for
+    /// each frame, in order of their names
+    #[arg(long, value_name = "FILE|DIR")]
+    frames: Option<PathBuf>,
+    /// A mesh with the faces that connect the points (PLY, also as .gz): exact normals
+    #[arg(long, value_name = "FILE", requires = "frames")]
+    faces: Option<PathBuf>,
+    /// Largest extent in metres
+    #[arg(long, value_name = "M", default_value_t = 2.0, value_parser = positive, allow_hyphen_values = true)]
+    size: f32,
+    /// Seconds of a cycle
+    #[arg(long, value_name = "S", default_value_t = 0.8, value_parser = positive, allow_hyphen_values = true)]
+    cycle: f32,
+    /// Speed in m/s; if left out, that of its feet
+    #[arg(long, value_name = "V", value_parser = positive, allow_hyphen_values = true)]
+    speed: Option<f32>,
+    /// Direction against gravity in the frames; auto is y
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        default_value = "auto",
+        allow_hyphen_values = true
+    )]
+    up: UpChoice,
+    /// Number of loose bodies in its way
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(0..=100))]
+    bodies: u16,
+    /// Number of steps of 1/60 s; if left out, as long as the run takes, at most 600
+    #[arg(long, value_name = "N")]
+    steps: Option<usize>,
+    /// Folder for initial.png, mid.png and final.png
+    #[arg(long, value_name = "DIR", default_value = "out/gallop")]
+    out: PathBuf,
+    /// Also write motion.png, an animated PNG
+    #[arg(long)]
+    animate: bool,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Half the length and half the width of the ground, its waves' height and length, in sizes of what
+/// runs.
+const GROUND_SIZE: [f32; 2] = [2.6, 0.8];
+const WAVE_HEIGHT: f32 = 0.025;
+const WAVE_LENGTH: f32 = 0.9;
+/// Seconds of an oscillation of the ground.
+const WAVE_PERIOD: f32 = 1.6;
+/// Points of the ground along the size of what runs.
+const GROUND_POINTS: f32 = 64.0;
+/// Speed in sizes a second of what does not get anywhere by its feet.
+const LEAST_SPEED: f32 = 0.6;
+const MOST_STEPS: usize = 600;
+/// Distance from a contact up to which it is tinted, as a share of its size.
+const TINTED: f32 = 0.06;
+const SKIN: [f32; 3] = [166.0, 122.0, 84.0];
+const TINT: [f32; 3] = [235.0, 60.0, 30.0];
+const PICTURE_SIZE: [u32; 2] = [1280, 720];
+const ANIMATION_SIZE: [u32; 2] = [640, 360];
+/// Steps from one picture of the animation to the next.
+const ANIMATION_STEPS: usize = 3;
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    match run(&args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> anyhow::Result<()> {
+    let mut runner = load_runner(args)?;
+    let file_size = runner.size();
+    if !(file_size.is_finite() && file_size > 0.0) {
+        bail!("the frames have no extent: all points coincide");
+    }
+    let up = match args.up {
+        UpChoice::Given(up) => up,
+        UpChoice::Auto => Vec3::Y,
+    };
+    let stride = runner.stand(up, args.size);
+    let speed = args.speed.unwrap_or_else(|| {
+        let by_feet = stride / args.cycle;
+        if by_feet > 0.1 * args.size {
+            by_feet
+        } else {
+            LEAST_SPEED * args.size
+        }
+    });
+    let scene = GallopScene {
+        runner,
+        size: args.size,
+        speed,
+        cycle: args.cycle,
+        ground: Ground {
+            half_size: GROUND_SIZE.map(|half| half * args.size),
+            spacing: args.size / GROUND_POINTS,
+            amplitude: WAVE_HEIGHT * args.size,
+            wavelength: WAVE_LENGTH * args.size,
+            period: WAVE_PERIOD,
+        },
+        bodies: usize::from(args.bodies),
+        seed: args.common.seed,
+    };
+    let mut simulation = GallopSimulation::new(scene, args.common.backend.open()?)?;
+    let steps = args
+        .steps
+        .unwrap_or_else(|| simulation.steps_of_run().min(MOST_STEPS));
+    let snapshots = simulate(&mut simulation, steps, args.animate)?;
+    draw(&simulation, &snapshots, args)?;
+    let report = simulation.report();
+    if let Some(path) = &args.common.json {
+        output::write_json(path, &report)?;
+    }
+    report.write_table(&mut io::stdout().lock())?;
+    Ok(())
+}
+
+fn load_runner(args: &Args) -> anyhow::Result<Runner> {
+    let Some(path) = &args.frames else {
+        eprintln!("generating a creature");
+        return Ok(creature(args.common.seed)?);
+    };
+    eprintln!("reading {}", path.display());
+    let points = MovingPoints::read(path).context("cannot use the frames")?;
+    let Some(path) = &args.faces else {
+        return Ok(Runner::new(points));
+    };
+    let mesh =
+        tldi_sources::read(path, &ReadOptions::default()).context("cannot read the faces")?;
+    if mesh.faces.is_empty() {
+        bail!("{} has no faces", path.display());
+    }
+    Runner::with_faces(points, mesh.faces)
+        .with_context(|| format!("cannot use the faces of {}", path.display()))
+}
+
+/// Takes all steps; snapshots before the first, in the middle and after the last or, for an
+/// animation, after every [`ANIMATION_STEPS`].
+fn simulate(
+    simulation: &mut GallopSimulation,
+    steps: usize,
+    animate: bool,
+) -> anyhow::Result<Vec<GallopSnapshot>> {
+    let bar = output::progress_bar(steps, "steps");
+    let mut snapshots = vec![simulation.snapshot()];
+    let mut middle: Option<GallopSnapshot> = None;
+    for step in 1..=steps {
+        (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
+        if animate && step % ANIMATION_STEPS == 0 {
+            snapshots.push(simulation.snapshot());
+        }
+        // Of the middle third, the moment with the most contacts.
+        if (steps / 3..=2 * steps / 3).contains(&step) {
+            let snapshot = simulation.snapshot();
+            let best = middle.as_ref().map_or(0, |middle| middle.contacts.len());
+            if middle.is_none() || snapshot.contacts.len() > best {
+                middle = Some(snapshot);
+            }
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    snapshots.push(simulation.snapshot());
+    let place = snapshots.len() / 2;
+    snapshots.insert(place, middle.unwrap_or_else(|| simulation.snapshot()));
+    Ok(snapshots)
+}
+
+fn draw(
+    simulation: &GallopSimulation,
+    snapshots: &[GallopSnapshot],
+    args: &Args,
+) -> anyhow::Result<()> {
+    let bodies: Vec<&PointCloud<'static>> = simulation.body_clouds().collect();
+    let size = simulation.size();
+    let picture = |snapshot: &GallopSnapshot, camera: &VirtualCamera| -> anyhow::Result<Picture> {
+        let runner = tinted(snapshot, TINTED * size)?;
+        let scene = scene_of(&runner, &bodies, snapshot, size);
+        Ok(scene.draw(camera, &snapshot.contacts))
+    };
+    let count = snapshots.len();
+    let middle = (count - 1) / 2;
+    output::make_folder(&args.out)?;
+    // The camera goes along, always on the same side.
+    for (index, name) in [
+        (0, "initial.png"),
+        (middle, "mid.png"),
+        (count - 1, "final.png"),
+    ] {
+        let snapshot = &snapshots[index];
+        let camera = beside(snapshot, size, PICTURE_SIZE);
+        let png = picture(snapshot, &camera)?.to_png()?;
+        output::write_file(&args.out.join(name), &png)?;
+    }
+    if args.animate {
+        let bar = output::progress_bar(count, "pictures");
+        let mut pictures = Vec::new();
+        for (index, snapshot) in snapshots.iter().enumerate() {
+            if index != middle {
+                pictures.push(picture(snapshot, &beside(snapshot, size, ANIMATION_SIZE))?);
+            }
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        let bytes = animation::to_apng(&pictures, ANIMATION_STEPS as f32 / 60.0)?;
+        output::write_file(&args.out.join("motion.png"), &bytes)?;
+    }
+    eprintln!("pictures are in {}", args.out.display());
+    Ok(())
+}
+
+/// A camera beside what runs, a little ahead and above.
+fn beside(snapshot: &GallopSnapshot, size: f32, pixels: [u32; 2]) -> VirtualCamera {
+    let middle = snapshot.world_from_runner.translation + 0.3 * size * Vec3::Y;
+    let eye = middle + size * Vec3::new(0.75, 0.6, 1.35);
+    VirtualCamera::perspective(
+        eye,
+        middle,
+        Vec3::Y,
+        0.873,
+        pixels,
+        0.05 * size,
+        100.0 * size,
+    )
+}
+
+/// What runs, red around its contacts.
+fn tinted(snapshot: &GallopSnapshot, reach: f32) -> anyhow::Result<PointCloud<'static>> {
+    let runner = &snapshot.runner;
+    let plain = |color: [f32; 3]| {
+        let [r, g, b] = color.map(|c| c as u8);
+        [r, g, b, 255]
+    };
+    if snapshot.contacts.is_empty() {
+        return Ok(load::painted(runner, |_| plain(SKIN))?);
+    }
+    let contacts = PointCloud::builder(&snapshot.contacts)
+        .radius(reach)
+        .build()?;
+    let tree = KdTree::new(&contacts);
+    Ok(load::painted(runner, |i| {
+        let place = snapshot.world_from_runner * runner.point(i);
+        let distance = tree
+            .nearest(place, reach)
+            .map_or(reach, |near| near.distance());
+        let strength = (2.0 - 2.0 * distance / reach).min(1.0);
+        plain([0, 1, 2].map(|k| SKIN[k] + strength * (TINT[k] - SKIN[k])))
+    })?)
+}
+
+fn scene_of<'a>(
+    runner: &'a PointCloud<'a>,
+    bodies: &[&'a PointCloud<'static>],
+    snapshot: &'a GallopSnapshot,
+    size: f32,
+) -> Scene<'a> {
+    let item = |cloud, scene_from_cloud, paint| Item {
+        cloud,
+        scene_from_cloud,
+        paint,
+    };
+    let colors = BODY_COLORS[1..].iter().cycle();
+    let loose = (bodies.iter().zip(&snapshot.world_from_body).zip(colors))
+        .map(|((cloud, pose), color)| item(*cloud, *pose, Paint::Body(*color)));
+    let mut items = vec![
+        item(&snapshot.ground, Pose3::IDENTITY, Paint::Scan),
+        item(runner, snapshot.world_from_runner, Paint::Body([0.7; 3])),
+    ];
+    items.extend(loose);
+    Scene {
+        items,
+        up: Vec3::Y,
+        detail: 0.25 * size,
+    }
+}

@@ -1,0 +1,78 @@
+//! Ground that oscillates: a wave runs through a sheet of points.
+
+use std::f32::consts::TAU;
+use tldi::glamx::Vec3;
+
+/// A sheet of points about the origin, y up. Lengths in metres, times in seconds.
+#[derive(Clone, Copy, Debug)]
+pub struct Ground {
+    /// Half the length along x and half the width along z.
+    pub half_size: [f32; 2],
+    /// Distance of neighbouring points.
+    pub spacing: f32,
+    /// Height of the waves over the middle.
+    pub amplitude: f32,
+    /// Length of the waves.
+    pub wavelength: f32,
+    /// Time of one oscillation.
+    pub period: f32,
+}
+
+impl Ground {
+    /// Number of points along x and z.
+    fn counts(&self) -> [usize; 2] {
+        self.half_size
+            .map(|half| 1 + (2.0 * half / self.spacing) as usize)
+    }
+
+    /// The points and their normals at a time; always as many, in the same order. They move up and
+    /// down only.
+    pub fn at(&self, time: f32) -> (Vec<Vec3>, Vec<Vec3>) {
+        let [columns, rows] = self.counts();
+        let wave = TAU / self.wavelength;
+        let mut points = Vec::with_capacity(columns * rows);
+        let mut normals = Vec::with_capacity(columns * rows);
+        for j in 0..rows {
+            for i in 0..columns {
+                let x = i as f32 * self.spacing - self.half_size[0];
+                let z = j as f32 * self.spacing - self.half_size[1];
+                let (sin, cos) = (wave * x - TAU * time / self.period).sin_cos();
+                let (side_sin, side_cos) = (0.7 * wave * z).sin_cos();
+                let height = self.amplitude * sin * side_cos;
+                points.push(Vec3::new(x, height, z));
+                let slopes =
+                    self.amplitude * wave * Vec3::new(cos * side_cos, 0.0, -0.7 * sin * side_sin);
+                normals.push((Vec3::Y - slopes).normalize());
+            }
+        }
+        (points, normals)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Normals are across the differences of neighbouring points.
+    #[test]
+    fn normals_are_across_the_surface() {
+        let ground = Ground {
+            half_size: [1.0, 0.6],
+            spacing: 0.01,
+            amplitude: 0.05,
+            wavelength: 0.8,
+            period: 1.0,
+        };
+        let (points, normals) = ground.at(0.3);
+        let columns = ground.counts()[0];
+        for k in columns + 1..points.len() - columns - 1 {
+            if k % columns == 0 || k % columns == columns - 1 {
+                continue;
+            }
+            let along = (points[k + 1] - points[k - 1]).normalize();
+            let across = (points[k + columns] - points[k - columns]).normalize();
+            assert!(normals[k].dot(along).abs() < 1e-3 && normals[k].dot(across).abs() < 1e-3);
+            assert!(normals[k].y > 0.5);
+        }
+    }
+}

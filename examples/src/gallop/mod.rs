@@ -1,0 +1,13 @@
+//! A deforming cloud runs over ground that deforms as well.
+
+mod creature;
+mod ground;
+mod report;
+mod runner;
+mod simulation;
+
+pub use creature::creature;
+pub use ground::Ground;
+pub use report::{GallopFrame, GallopReport};
+pub use runner::{FacesOutOfRange, Runner};
+pub use simulation::{GallopScene, GallopSimulation, GallopSnapshot};

@@ -1,0 +1,125 @@
+//! What a run of `gallop` found.
+
+use serde::Serialize;
+use std::io::{self, Write};
+
+/// As written to `--json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct GallopReport {
+    /// Name of the backend that compared the clouds.
+    pub backend: String,
+    /// Name of the GPU, if one did the work.
+    pub adapter: Option<String>,
+    /// Why the CPU had to do though a GPU would have been taken.
+    pub fallback: Option<String>,
+    /// Steps simulated; a frame is a step.
+    pub steps: usize,
+    /// Length of a step in seconds.
+    pub dt: f32,
+    /// Wall-clock time of the simulation in seconds.
+    pub wall_seconds: f64,
+    /// Simulated time by wall-clock time.
+    pub real_time_factor: f64,
+    /// Points of what runs.
+    pub points: usize,
+    /// Frames of its cycle, as read.
+    pub cycle_frames: usize,
+    /// Points of the ground.
+    pub ground_points: usize,
+    /// Mean point radius in metres of the coarser of both.
+    pub mean_radius: f32,
+    /// Speed of the run, m/s.
+    pub speed: f32,
+    /// Steps in which it touched ground or bodies.
+    pub contact_steps: usize,
+    /// Deepest penetration in metres over all steps.
+    pub max_penetration: f32,
+    /// Pairs compared in batches, over all steps.
+    pub pairs_batched: usize,
+    /// Pairs compared on the spot, over all steps.
+    pub pairs_missed: usize,
+    /// Every step.
+    pub frames: Vec<GallopFrame>,
+    /// Loose bodies.
+    pub bodies: Vec<GallopBody>,
+}
+
+/// One step. Times are milliseconds of wall-clock time.
+#[derive(Clone, Debug, Serialize)]
+pub struct GallopFrame {
+    /// Simulated time in seconds.
+    pub time: f32,
+    /// Contact points of what runs: with the ground and with bodies.
+    pub contacts: usize,
+    /// Pairs compared.
+    pub pairs_batched: usize,
+    /// New points for what runs and for the ground, interpolation and normals included.
+    pub deform_ms: f64,
+    /// The step: batch, contacts, solver.
+    pub step_ms: f64,
+}
+
+/// One loose body.
+#[derive(Clone, Debug, Serialize)]
+pub struct GallopBody {
+    /// What it is, and its number.
+    pub name: String,
+    /// Number of points.
+    pub points: usize,
+    /// Position after the last step, metres.
+    pub translation: [f32; 3],
+    /// How far it was moved, metres.
+    pub displacement: f32,
+    /// Whether what runs touched it.
+    pub kicked: bool,
+}
+
+impl GallopReport {
+    /// Writes the results as a table for people.
+    ///
+    /// # Errors
+    /// Those of writing.
+    pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
+        writeln!(
+            out,
+            "{} points in {} frames of a cycle run at {:.2} m/s over {} points of ground",
+            self.points, self.cycle_frames, self.speed, self.ground_points
+        )?;
+        for body in &self.bodies {
+            let kicked = if body.kicked { ", kicked" } else { "" };
+            writeln!(
+                out,
+                "{:<22} moved {:.3} m{kicked}",
+                body.name, body.displacement
+            )?;
+        }
+        let median = |value: fn(&GallopFrame) -> f64| {
+            let mut values: Vec<f64> = self.frames.iter().map(value).collect();
+            values.sort_by(f64::total_cmp);
+            values.get(values.len() / 2).copied().unwrap_or(0.0)
+        };
+        let contacts: usize = self.frames.iter().map(|frame| frame.contacts).sum();
+        writeln!(
+            out,
+            "median step: {:.2} ms for new points, {:.2} ms for contacts and solver; {contacts} contact \
+             points in {} of {} steps",
+            median(|frame| frame.deform_ms),
+            median(|frame| frame.step_ms),
+            self.contact_steps,
+            self.steps
+        )?;
+        writeln!(
+            out,
+            "{} steps of {:.4} s in {:.2} s ({:.1} x real time) on {}; at most {:.2} mm deep; {} pairs \
+             batched, {} missed",
+            self.steps,
+            self.dt,
+            self.wall_seconds,
+            self.real_time_factor,
+            self.backend,
+            1e3 * self.max_penetration,
+            self.pairs_batched,
+            self.pairs_missed
+        )
+    }
+}

@@ -1,0 +1,224 @@
+//! Runs the binary `gallop` as a user would.
+
+mod common;
+
+use common::{data, folder, json, keys, run, stderr};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_gallop");
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+fn report(folder: &Path, options: &[&str]) -> Value {
+    let output = run(
+        BINARY,
+        folder,
+        &[&["--json", "report.json"], options].concat(),
+    );
+    assert!(output.status.success(), "{options:?}: {}", stderr(&output));
+    json(folder.join("report.json"))
+}
+
+/// A ball of 400 points that hops: z up, frames × points × 3 as numpy.save writes them.
+fn write_hopping_ball(path: &Path) {
+    let (frames, points) = (8, 400);
+    let mut data = Vec::new();
+    for frame in 0..frames {
+        let height = 0.5 * (frame as f64 / frames as f64 * std::f64::consts::TAU).sin();
+        for k in 0..points {
+            let z = 1.0 - (2 * k + 1) as f64 / points as f64;
+            let angle = k as f64 * 2.399963;
+            let ring = (1.0 - z * z).sqrt();
+            for c in [ring * angle.cos(), ring * angle.sin(), z + height] {
+                data.extend((c as f32).to_le_bytes());
+            }
+        }
+    }
+    let header =
+        format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({frames}, {points}, 3), }}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(data);
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn the_creature_kicks_and_equal_seeds_give_equal_reports() {
+    let folder = folder("gallop_generated");
+    let run = |seed: &str| {
+        let mut report = report(&folder, &["--seed", seed, "--steps", "150"]);
+        for key in ["wall_seconds", "real_time_factor"] {
+            assert!(number(&report[key]) > 0.0, "{key}");
+            report[key] = Value::Null;
+        }
+        for frame in report["frames"].as_array_mut().unwrap() {
+            assert!(number(&frame["deform_ms"]) > 0.0 && number(&frame["step_ms"]) > 0.0);
+            frame["deform_ms"] = Value::Null;
+            frame["step_ms"] = Value::Null;
+        }
+        report
+    };
+    let first = run("1");
+    assert_eq!(run("1"), first);
+    assert_ne!(run("2"), first);
+    for key in [
+        "backend",
+        "adapter",
+        "steps",
+        "dt",
+        "frames",
+        "contact_steps",
+        "max_penetration",
+    ] {
+        assert!(keys(&first).contains(&key), "{key}");
+    }
+    assert_eq!(first["frames"].as_array().unwrap().len(), 150);
+    assert_eq!(first["pairs_missed"], 0);
+    // Feet are down for a good part of every cycle, and off the ground in others.
+    let contact_steps = number(&first["contact_steps"]);
+    assert!((30.0..150.0).contains(&contact_steps), "{contact_steps}");
+    let bodies = first["bodies"].as_array().unwrap();
+    assert_eq!(bodies.len(), 8);
+    assert!(
+        bodies
+            .iter()
+            .any(|b| b["kicked"] == true && number(&b["displacement"]) > 0.1)
+    );
+    // What lies on the waves rises and falls with them, and stays on them.
+    for body in bodies.iter().filter(|b| b["kicked"] == false) {
+        let height = number(&body["translation"][1]);
+        assert!((-0.05..0.25).contains(&height), "{body}");
+    }
+    for name in ["initial.png", "mid.png", "final.png"] {
+        let png = fs::read(folder.join("out/gallop").join(name)).unwrap();
+        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+    }
+}
+
+/// It touches where the ground, whose waves are known, is higher than its lowest point.
+#[test]
+fn a_hopping_ball_touches_where_it_is_low() {
+    let folder = folder("gallop_ball");
+    write_hopping_ball(&folder.join("ball.npy"));
+    let options = [
+        "--frames",
+        "ball.npy",
+        "--up",
+        "0,0,1",
+        "--size",
+        "1",
+        "--cycle",
+        "0.8",
+        "--bodies",
+        "0",
+        "--speed",
+        "1",
+        "--steps",
+        "220",
+        "--animate",
+    ];
+    let report = report(&folder, &options);
+    assert_eq!(
+        (&report["points"], &report["cycle_frames"]),
+        (&Value::from(400), &Value::from(8))
+    );
+    let tau = std::f64::consts::TAU;
+    let mut certain = [0, 0];
+    for frame in report["frames"].as_array().unwrap() {
+        let time = number(&frame["time"]);
+        // Three metres high in its file, one metre here: it hops by a sixth of a metre.
+        let bottom = (1.0 + (tau * time / 0.8).sin()) / 6.0;
+        // It starts 1.9 m before the middle of waves that are 2.5 cm high and 0.9 m long.
+        let x = -1.9 + time;
+        let ground = 0.025 * (tau * x / 0.9 - tau * time / 1.6).sin();
+        // 1 cm: a fifth of the ball's coarse radii. 3 cm: where the ground slopes by 10°, the ball
+        // meets it 0.5 cm earlier, and gaps of a fifth of a radius count as touching.
+        let touches = number(&frame["contacts"]) > 0.0;
+        if ground - bottom > 0.01 {
+            assert!(touches, "{frame}");
+            certain[0] += 1;
+        } else if ground - bottom < -0.03 {
+            assert!(!touches, "{frame}");
+            certain[1] += 1;
+        }
+    }
+    assert!(certain[0] > 0 && certain[1] > 50, "{certain:?}");
+    assert!(folder.join("out/gallop/motion.png").exists());
+}
+
+#[test]
+fn what_is_wrong_is_said() {
+    let folder = folder("gallop_errors");
+    write_hopping_ball(&folder.join("ball.npy"));
+    let bytes = fs::read(folder.join("ball.npy")).unwrap();
+    fs::write(folder.join("short.npy"), &bytes[..bytes.len() / 2]).unwrap();
+    fs::create_dir_all(folder.join("empty")).unwrap();
+    let ply = |face: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 500\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 1\nproperty list uchar int vertex_indices\nend_header\n{}{face}\n",
+            "0 0 0\n".repeat(500)
+        )
+    };
+    fs::write(folder.join("other.ply"), ply("3 0 1 450")).unwrap();
+    for (options, code, message) in [
+        (&["--frames", "short.npy"][..], 1, "frame 3 of 8 ends early"),
+        (&["--frames", "empty"], 1, "no cloud in empty"),
+        (&["--frames", "lost.npy"], 1, "lost.npy"),
+        (
+            &["--frames", "ball.npy", "--faces", "other.ply"],
+            1,
+            "a face refers to point 450",
+        ),
+        (&["--faces", "other.ply"], 2, "--frames"),
+        (&["--size", "-1"], 2, "greater than 0"),
+        (&["--backend", "gpu"], 2, "not built"),
+    ] {
+        let output = run(BINARY, &folder, options);
+        assert_eq!(
+            output.status.code(),
+            Some(code),
+            "{options:?}: {}",
+            stderr(&output)
+        );
+        assert!(
+            stderr(&output).contains(message),
+            "{options:?}: {}",
+            stderr(&output)
+        );
+    }
+}
+
+#[test]
+fn the_horse_gallops() {
+    let (Some(frames), Some(faces)) = (
+        data("horse_gallop/positions_24x8431x3_f32.npy.gz"),
+        data("horse_gallop/frame01.ply.gz"),
+    ) else {
+        return;
+    };
+    let folder = folder("gallop_horse");
+    let options = [
+        "--frames",
+        frames.to_str().unwrap(),
+        "--faces",
+        faces.to_str().unwrap(),
+    ];
+    let report = report(&folder, &options);
+    assert_eq!(
+        (&report["points"], &report["cycle_frames"]),
+        (&Value::from(8431), &Value::from(24))
+    );
+    // Its hooves go back by some 3 m in a cycle of 0.8 s.
+    assert!(
+        (2.0..6.0).contains(&number(&report["speed"])),
+        "{}",
+        report["speed"]
+    );
+    assert!(number(&report["contact_steps"]) > 20.0);
+}
