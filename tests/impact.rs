@@ -268,3 +268,23 @@ fn exact_shapes() {
         }
     }
 }
+
+/// What moves on passes a flying pixel, but not a wire, and meets the sheet behind it.
+#[test]
+fn lone_points_are_passed() {
+    let mut rng = fastrand::Rng::with_seed(4);
+    let ball = sampled_sphere(0.05, R).cloud(R);
+    let lone = Vec3::new(0.0, 0.2, 0.0);
+    let wire = (-10..=10).map(|k| lone + k as f32 * R * Vec3::X);
+    for (beside, height) in [(vec![lone], 0.0), (wire.collect(), 0.2)] {
+        let mut points = sampled_plane(0.4, R, &mut rng).points;
+        points.extend(beside);
+        let cloud = PointCloud::builder(points).radius(R).build();
+        let cloud = cloud.expect("a valid cloud");
+        let start = Pose3::translation(0.0, 0.4, 0.0);
+        let (a, b) = (Surface::Cloud(&cloud), Surface::Cloud(&ball));
+        let found = impact(&query(a, b, start, -0.5 * Vec3::Y)).expect("the sheet is in the way");
+        let off = found.distance - (0.35 - height);
+        assert!(off.abs() < R, "{height}: off by {off}");
+    }
+}

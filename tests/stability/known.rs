@@ -83,7 +83,8 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "density",
         "1 % flying pixels",
-        "Lone points in the air collide like any other.",
+        "Of twenty seeds four fail: points up to three radii above the floor, or some near each other, are \
+         not told from a surface.",
     ),
     known(
         "grazing",

@@ -11,6 +11,7 @@ use super::pair::{Scratch, is_oriented, ring};
 use super::side::{CloudView, ExactView};
 use super::splat::splat_radius;
 use super::sweep::is_edge_on;
+use crate::lone_points::is_alone;
 use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Params, Surface, Tldi, VirtualCamera};
 use glamx::{Pose3, Vec3};
 
@@ -107,20 +108,35 @@ impl Scratch {
                 .min_by(|m, n| m.distance.total_cmp(&n.distance));
             self.meetings.extend(nearest);
         }
-        let first = self
-            .meetings
-            .iter()
-            .min_by(|m, n| m.distance.total_cmp(&n.distance))?;
+        let image_width = b.size[0] as usize;
+        let origin = b.origin.map(|o| o as f32 + 0.5);
+        let place = |pixel: usize, depth: f32| {
+            let (i, j) = (pixel % image_width, pixel / image_width);
+            camera.point_at(origin[0] + i as f32, origin[1] + j as f32, depth)
+        };
+        let b_from_a = query.a_from_b.inverse();
+        let is_lone = |meeting: &Meeting| {
+            let before = place(meeting.pixel, meeting.depth - meeting.distance);
+            let of = |surface: &Surface, place: Vec3| match surface {
+                Surface::Cloud(cloud) => is_alone(cloud, place),
+                Surface::Exact(_) => false,
+            };
+            of(&query.a, place(meeting.pixel, meeting.depth)) || of(&query.b, b_from_a * before)
+        };
+        self.meetings.sort_unstable_by(|m, n| {
+            (m.distance.total_cmp(&n.distance)).then(m.pixel.cmp(&n.pixel))
+        });
+        let first_not_lone = self.meetings.iter().position(|meeting| !is_lone(meeting))?;
+        self.meetings.drain(..first_not_lone);
+        let first = self.meetings.first()?;
         // A single pixel's normal may be that of a rim.
         let near = first.distance + NORMAL_BAND * query.params.pixel_size;
         let normals = self.meetings.iter().filter(|m| m.distance <= near);
         let normal: Vec3 = normals.map(|m| m.normal).sum();
-        let column = b.origin[0] + (first.pixel % b.size[0] as usize) as i32;
-        let row = b.origin[1] + (first.pixel / b.size[0] as usize) as i32;
         let frame_from_view = camera.view_from_frame.rotation.inverse();
         Some(Impact {
             distance: first.distance,
-            point: camera.point_at(column as f32 + 0.5, row as f32 + 0.5, first.depth),
+            point: place(first.pixel, first.depth),
             normal: (frame_from_view * normal).normalize_or(-camera.axis()),
         })
     }
