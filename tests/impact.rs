@@ -288,3 +288,37 @@ fn lone_points_are_passed() {
         assert!(off.abs() < R, "{height}: off by {off}");
     }
 }
+
+/// A small ball that comes in obliquely at speed, its rim first, is not let in as deep as its rim is
+/// wide; what is beside its way is passed all the same.
+#[test]
+fn the_rim_of_what_is_fast_is_met() {
+    let mut rng = fastrand::Rng::with_seed(5);
+    let radius = 5.0 * R;
+    let ball = sampled_sphere(radius, R).cloud(R);
+    let floor = sampled_plane(2.0, R, &mut rng).bare_cloud(R);
+    let (sin, cos) = 70f32.to_radians().sin_cos();
+    let start = Pose3::translation(-0.5 * sin / cos, 0.5, 0.0);
+    let cast = |motion: Vec3| {
+        impact(&ImpactQuery {
+            core_only: true,
+            ..query(Surface::Cloud(&floor), Surface::Cloud(&ball), start, motion)
+        })
+    };
+    let met = cast(2.0 * Vec3::new(sin, -cos, 0.0)).expect("the floor is met");
+    let depth = radius - (start.translation.y - met.distance * cos);
+    // All of a rim of three pixels would let it in by 1.9.
+    assert!(depth < 1.3 * R, "{depth}");
+    // Half a point radius beside the edge of the floor.
+    let beside = Pose3::translation(1.0 + radius + 0.5 * R, 0.5, 0.0);
+    let passed = impact(&ImpactQuery {
+        core_only: true,
+        ..query(
+            Surface::Cloud(&floor),
+            Surface::Cloud(&ball),
+            beside,
+            -Vec3::Y,
+        )
+    });
+    assert_eq!(passed, None);
+}

@@ -53,10 +53,8 @@ const RESAMPLED: &str =
     "New samples bring new gaps in every frame, which push although nothing moved.";
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
                          mean depth.";
-const WRONG_SIDE: &str = "Rarely, the side on which a body is of a noisy sheet without normals is \
-                          mistaken while the body is partly in it.";
-const STANDING_SWEEP: &str = "Sweeps take the surface to stand still during a step, but it moves by \
-                              up to half a mean radius and is sampled anew.";
+const DEEP_IN_WAVES: &str = "A fast body that a wave catches deep is held there by the sweep, which meets \
+                             the next slope in every step and takes back what contacts pushed out.";
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
                             it spins off, as the primitive does, with a little less height, and may land \
                             again with up to 8 % more energy.";
@@ -70,7 +68,8 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
         "stack",
         "10 boxes",
         "Not fully explained: interfaces tilt by a degree while the stack settles, and it leans more \
-         and more; rapier's own meshes and voxels fall as well.",
+         and more; neither levelled support gaps nor less slack for noise change that, and rapier's \
+         own meshes and voxels fall as well.",
     ),
     known("slide", "noisy plane, 1 m/s", UNEVEN_GAPS).no_worse_than("heading_deg", 3.0),
     known("slide", "noisy plane, 5 m/s", UNEVEN_GAPS).no_worse_than("hop_mean_radii", 0.7),
@@ -78,8 +77,14 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
         .no_worse_than("most_energy_over_initial", 1.1),
     known("thin-sheet", "box on each of two sheets, bare", ONE_LAYER),
     known("thin-sheet", "ball on each of two sheets, bare", ONE_LAYER),
-    known("tunnelling", "scan", WRONG_SIDE).no_worse_than("passed_share", 0.04),
-    known("tunnelling", "waves", STANDING_SWEEP).no_worse_than("passed_share", 0.06),
+    known(
+        "tunnelling",
+        "scan",
+        "Two of 3,600 hits: of a small body that is deep in a rough scan without normals a further \
+         view takes the wrong side.",
+    )
+    .no_worse_than("passed_share", 0.03),
+    known("tunnelling", "waves", DEEP_IN_WAVES).no_worse_than("passed_share", 0.06),
     known(
         "density",
         "1 % flying pixels",

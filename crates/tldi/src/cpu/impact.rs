@@ -20,11 +20,20 @@ use glamx::{Pose3, Vec3};
 /// which contacts push out again.
 const RIM: i32 = 3;
 
+/// Width in pixels of what of the rim passes anything: a splat of either side stands out by so much.
+/// The rest passes what the motion does not go on towards by more than all of the rim.
+const OUTER_RIM: u8 = 2;
+
 /// Pixels around an image that tell its rim from its edge: the rim, and one for the closing.
 pub(super) const BORDER: i32 = RIM + 1;
 
 /// Band above the least distance, in pixels, whose normals are averaged.
 const NORMAL_BAND: f32 = 0.5;
+
+/// Where a pixel is in a moving surface.
+const OUTSIDE: u8 = 0;
+const INNER_RIM: u8 = 1;
+const CORE: u8 = 2;
 
 /// Which pixels of a moving surface count, kept from call to call.
 #[derive(Default)]
@@ -86,7 +95,11 @@ impl Scratch {
         }
         self.meetings.clear();
         for pixel in 0..b.pixel_count() {
-            if query.core_only && !self.core.contains(pixel, b.size[0]) {
+            let place = match query.core_only {
+                true => self.core.place(pixel, b.size[0]),
+                false => CORE,
+            };
+            if place == OUTSIDE {
                 continue;
             }
             let layers = a.layers_of(pixel);
@@ -99,7 +112,8 @@ impl Scratch {
             };
             let in_way = |meeting: &Meeting| {
                 let approach = meeting.facing * (length - meeting.distance);
-                (0.0..=length).contains(&meeting.distance)
+                (place == CORE || approach > RIM as f32 * query.params.pixel_size)
+                    && (0.0..=length).contains(&meeting.distance)
                     && (meeting.distance >= query.touching || approach > query.params.pixel_size)
             };
             let nearest = met
@@ -290,7 +304,7 @@ impl CoreScratch {
         }
     }
 
-    /// Leaves of what is covered what is not of its rim; the image is `width` pixels wide.
+    /// Marks what is covered as core, rim or outside; the image is `width` pixels wide.
     fn find(&mut self, width: u32) {
         let row = width as usize + 2 * BORDER as usize;
         // Closed first: a gap of a pixel in the cover is no rim.
@@ -313,14 +327,21 @@ impl CoreScratch {
         }
         let rim = 1 + RIM as u8;
         for ((covered, depth), around) in covered.iter_mut().zip(depth).zip(deepest_around) {
-            *covered &= u8::from(*depth > rim || depth == around);
+            *covered *= if *depth > rim || depth == around {
+                CORE
+            } else if *depth > 1 + OUTER_RIM {
+                INNER_RIM
+            } else {
+                OUTSIDE
+            };
         }
     }
 
-    fn contains(&self, pixel: usize, width: u32) -> bool {
+    /// [`CORE`], [`INNER_RIM`] or [`OUTSIDE`].
+    fn place(&self, pixel: usize, width: u32) -> u8 {
         let (i, j) = (pixel % width as usize, pixel / width as usize);
         let row = width as usize + 2 * BORDER as usize;
-        self.covered[(j + BORDER as usize) * row + i + BORDER as usize] > 0
+        self.covered[(j + BORDER as usize) * row + i + BORDER as usize]
     }
 }
 
