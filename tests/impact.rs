@@ -268,3 +268,57 @@ fn exact_shapes() {
         }
     }
 }
+
+/// What moves on passes a flying pixel, but not a wire, and meets the sheet behind it.
+#[test]
+fn lone_points_are_passed() {
+    let mut rng = fastrand::Rng::with_seed(4);
+    let ball = sampled_sphere(0.05, R).cloud(R);
+    let lone = Vec3::new(0.0, 0.2, 0.0);
+    let wire = (-10..=10).map(|k| lone + k as f32 * R * Vec3::X);
+    for (beside, height) in [(vec![lone], 0.0), (wire.collect(), 0.2)] {
+        let mut points = sampled_plane(0.4, R, &mut rng).points;
+        points.extend(beside);
+        let cloud = PointCloud::builder(points).radius(R).build();
+        let cloud = cloud.expect("a valid cloud");
+        let start = Pose3::translation(0.0, 0.4, 0.0);
+        let (a, b) = (Surface::Cloud(&cloud), Surface::Cloud(&ball));
+        let found = impact(&query(a, b, start, -0.5 * Vec3::Y)).expect("the sheet is in the way");
+        let off = found.distance - (0.35 - height);
+        assert!(off.abs() < R, "{height}: off by {off}");
+    }
+}
+
+/// A small ball that comes in obliquely at speed, its rim first, is not let in as deep as its rim is
+/// wide; what is beside its way is passed all the same.
+#[test]
+fn the_rim_of_what_is_fast_is_met() {
+    let mut rng = fastrand::Rng::with_seed(5);
+    let radius = 5.0 * R;
+    let ball = sampled_sphere(radius, R).cloud(R);
+    let floor = sampled_plane(2.0, R, &mut rng).bare_cloud(R);
+    let (sin, cos) = 70f32.to_radians().sin_cos();
+    let start = Pose3::translation(-0.5 * sin / cos, 0.5, 0.0);
+    let cast = |motion: Vec3| {
+        impact(&ImpactQuery {
+            core_only: true,
+            ..query(Surface::Cloud(&floor), Surface::Cloud(&ball), start, motion)
+        })
+    };
+    let met = cast(2.0 * Vec3::new(sin, -cos, 0.0)).expect("the floor is met");
+    let depth = radius - (start.translation.y - met.distance * cos);
+    // All of a rim of three pixels would let it in by 1.9.
+    assert!(depth < 1.3 * R, "{depth}");
+    // Half a point radius beside the edge of the floor.
+    let beside = Pose3::translation(1.0 + radius + 0.5 * R, 0.5, 0.0);
+    let passed = impact(&ImpactQuery {
+        core_only: true,
+        ..query(
+            Surface::Cloud(&floor),
+            Surface::Cloud(&ball),
+            beside,
+            -Vec3::Y,
+        )
+    });
+    assert_eq!(passed, None);
+}

@@ -342,3 +342,34 @@ fn far_pairs_are_rejected_early() {
     let result = clouds(&pair_of_balls(0.2), &pair_of_balls(-0.2), Pose3::IDENTITY);
     assert_eq!(result, PairResult::default());
 }
+
+/// A ball of 5 cm whose lowest point is 6 cm above a sheet, 1.5 r̄ deep in what is there beside.
+fn over_sheet(beside: &[Vec3]) -> PairResult {
+    let mut rng = fastrand::Rng::with_seed(8);
+    let mut sheet = sampled_plane(0.4, R, &mut rng);
+    sheet.points.extend(beside);
+    let ball = sampled_sphere(0.05, R).cloud(R);
+    let sheet = PointCloud::builder(sheet.points).radius(R).build();
+    clouds(
+        &sheet.expect("a valid cloud"),
+        &ball,
+        Pose3::translation(0.0, 0.11 - 1.5 * R, 0.0),
+    )
+}
+
+/// A flying pixel is not touched; a wire of points in its place is, and so are five points that are
+/// all there is.
+#[test]
+fn lone_points_are_not_touched() {
+    assert!(over_sheet(&[]).patches.is_empty());
+    let lone = Vec3::new(0.0, 0.06, 0.0);
+    assert!(over_sheet(&[lone]).patches.is_empty());
+    let wire: Vec<Vec3> = (-10..=10).map(|k| lone + k as f32 * R * Vec3::X).collect();
+    assert!(!over_sheet(&wire).patches.is_empty());
+    let few = [Vec3::ZERO, Vec3::X, -Vec3::X, Vec3::Z, -Vec3::Z].map(|p| lone + R * p);
+    let few = PointCloud::builder(few.to_vec()).radius(R).build();
+    let ball = sampled_sphere(0.05, R).cloud(R);
+    let pose = Pose3::translation(0.0, 0.11 - 1.5 * R, 0.0);
+    let result = clouds(&few.expect("a valid cloud"), &ball, pose);
+    assert!(!result.patches.is_empty());
+}

@@ -53,37 +53,41 @@ const RESAMPLED: &str =
     "New samples bring new gaps in every frame, which push although nothing moved.";
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
                          mean depth.";
-const WRONG_SIDE: &str = "Rarely, the side on which a body is of a noisy sheet without normals is \
-                          mistaken while the body is partly in it.";
-const STANDING_SWEEP: &str = "Sweeps take the surface to stand still during a step, but it moves by \
-                              up to half a mean radius and is sampled anew.";
+const DEEP_IN_WAVES: &str = "A fast body that a wave catches deep is held there by the sweep, which meets \
+                             the next slope in every step and takes back what contacts pushed out.";
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
                             it spins off, as the primitive does, with a little less height, and may land \
-                            again with up to 8 % more energy.";
+                            again with up to 10 % more energy.";
 
 /// All of them.
 pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known("rest", "ball, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.3),
-    known("rest", "box, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.05),
-    known("rest", "bunny, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.1),
     known(
         "stack",
         "10 boxes",
         "Not fully explained: interfaces tilt by a degree while the stack settles, and it leans more \
-         and more; rapier's own meshes and voxels fall as well.",
+         and more; neither levelled support gaps nor less slack for noise change that, and rapier's \
+         own meshes and voxels fall as well.",
     ),
     known("slide", "noisy plane, 1 m/s", UNEVEN_GAPS).no_worse_than("heading_deg", 3.0),
     known("slide", "noisy plane, 5 m/s", UNEVEN_GAPS).no_worse_than("hop_mean_radii", 0.7),
     known("bounce", "box, restitution", SOLVER_SPINS)
-        .no_worse_than("most_energy_over_initial", 1.1),
+        .no_worse_than("most_energy_over_initial", 1.11),
     known("thin-sheet", "box on each of two sheets, bare", ONE_LAYER),
     known("thin-sheet", "ball on each of two sheets, bare", ONE_LAYER),
-    known("tunnelling", "scan", WRONG_SIDE).no_worse_than("passed_share", 0.04),
-    known("tunnelling", "waves", STANDING_SWEEP).no_worse_than("passed_share", 0.06),
+    known(
+        "tunnelling",
+        "scan",
+        "Two of 3,600 hits: of a small body that is deep in a rough scan without normals a further \
+         view takes the wrong side.",
+    )
+    .no_worse_than("passed_share", 0.03),
+    known("tunnelling", "waves", DEEP_IN_WAVES).no_worse_than("passed_share", 0.06),
     known(
         "density",
         "1 % flying pixels",
-        "Lone points in the air collide like any other.",
+        "Of twenty seeds four fail: points up to three radii above the floor, or some near each other, are \
+         not told from a surface.",
     ),
     known(
         "grazing",
@@ -93,7 +97,6 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     )
     .no_worse_than("worst_gap_error_mean_radii", 10.0),
     known("scale-shift", "box of 100 m", UNEVEN_GAPS).no_worse_than("shift_mean_radii", 0.2),
-    known("scale-shift", "points 1 km", UNEVEN_GAPS).no_worse_than("tilt_deg", 0.3),
 ];
 
 /// The declared cause of a failure, if there is one.
@@ -135,12 +138,12 @@ mod tests {
     fn what_is_worse_than_declared_is_another_failure() {
         let cause = |speed: f64| {
             let metrics = BTreeMap::from([("rms_speed_m_s".to_owned(), speed)]);
-            known_cause("rest", "box, new samples each frame", &metrics)
+            known_cause("rest", "ball, new samples each frame", &metrics)
         };
         assert!(cause(0.02).is_some());
-        assert_eq!(cause(0.2), None);
+        assert_eq!(cause(0.5), None);
         assert_eq!(
-            known_cause("rest", "box, new samples each frame", &BTreeMap::new()),
+            known_cause("rest", "ball, new samples each frame", &BTreeMap::new()),
             None
         );
         assert_eq!(

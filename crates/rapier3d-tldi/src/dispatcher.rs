@@ -40,8 +40,8 @@ use tldi::PairResult;
 /// The time of a straight cast is good to 0.2 r̄ of the coarser cloud over the speed where surfaces
 /// meet face on, and to a pixel over the cosine between normal and motion where they do not; a target
 /// distance counts along the motion. With `stop_at_penetration` off, and in turning casts, what touches
-/// at the start is passed unless the motion goes on towards it by more than a pixel, and so does what
-/// only the outer three pixels of the moving shape would meet. Turning casts are early by up to a
+/// at the start is passed unless the motion goes on towards it by more than a pixel, and so is what
+/// only the outer two pixels of the moving shape would meet, or three where it goes on by no more. Turning casts are early by up to a
 /// pixel. Cost: reading both clouds and the layers in the way, for each piece in which a turning shape
 /// displaces no point by more than half a pixel (64 pieces at the most).
 ///

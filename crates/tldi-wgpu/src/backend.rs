@@ -530,7 +530,7 @@ impl WgpuBackend {
         buffer.unmap();
         if self.capacities.holds(&needed) {
             for &pair in &self.upload.pairs_of {
-                self.patches.reduce(&mut results[pair], &batch[pair].params);
+                self.patches.reduce_pair(&mut results[pair], &batch[pair]);
             }
         }
         self.last = needed;

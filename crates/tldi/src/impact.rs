@@ -19,8 +19,9 @@ pub struct ImpactQuery<'a> {
     /// met only if the motion goes on towards it by more than a pixel, and what is behind it may be
     /// met instead.
     pub touching: f32,
-    /// Whether the rim of `b`, three pixels wide where `b` is wider than that, passes what it meets:
-    /// a body that slides along a rough surface is not stopped by it.
+    /// Whether the rim of `b` passes what it meets: a body that slides along a rough surface is not
+    /// stopped by it. It is two pixels wide, and a third one where the motion does not go on by more
+    /// than three towards what is there; less where `b` is not wider than that.
     pub core_only: bool,
     /// Parameters of the images; `prediction` adds to the region that is looked at.
     pub params: Params,

@@ -18,6 +18,7 @@ mod gather;
 mod impact;
 mod knn;
 mod links;
+mod lone_points;
 mod morton;
 mod normals;
 pub mod paper;

@@ -75,6 +75,19 @@ impl Links {
         }
     }
 
+    /// Fills `roots`, for each of `contacts` contact pixels, with the lowest index among those that
+    /// links join it with.
+    pub(crate) fn components(&self, contacts: usize, roots: &mut Vec<u32>) {
+        roots.clear();
+        roots.extend(0..contacts as u32);
+        for &(k, l) in &self.pairs {
+            join(roots, k, l);
+        }
+        for k in 0..contacts as u32 {
+            roots[k as usize] = root(roots, k);
+        }
+    }
+
     /// Cuts the penetrations of `result` to what neighbours confirm: contact pixels deeper than a
     /// layer are removed, with their links, others still touch. Those that are left decide on
     /// `collides` and `gap`.
@@ -146,6 +159,22 @@ impl Links {
             }
         }
     }
+}
+
+/// Joins the sets of `k` and `l`; the lower root becomes that of both, so that the order of the links
+/// does not matter.
+pub(crate) fn join(parents: &mut [u32], k: u32, l: u32) {
+    let (root_k, root_l) = (root(parents, k), root(parents, l));
+    parents[root_k.max(root_l) as usize] = root_k.min(root_l);
+}
+
+/// The root of the set of `k`, shortening the way to it.
+pub(crate) fn root(parents: &mut [u32], mut k: u32) -> u32 {
+    while parents[k as usize] != k {
+        parents[k as usize] = parents[parents[k as usize] as usize];
+        k = parents[k as usize];
+    }
+    k
 }
 
 #[cfg(test)]

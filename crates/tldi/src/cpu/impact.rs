@@ -11,6 +11,7 @@ use super::pair::{Scratch, is_oriented};
 use super::side::{CloudView, ExactView};
 use super::splat::splat_radius;
 use super::sweep::is_edge_on;
+use crate::lone_points::is_alone;
 use crate::plan::{ring, stride};
 use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Params, Surface, Tldi, VirtualCamera};
 use glamx::{Pose3, Vec3};
@@ -20,11 +21,20 @@ use glamx::{Pose3, Vec3};
 /// which contacts push out again.
 const RIM: i32 = 3;
 
+/// Width in pixels of what of the rim passes anything: a splat of either side stands out by so much.
+/// The rest passes what the motion does not go on towards by more than all of the rim.
+const OUTER_RIM: u8 = 2;
+
 /// Pixels around an image that tell its rim from its edge: the rim, and one for the closing.
 pub(super) const BORDER: i32 = RIM + 1;
 
 /// Band above the least distance, in pixels, whose normals are averaged.
 const NORMAL_BAND: f32 = 0.5;
+
+/// Where a pixel is in a moving surface.
+const OUTSIDE: u8 = 0;
+const INNER_RIM: u8 = 1;
+const CORE: u8 = 2;
 
 /// Which pixels of a moving surface count, kept from call to call.
 #[derive(Default)]
@@ -86,7 +96,11 @@ impl Scratch {
         }
         self.meetings.clear();
         for pixel in 0..b.pixel_count() {
-            if query.core_only && !self.core.contains(pixel, b.size[0]) {
+            let place = match query.core_only {
+                true => self.core.place(pixel, b.size[0]),
+                false => CORE,
+            };
+            if place == OUTSIDE {
                 continue;
             }
             let layers = a.layers_of(pixel);
@@ -99,7 +113,8 @@ impl Scratch {
             };
             let in_way = |meeting: &Meeting| {
                 let approach = meeting.facing * (length - meeting.distance);
-                (0.0..=length).contains(&meeting.distance)
+                (place == CORE || approach > RIM as f32 * query.params.pixel_size)
+                    && (0.0..=length).contains(&meeting.distance)
                     && (meeting.distance >= query.touching || approach > query.params.pixel_size)
             };
             let nearest = met
@@ -108,20 +123,35 @@ impl Scratch {
                 .min_by(|m, n| m.distance.total_cmp(&n.distance));
             self.meetings.extend(nearest);
         }
-        let first = self
-            .meetings
-            .iter()
-            .min_by(|m, n| m.distance.total_cmp(&n.distance))?;
+        let image_width = b.size[0] as usize;
+        let origin = b.origin.map(|o| o as f32 + 0.5);
+        let place = |pixel: usize, depth: f32| {
+            let (i, j) = (pixel % image_width, pixel / image_width);
+            camera.point_at(origin[0] + i as f32, origin[1] + j as f32, depth)
+        };
+        let b_from_a = query.a_from_b.inverse();
+        let is_lone = |meeting: &Meeting| {
+            let before = place(meeting.pixel, meeting.depth - meeting.distance);
+            let of = |surface: &Surface, place: Vec3| match surface {
+                Surface::Cloud(cloud) => is_alone(cloud, place),
+                Surface::Exact(_) => false,
+            };
+            of(&query.a, place(meeting.pixel, meeting.depth)) || of(&query.b, b_from_a * before)
+        };
+        self.meetings.sort_unstable_by(|m, n| {
+            (m.distance.total_cmp(&n.distance)).then(m.pixel.cmp(&n.pixel))
+        });
+        let first_not_lone = self.meetings.iter().position(|meeting| !is_lone(meeting))?;
+        self.meetings.drain(..first_not_lone);
+        let first = self.meetings.first()?;
         // A single pixel's normal may be that of a rim.
         let near = first.distance + NORMAL_BAND * query.params.pixel_size;
         let normals = self.meetings.iter().filter(|m| m.distance <= near);
         let normal: Vec3 = normals.map(|m| m.normal).sum();
-        let column = b.origin[0] + (first.pixel % b.size[0] as usize) as i32;
-        let row = b.origin[1] + (first.pixel / b.size[0] as usize) as i32;
         let frame_from_view = camera.view_from_frame.rotation.inverse();
         Some(Impact {
             distance: first.distance,
-            point: camera.point_at(column as f32 + 0.5, row as f32 + 0.5, first.depth),
+            point: place(first.pixel, first.depth),
             normal: (frame_from_view * normal).normalize_or(-camera.axis()),
         })
     }
@@ -275,7 +305,7 @@ impl CoreScratch {
         }
     }
 
-    /// Leaves of what is covered what is not of its rim; the image is `width` pixels wide.
+    /// Marks what is covered as core, rim or outside; the image is `width` pixels wide.
     fn find(&mut self, width: u32) {
         let row = width as usize + 2 * BORDER as usize;
         // Closed first: a gap of a pixel in the cover is no rim.
@@ -298,14 +328,21 @@ impl CoreScratch {
         }
         let rim = 1 + RIM as u8;
         for ((covered, depth), around) in covered.iter_mut().zip(depth).zip(deepest_around) {
-            *covered &= u8::from(*depth > rim || depth == around);
+            *covered *= if *depth > rim || depth == around {
+                CORE
+            } else if *depth > 1 + OUTER_RIM {
+                INNER_RIM
+            } else {
+                OUTSIDE
+            };
         }
     }
 
-    fn contains(&self, pixel: usize, width: u32) -> bool {
+    /// [`CORE`], [`INNER_RIM`] or [`OUTSIDE`].
+    fn place(&self, pixel: usize, width: u32) -> u8 {
         let (i, j) = (pixel % width as usize, pixel / width as usize);
         let row = width as usize + 2 * BORDER as usize;
-        self.covered[(j + BORDER as usize) * row + i + BORDER as usize] > 0
+        self.covered[(j + BORDER as usize) * row + i + BORDER as usize]
     }
 }
 

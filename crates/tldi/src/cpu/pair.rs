@@ -66,7 +66,7 @@ impl Scratch {
                 }
             }
         }
-        self.patches.reduce(result, &query.params);
+        self.patches.reduce_pair(result, query);
     }
 
     fn compare_paper(
