@@ -21,54 +21,138 @@ const SAME_POINT: f32 = 1e-3;
 /// Contact pixels of one component that are looked at.
 const SAMPLES: usize = 9;
 
-/// The points of a cloud nearest to a place: squares of their distances in metres, and indices.
-type Nearest = [(f32, usize); NEIGHBORS];
+/// How far neighbours are looked for at least, in mean radii of the cloud. What has none within that
+/// is not known to stand alone.
+const REACH: f32 = 32.0;
 
-/// The points of `cloud` nearest to `place` and at least `beyond` metres away, in ascending order.
-fn nearest(cloud: &PointCloud, place: Vec3, beyond: f32) -> Nearest {
-    let [x, y, z] = cloud.coordinates();
-    let away = |bounds: &Aabb| place.clamp(bounds.min, bounds.max).distance_squared(place);
-    let mut best: Nearest = [(f32::INFINITY, 0); NEIGHBORS];
-    let mut visit = |block: usize| {
-        let first = block * BLOCK;
-        for i in first..(first + BLOCK).min(cloud.len()) {
-            let squared = Vec3::new(x[i], y[i], z[i]).distance_squared(place);
-            if squared >= beyond * beyond && squared < best[NEIGHBORS - 1].0 {
-                let at = best.partition_point(|near| near.0 <= squared);
-                best.copy_within(at..NEIGHBORS - 1, at + 1);
-                best[at] = (squared, i);
-            }
-        }
-        best[NEIGHBORS - 1].0
-    };
-    // The block that is nearest first: it spares most of the others.
-    let blocks = cloud.blocks();
-    let by_distance = |k: &usize, l: &usize| away(&blocks[*k]).total_cmp(&away(&blocks[*l]));
-    let first = (0..blocks.len()).min_by(by_distance).unwrap_or(0);
-    let mut limit = visit(first);
-    for (block, bounds) in blocks.iter().enumerate() {
-        if block != first && away(bounds) < limit {
-            limit = visit(block);
-        }
-    }
-    best
+/// Most cells around the places that are asked about.
+const MAX_CELLS: f32 = 4096.0;
+
+/// The points nearest to a place: squares of their distances in metres, and where they are.
+type Nearest = [(f32, Vec3); NEIGHBORS];
+
+/// The points of a cloud around some places, sorted into cells.
+struct Surroundings {
+    min: Vec3,
+    inv_cell: f32,
+    dims: [usize; 3],
+    /// First point of each cell; one entry more than cells.
+    starts: Vec<u32>,
+    points: Vec<Vec3>,
+    same: f32,
 }
 
-/// Whether the point of `cloud` nearest to `place` stands alone. Cost: up to six passes over the
-/// bounds of its blocks.
-pub(crate) fn is_alone(cloud: &PointCloud, place: Vec3) -> bool {
-    let same = SAME_POINT * cloud.mean_radius();
-    let [(_, point), ..] = nearest(cloud, place, 0.0);
-    let neighbors = nearest(cloud, cloud.point(point), same);
-    let (apart, _) = neighbors[NEIGHBORS - 1];
-    if !apart.is_finite() {
-        return false;
+impl Surroundings {
+    /// Those around `places`. Cost: a pass over the points of the blocks there.
+    fn new(cloud: &PointCloud, places: impl Iterator<Item = Vec3> + Clone) -> Self {
+        let bounds = places.clone().fold(Aabb::EMPTY, |all, p| all.including(p));
+        let mut cell = REACH * cloud.mean_radius();
+        let dims = |cell: f32| (bounds.extents() / cell).floor() + Vec3::splat(3.0);
+        while dims(cell).element_product() > MAX_CELLS {
+            cell *= 1.26; // a third of an octave: twice fewer cells
+        }
+        let mut all = Self {
+            min: bounds.min - Vec3::splat(cell),
+            inv_cell: 1.0 / cell,
+            dims: dims(cell).to_array().map(|n| n as usize),
+            starts: Vec::new(),
+            points: Vec::new(),
+            same: SAME_POINT * cloud.mean_radius(),
+        };
+        let count = all.dims.iter().product();
+        let mut is_asked = vec![false; count];
+        for place in places {
+            for cell in all.cell(place).into_iter().flat_map(|c| all.around(c)) {
+                is_asked[cell] = true;
+            }
+        }
+        let region = bounds.loosened(cell);
+        let mut found = Vec::new();
+        for (block, block_bounds) in cloud.blocks().iter().enumerate() {
+            if !block_bounds.intersects(&region) {
+                continue;
+            }
+            for i in block * BLOCK..((block + 1) * BLOCK).min(cloud.len()) {
+                let point = cloud.point(i);
+                let cell = all.cell(point).map(|c| all.index(c));
+                found.extend(cell.filter(|&c| is_asked[c]).map(|c| (c, point)));
+            }
+        }
+        all.starts.resize(count + 1, 0);
+        for (cell, _) in &found {
+            all.starts[cell + 1] += 1;
+        }
+        for k in 0..count {
+            all.starts[k + 1] += all.starts[k];
+        }
+        let mut cursors = all.starts.clone();
+        all.points.resize(found.len(), Vec3::ZERO);
+        for (cell, point) in found {
+            all.points[cursors[cell] as usize] = point;
+            cursors[cell] += 1;
+        }
+        all
     }
-    // The nearest ones may stand alone as well.
-    neighbors.iter().any(|&(_, neighbor)| {
-        let [.., (usual, _)] = nearest(cloud, cloud.point(neighbor), same);
-        apart > ALONE * ALONE * usual
-    })
+
+    /// The cell of a place, if it is one.
+    fn cell(&self, place: Vec3) -> Option<[usize; 3]> {
+        let at = ((place - self.min) * self.inv_cell).to_array();
+        let is_inside = (0..3).all(|k| at[k] >= 0.0 && at[k] < self.dims[k] as f32);
+        is_inside.then(|| at.map(|c| c as usize))
+    }
+
+    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
+        (z * self.dims[1] + y) * self.dims[0] + x
+    }
+
+    /// Indices of a cell and of those around it.
+    fn around(&self, cell: [usize; 3]) -> impl Iterator<Item = usize> {
+        let [xs, ys, zs] =
+            [0, 1, 2].map(|k| cell[k].saturating_sub(1)..(cell[k] + 2).min(self.dims[k]));
+        zs.flat_map(move |z| {
+            let xs = xs.clone();
+            ys.clone()
+                .flat_map(move |y| xs.clone().map(move |x| self.index([x, y, z])))
+        })
+    }
+
+    /// The points nearest to `place` and at least `beyond` metres away, in ascending order.
+    fn nearest(&self, place: Vec3, beyond: f32) -> Nearest {
+        let mut best: Nearest = [(f32::INFINITY, place); NEIGHBORS];
+        let cells = self.cell(place).into_iter().flat_map(|c| self.around(c));
+        for cell in cells {
+            for &point in &self.points[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
+                let squared = point.distance_squared(place);
+                if squared >= beyond * beyond && squared < best[NEIGHBORS - 1].0 {
+                    let at = best.partition_point(|near| near.0 <= squared);
+                    best.copy_within(at..NEIGHBORS - 1, at + 1);
+                    best[at] = (squared, point);
+                }
+            }
+        }
+        best
+    }
+
+    /// Whether the point nearest to `place` stands alone.
+    fn is_alone(&self, place: Vec3) -> bool {
+        let [(_, point), ..] = self.nearest(place, 0.0);
+        let neighbors = self.nearest(point, self.same);
+        let (apart, _) = neighbors[NEIGHBORS - 1];
+        if !apart.is_finite() {
+            return false;
+        }
+        // The nearest ones may stand alone as well.
+        neighbors.iter().any(|&(_, neighbor)| {
+            let [.., (usual, _)] = self.nearest(neighbor, self.same);
+            apart > ALONE * ALONE * usual
+        })
+    }
+}
+
+/// Whether the point of `cloud` nearest to `place` stands alone. Cost: a pass over the points of the
+/// blocks around it.
+pub(crate) fn is_alone(cloud: &PointCloud, place: Vec3) -> bool {
+    Surroundings::new(cloud, std::iter::once(place)).is_alone(place)
 }
 
 /// Removes the components of linked contact pixels that points standing alone make.
@@ -93,18 +177,27 @@ impl LonePoints {
             .sort_unstable_by_key(|&m| (group[m as usize], m));
         self.is_dropped.clear();
         self.is_dropped.resize(contacts.len(), false);
+        if contacts.is_empty() {
+            return;
+        }
         let b_from_a = query.a_from_b.inverse();
-        for component in self
-            .members
-            .chunk_by(|&k, &l| group[k as usize] == group[l as usize])
-        {
-            let is_lone = |surface: &Surface, at: &dyn Fn(&ContactPixel) -> Vec3| match surface {
-                Surface::Cloud(cloud) => made_by_lone_point(cloud, component, contacts, at),
-                Surface::Exact(_) | Surface::Device(_) => false,
+        let on_a = |c: &ContactPixel| c.point_a;
+        let on_b = |c: &ContactPixel| b_from_a * c.point_b;
+        let sides: [(Surface, &dyn Fn(&ContactPixel) -> Vec3); 2] =
+            [(query.a, &on_a), (query.b, &on_b)];
+        for (surface, at) in sides {
+            let Surface::Cloud(cloud) = surface else {
+                continue;
             };
-            if is_lone(&query.a, &|c| c.point_a) || is_lone(&query.b, &|c| b_from_a * c.point_b) {
-                for &m in component {
-                    self.is_dropped[m as usize] = true;
+            let same_group = |k: &u32, l: &u32| group[*k as usize] == group[*l as usize];
+            let components = || self.members.chunk_by(same_group);
+            let middles = components().map(|component| middle(component, contacts, at));
+            let around = Surroundings::new(cloud, middles);
+            for component in components() {
+                if made_by_lone_point(&around, component, contacts, at) {
+                    for &m in component {
+                        self.is_dropped[m as usize] = true;
+                    }
                 }
             }
         }
@@ -115,27 +208,35 @@ impl LonePoints {
     }
 }
 
+/// The place of a component that is nearest to the mean of all its places.
+fn middle(
+    component: &[u32],
+    contacts: &[ContactPixel],
+    at: &dyn Fn(&ContactPixel) -> Vec3,
+) -> Vec3 {
+    let places = || component.iter().map(|&m| at(&contacts[m as usize]));
+    let mean = places().sum::<Vec3>() / component.len() as f32;
+    let squared = |place: &Vec3| place.distance_squared(mean);
+    let nearest = places().min_by(|p, q| squared(p).total_cmp(&squared(q)));
+    nearest.unwrap_or(mean)
+}
+
 /// Whether the middle of a component belongs to a point that stands alone, and so do most of its
 /// pixels. At the rim of a large splat, or where fine points border on coarse ones, some do not, or
 /// do.
 fn made_by_lone_point(
-    cloud: &PointCloud,
+    around: &Surroundings,
     component: &[u32],
     contacts: &[ContactPixel],
     at: &dyn Fn(&ContactPixel) -> Vec3,
 ) -> bool {
-    let places = || component.iter().map(|&m| at(&contacts[m as usize]));
-    let mean = places().sum::<Vec3>() / component.len() as f32;
-    let middle = places().min_by(|p, q| {
-        let squared = |place: &Vec3| place.distance_squared(mean);
-        squared(p).total_cmp(&squared(q))
-    });
-    if !middle.is_some_and(|middle| is_alone(cloud, middle)) {
+    if !around.is_alone(middle(component, contacts, at)) {
         return false;
     }
     let step = component.len().div_ceil(SAMPLES);
-    let sampled = || places().step_by(step);
-    let alone = sampled().filter(|&place| is_alone(cloud, place)).count();
+    let places = component.iter().map(|&m| at(&contacts[m as usize]));
+    let sampled = || places.clone().step_by(step);
+    let alone = sampled().filter(|&place| around.is_alone(place)).count();
     2 * alone > sampled().count()
 }
 

@@ -134,7 +134,7 @@ impl Scratch {
             let before = place(meeting.pixel, meeting.depth - meeting.distance);
             let of = |surface: &Surface, place: Vec3| match surface {
                 Surface::Cloud(cloud) => is_alone(cloud, place),
-                Surface::Exact(_) => false,
+                Surface::Exact(_) | Surface::Device(_) => false,
             };
             of(&query.a, place(meeting.pixel, meeting.depth)) || of(&query.b, b_from_a * before)
         };
