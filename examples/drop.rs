@@ -81,7 +81,8 @@ fn run(args: &Args) -> anyhow::Result<()> {
         seed: args.common.seed,
     };
     let spots = find_spots(&scan, up, &demand)?;
-    let mut simulation = DropSimulation::new(scan, up, bodies, &spots, args.common.seed)?;
+    let chosen = args.common.backend.open()?;
+    let mut simulation = DropSimulation::new(scan, up, bodies, &spots, args.common.seed, chosen)?;
     let snapshots = simulate(&mut simulation, args.steps)?;
     let report = simulation.report();
     draw(&simulation, &report, up, &snapshots, &args.out)?;

@@ -1,5 +1,6 @@
 //! Lets bodies fall onto a scan and records what happens.
 
+use crate::cli::ChosenBackend;
 use crate::report::{BodyReport, DropReport};
 use crate::spots::Spot;
 use fastrand::Rng;
@@ -54,6 +55,7 @@ pub struct DropSimulation {
     pairs_missed: usize,
     max_penetration: f32,
     backend: String,
+    adapter: Option<String>,
     wall_seconds: f64,
 }
 
@@ -69,15 +71,16 @@ impl DropSimulation {
     /// its lowest point between 15 and 30 cm above the surface.
     ///
     /// # Errors
-    /// Those of [`TldiPipeline::new`].
+    /// Those of [`TldiPipeline::with_backend`].
     pub fn new(
         scan: PointCloud<'static>,
         up: Vec3,
         bodies: Vec<NamedCloud>,
         spots: &[Spot],
         seed: u64,
+        chosen: ChosenBackend,
     ) -> Result<Self, TldiError> {
-        let tldi = TldiPipeline::new(TldiConfig::default())?;
+        let tldi = TldiPipeline::with_backend(TldiConfig::default(), chosen.backend)?;
         let mut world = PhysicsWorld {
             gravity: -GRAVITY * up,
             ..PhysicsWorld::default()
@@ -117,6 +120,7 @@ impl DropSimulation {
             pairs_missed: 0,
             max_penetration: 0.0,
             backend: String::new(),
+            adapter: chosen.adapter,
             wall_seconds: 0.0,
         })
     }
@@ -182,7 +186,7 @@ impl DropSimulation {
             .map(|body| body.named.cloud.mean_radius());
         DropReport {
             backend: self.backend.clone(),
-            adapter: None,
+            adapter: self.adapter.clone(),
             steps: self.steps,
             dt: DT,
             wall_seconds: self.wall_seconds,

@@ -2,6 +2,7 @@
 
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
+use tldi_examples::cli::BackendChoice;
 use tldi_examples::load;
 use tldi_examples::simulation::{DropSimulation, NamedCloud};
 use tldi_examples::spots::Spot;
@@ -42,7 +43,8 @@ fn simulation(places: &[(Vec3, usize)]) -> DropSimulation {
         .map(|&(surface, level)| Spot { surface, level })
         .collect();
     let bodies = vec![cube(); spots.len()];
-    DropSimulation::new(floor(), Vec3::Z, bodies, &spots, 3).unwrap()
+    let chosen = BackendChoice::Cpu.open().unwrap();
+    DropSimulation::new(floor(), Vec3::Z, bodies, &spots, 3, chosen).unwrap()
 }
 
 /// Heights of the lowest and the highest point of each body.
