@@ -1,4 +1,4 @@
-//! Point clouds from files.
+//! Point clouds from files, cameras and meshes.
 //!
 //! | format | extensions | read |
 //! |---|---|---|
@@ -21,6 +21,9 @@
 //! | 6 | x y z r g b if the last three are whole numbers from 0 to 255 in all lines, else x y z nx ny nz |
 //! | 7 | x y z, one ignored, r g b (the PTS layout; a first line with nothing but the count is passed over) |
 //! | 9 | x y z r g b nx ny nz, or x y z nx ny nz r g b if only the last three are such whole numbers |
+//!
+//! Besides, [`depth`] has folders of depth frames, [`MovingPoints`] deforming meshes as NumPy arrays
+//! or folders of clouds, and [`sample_mesh`] even samples of a mesh's faces.
 //!
 //! Any file may be packed with gzip (`.gz`), which is told by its content. Positions, normals, colours
 //! and radii are kept, whatever their order and type in the file; all else is skipped. Units are

@@ -31,7 +31,8 @@ const MAX_CELLS: f32 = 4096.0;
 /// The points nearest to a place: squares of their distances in metres, and where they are.
 type Nearest = [(f32, Vec3); NEIGHBORS];
 
-/// The points of a cloud around some places, sorted into cells.
+/// The points of a cloud around some places, sorted into cells; kept from call to call.
+#[derive(Debug, Default)]
 struct Surroundings {
     min: Vec3,
     inv_cell: f32,
@@ -40,58 +41,62 @@ struct Surroundings {
     starts: Vec<u32>,
     points: Vec<Vec3>,
     same: f32,
+    is_asked: Vec<bool>,
+    found: Vec<(usize, Vec3)>,
 }
 
 impl Surroundings {
-    /// Those around `places`. Cost: a pass over the points of the blocks there.
-    fn new(cloud: &PointCloud, places: impl Iterator<Item = Vec3> + Clone) -> Self {
+    /// Finds those around `places`. Cost: a pass over the points of the blocks there.
+    fn find(&mut self, cloud: &PointCloud, places: impl Iterator<Item = Vec3> + Clone) {
         let bounds = places.clone().fold(Aabb::EMPTY, |all, p| all.including(p));
         let mut cell = REACH * cloud.mean_radius();
         let dims = |cell: f32| (bounds.extents() / cell).floor() + Vec3::splat(3.0);
         while dims(cell).element_product() > MAX_CELLS {
             cell *= 1.26; // a third of an octave: twice fewer cells
         }
-        let mut all = Self {
-            min: bounds.min - Vec3::splat(cell),
-            inv_cell: 1.0 / cell,
-            dims: dims(cell).to_array().map(|n| n as usize),
-            starts: Vec::new(),
-            points: Vec::new(),
-            same: SAME_POINT * cloud.mean_radius(),
-        };
-        let count = all.dims.iter().product();
-        let mut is_asked = vec![false; count];
+        self.min = bounds.min - Vec3::splat(cell);
+        self.inv_cell = 1.0 / cell;
+        self.dims = dims(cell).to_array().map(|n| n as usize);
+        self.same = SAME_POINT * cloud.mean_radius();
+        let count = self.dims.iter().product();
+        let mut is_asked = std::mem::take(&mut self.is_asked);
+        is_asked.clear();
+        is_asked.resize(count, false);
         for place in places {
-            for cell in all.cell(place).into_iter().flat_map(|c| all.around(c)) {
+            for cell in self.cell(place).into_iter().flat_map(|c| self.around(c)) {
                 is_asked[cell] = true;
             }
         }
+        self.is_asked = is_asked;
         let region = bounds.loosened(cell);
-        let mut found = Vec::new();
+        self.found.clear();
         for (block, block_bounds) in cloud.blocks().iter().enumerate() {
             if !block_bounds.intersects(&region) {
                 continue;
             }
             for i in block * BLOCK..((block + 1) * BLOCK).min(cloud.len()) {
                 let point = cloud.point(i);
-                let cell = all.cell(point).map(|c| all.index(c));
-                found.extend(cell.filter(|&c| is_asked[c]).map(|c| (c, point)));
+                let cell = self.cell(point).map(|c| self.index(c));
+                if let Some(cell) = cell.filter(|&c| self.is_asked[c]) {
+                    self.found.push((cell, point));
+                }
             }
         }
-        all.starts.resize(count + 1, 0);
-        for (cell, _) in &found {
-            all.starts[cell + 1] += 1;
+        // Counts go one further, so that after the sums an entry is its cell's cursor, and after the
+        // sort its end: the next cell's first point.
+        self.starts.clear();
+        self.starts.resize(count + 2, 0);
+        for (cell, _) in &self.found {
+            self.starts[cell + 2] += 1;
         }
-        for k in 0..count {
-            all.starts[k + 1] += all.starts[k];
+        for k in 2..count + 2 {
+            self.starts[k] += self.starts[k - 1];
         }
-        let mut cursors = all.starts.clone();
-        all.points.resize(found.len(), Vec3::ZERO);
-        for (cell, point) in found {
-            all.points[cursors[cell] as usize] = point;
-            cursors[cell] += 1;
+        self.points.resize(self.found.len(), Vec3::ZERO);
+        for &(cell, point) in &self.found {
+            self.points[self.starts[cell + 1] as usize] = point;
+            self.starts[cell + 1] += 1;
         }
-        all
     }
 
     /// The cell of a place, if it is one.
@@ -152,12 +157,15 @@ impl Surroundings {
 /// Whether the point of `cloud` nearest to `place` stands alone. Cost: a pass over the points of the
 /// blocks around it.
 pub(crate) fn is_alone(cloud: &PointCloud, place: Vec3) -> bool {
-    Surroundings::new(cloud, std::iter::once(place)).is_alone(place)
+    let mut around = Surroundings::default();
+    around.find(cloud, std::iter::once(place));
+    around.is_alone(place)
 }
 
 /// Removes the components of linked contact pixels that points standing alone make.
 #[derive(Debug, Default)]
 pub(crate) struct LonePoints {
+    around: Surroundings,
     links: Links,
     group: Vec<u32>,
     members: Vec<u32>,
@@ -181,20 +189,20 @@ impl LonePoints {
             return;
         }
         let b_from_a = query.a_from_b.inverse();
-        let on_a = |c: &ContactPixel| c.point_a;
-        let on_b = |c: &ContactPixel| b_from_a * c.point_b;
-        let sides: [(Surface, &dyn Fn(&ContactPixel) -> Vec3); 2] =
-            [(query.a, &on_a), (query.b, &on_b)];
-        for (surface, at) in sides {
-            let Surface::Cloud(cloud) = surface else {
+        for side in [0, 1] {
+            let Surface::Cloud(cloud) = [query.a, query.b][side] else {
                 continue;
+            };
+            let at = |c: &ContactPixel| match side {
+                0 => c.point_a,
+                _ => b_from_a * c.point_b,
             };
             let same_group = |k: &u32, l: &u32| group[*k as usize] == group[*l as usize];
             let components = || self.members.chunk_by(same_group);
             let middles = components().map(|component| middle(component, contacts, at));
-            let around = Surroundings::new(cloud, middles);
+            self.around.find(cloud, middles);
             for component in components() {
-                if made_by_lone_point(&around, component, contacts, at) {
+                if made_by_lone_point(&self.around, component, contacts, at) {
                     for &m in component {
                         self.is_dropped[m as usize] = true;
                     }
@@ -212,7 +220,7 @@ impl LonePoints {
 fn middle(
     component: &[u32],
     contacts: &[ContactPixel],
-    at: &dyn Fn(&ContactPixel) -> Vec3,
+    at: impl Fn(&ContactPixel) -> Vec3 + Copy,
 ) -> Vec3 {
     let places = || component.iter().map(|&m| at(&contacts[m as usize]));
     let mean = places().sum::<Vec3>() / component.len() as f32;
@@ -228,7 +236,7 @@ fn made_by_lone_point(
     around: &Surroundings,
     component: &[u32],
     contacts: &[ContactPixel],
-    at: &dyn Fn(&ContactPixel) -> Vec3,
+    at: impl Fn(&ContactPixel) -> Vec3 + Copy,
 ) -> bool {
     if !around.is_alone(middle(component, contacts, at)) {
         return false;
