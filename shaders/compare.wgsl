@@ -210,20 +210,6 @@ fn turned_from(c: Column, met: i32, from_behind: bool) -> Column {
     return Column(c.begin, c.end, is_turned);
 }
 
-fn view_of_pixel(pixel: u32) -> u32 {
-    var low = 0u;
-    var high = batch.pairs * MAX_VIEWS;
-    while high - low > 1u {
-        let middle = (low + high) / 2u;
-        if views[middle].first_pixel <= pixel {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
-
 @compute @workgroup_size(256)
 fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let k = group_index(group) * GROUP + lane;

@@ -73,12 +73,14 @@ const SWEEP: &str = shader!(
     "shared/types.wgsl",
     "shared/math.wgsl",
     "shared/pixels.wgsl",
+    "shared/view_of_pixel.wgsl",
     "sweep.wgsl"
 );
 const COMPARE: &str = shader!(
     "shared/types.wgsl",
     "shared/math.wgsl",
     "shared/pixels.wgsl",
+    "shared/view_of_pixel.wgsl",
     "compare.wgsl"
 );
 

@@ -110,20 +110,6 @@ fn layer_of(start: u32, end: u32, oriented: bool, view: u32) -> Layer {
     return layer;
 }
 
-fn view_of_pixel(pixel: u32) -> u32 {
-    var low = 0u;
-    var high = batch.pairs * MAX_VIEWS;
-    while high - low > 1u {
-        let middle = (low + high) / 2u;
-        if views[middle].first_pixel <= pixel {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
-
 @compute @workgroup_size(256)
 fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let k = group_index(group) * GROUP + lane;

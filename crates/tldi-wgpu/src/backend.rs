@@ -1,10 +1,8 @@
 //! One batch: upload, dispatch, read back; grown and redone where a buffer was too small.
 
+use crate::batch_buffers::BatchBuffers;
 use crate::buffers::Growable;
-use crate::layout::{
-    BatchData, CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, GROUP, LAYER_BYTES,
-    NORMAL_BYTES, PAIR_WORDS, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, VIEW_BYTES, is_for_device,
-};
+use crate::layout::{CONTACT_WORDS, COUNTERS, GROUP, PAIR_WORDS, VIEW_BYTES, is_for_device};
 use crate::pipelines::Pipeline;
 use crate::readback::{Counters, Readback};
 use crate::resident::Resident;
@@ -17,7 +15,6 @@ use std::time::Duration;
 use tldi::{
     Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult, PatchScratch, Surface,
 };
-use wgpu::BufferUsages;
 
 /// Times that a batch is redone with larger buffers before that counts as a fault: every time at
 /// least one of seven has doubled.
@@ -67,7 +64,7 @@ pub struct WgpuBackend {
     gpu: Gpu,
     resident: Resident,
     sources: Sources,
-    buffers: Buffers,
+    buffers: BatchBuffers,
     /// Elements that the buffers hold: what batches have needed so far.
     capacities: Counters,
     /// What the bind groups were made of.
@@ -81,53 +78,6 @@ pub struct WgpuBackend {
     last: Counters,
     timer: Option<Timer>,
     times: Vec<StageTime>,
-}
-
-#[derive(Debug)]
-struct Buffers {
-    batch: Growable,
-    pairs: Growable,
-    sides: Growable,
-    items: Growable,
-    survivors: Growable,
-    views: Growable,
-    work: Growable,
-    entries: Growable,
-    estimated: Growable,
-    samples: Growable,
-    splats: Growable,
-    fragments: Growable,
-    layers: Growable,
-    found: Growable,
-    groups: Growable,
-    splat_groups: Growable,
-    readback: Growable,
-}
-
-impl Default for Buffers {
-    fn default() -> Self {
-        let (storage, to) = (BufferUsages::STORAGE, BufferUsages::COPY_DST);
-        let from = BufferUsages::COPY_SRC;
-        Self {
-            batch: Growable::new("batch", BufferUsages::UNIFORM | to),
-            pairs: Growable::new("pairs", storage | to),
-            sides: Growable::new("sides", storage | to),
-            items: Growable::new("items", storage | to),
-            survivors: Growable::new("survivors", storage),
-            views: Growable::new("views", storage | to),
-            work: Growable::new("work", storage | to | from),
-            entries: Growable::new("entries", storage),
-            estimated: Growable::new("estimated normals", storage),
-            samples: Growable::new("samples", storage),
-            splats: Growable::new("splats", storage),
-            fragments: Growable::new("fragments", storage),
-            layers: Growable::new("layers", storage),
-            found: Growable::new("found", storage | to | from),
-            groups: Growable::new("groups", storage | BufferUsages::INDIRECT),
-            splat_groups: Growable::new("splat groups", storage | BufferUsages::INDIRECT),
-            readback: Growable::new("readback", BufferUsages::MAP_READ | to),
-        }
-    }
 }
 
 impl WgpuBackend {
@@ -144,7 +94,7 @@ impl WgpuBackend {
             gpu,
             resident,
             sources: Sources::default(),
-            buffers: Buffers::default(),
+            buffers: BatchBuffers::default(),
             capacities: Counters::LEAST,
             bound: Vec::new(),
             bind_groups: Vec::new(),
@@ -311,7 +261,7 @@ impl WgpuBackend {
     /// Uploads and submits the batch.
     fn submit(&mut self) -> Result<(), GpuError> {
         let data = self.upload.batch_data(&self.capacities);
-        self.prepare_buffers(&data)?;
+        self.buffers.fit(&self.gpu, &data, &self.upload)?;
         self.bind();
         let Self {
             gpu,
@@ -400,63 +350,9 @@ impl WgpuBackend {
         gpu.check()
     }
 
-    /// Grows the buffers to the batch and writes what is uploaded.
-    fn prepare_buffers(&mut self, data: &BatchData) -> Result<(), GpuError> {
-        let (gpu, b, upload) = (&self.gpu, &mut self.buffers, &self.upload);
-        b.batch.write(gpu, std::slice::from_ref(data))?;
-        b.pairs.write(gpu, &upload.pairs)?;
-        b.sides.write(gpu, &upload.sides)?;
-        b.items.write(gpu, &upload.items)?;
-        let pairs = u64::from(data.pairs);
-        let found = 4 * (u64::from(PAIR_WORDS) * pairs + u64::from(CONTACT_WORDS * data.contacts));
-        let bare = if data.cells > 0 { data.survivors } else { 1 };
-        for (buffer, bytes) in [
-            (&mut b.survivors, SURVIVOR_BYTES * u64::from(data.survivors)),
-            (&mut b.views, 3 * VIEW_BYTES * pairs),
-            (
-                &mut b.work,
-                4 * u64::from(data.pixels_at) + 16 * u64::from(data.pixels),
-            ),
-            (&mut b.entries, ENTRY_BYTES * u64::from(bare)),
-            (&mut b.estimated, NORMAL_BYTES * u64::from(bare)),
-            (&mut b.samples, 2 * 16 * SAMPLE_SLOTS * pairs),
-            (&mut b.splats, SPLAT_BYTES * u64::from(data.splats)),
-            (&mut b.fragments, FRAGMENT_BYTES * u64::from(data.fragments)),
-            (&mut b.layers, LAYER_BYTES * u64::from(data.layers)),
-            (&mut b.found, found),
-            (&mut b.groups, 64),
-            (&mut b.splat_groups, 64),
-            (&mut b.readback, 4 * u64::from(COUNTERS) + found),
-        ] {
-            buffer.ensure(gpu, bytes)?;
-        }
-        Ok(())
-    }
-
     /// Makes the bind groups, if a buffer is new.
     fn bind(&mut self) {
-        let b = &self.buffers;
-        let grown = |buffer: &Growable| buffer.get().cloned();
-        let bound = vec![
-            grown(&b.batch),
-            grown(&b.pairs),
-            grown(&b.sides),
-            grown(&b.items),
-            Some(self.resident.points().clone()),
-            Some(self.resident.normals().clone()),
-            grown(&b.survivors),
-            grown(&b.views),
-            grown(&b.work),
-            grown(&b.entries),
-            grown(&b.samples),
-            grown(&b.splats),
-            grown(&b.fragments),
-            grown(&b.layers),
-            grown(&b.found),
-            grown(&b.groups),
-            grown(&b.splat_groups),
-            grown(&b.estimated),
-        ];
+        let bound = self.buffers.bound(&self.resident);
         if bound == self.bound {
             return;
         }

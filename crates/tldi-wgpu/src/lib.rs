@@ -8,6 +8,7 @@
 mod auto;
 mod backend;
 mod bandwidth;
+mod batch_buffers;
 mod buffers;
 mod choice;
 mod device;
