@@ -13,7 +13,7 @@ use tldi_tests::{
     HalfSpace, Samples, aimed, gpu_backend, random_pose, random_unit, sampled_box, sampled_plane,
     sampled_sphere,
 };
-use tldi_wgpu::{AdapterChoice, AutoBackend, Gpu, WgpuBackend};
+use tldi_wgpu::{AdapterChoice, AutoBackend, Gpu, WgpuBackend, wgpu};
 
 const R: f32 = 0.02;
 
@@ -413,4 +413,43 @@ fn views_along_the_axes_have_the_frames_of_the_cpu() {
             "{axis}: {found:?}"
         );
     }
+}
+
+/// A device that has no room for a batch says so; under `AutoBackend` the CPU compares it.
+#[test]
+fn a_device_without_room_loses_nothing() {
+    let Some(gpu) = gpu_backend() else {
+        return;
+    };
+    drop(gpu);
+    // One megabyte a buffer: less than the fragments of any batch take.
+    let limits = wgpu::Limits {
+        max_storage_buffer_binding_size: 1 << 20,
+        ..wgpu::Limits::default()
+    };
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+    let instance = wgpu::Instance::new(descriptor);
+    let open = || {
+        let adapter = pollster::block_on(instance.request_adapter(&Default::default()))
+            .expect("there is an adapter");
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            required_limits: limits.clone(),
+            ..Default::default()
+        }))
+        .expect("there is a device");
+        WgpuBackend::new(Gpu::shared(device, queue)).expect("the stages fit")
+    };
+    let pairs = random_pairs(600..602);
+    let batch = queries(&pairs);
+    let error = open()
+        .compare(&batch, &mut Vec::new())
+        .expect_err("there is no room");
+    assert!(error.to_string().contains("1048576 are allowed"), "{error}");
+    let mut auto = AutoBackend::with_gpu(open(), 0);
+    assert_eq!(on_cpu(&batch), compared(&mut auto, &batch));
+    assert!(
+        auto.fallback()
+            .is_some_and(|reason| reason.contains("allowed"))
+    );
 }

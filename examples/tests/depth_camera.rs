@@ -166,7 +166,7 @@ fn what_is_wrong_is_said() {
     for (options, code, message) in [
         (&["--frames", "empty"][..], 1, "holds intrinsics.txt"),
         (&["--frames", "missing"], 1, "missing"),
-        (&["--backend", "gpu"], 2, "not built"),
+        (&["--backend", "fast"], 2, "is no backend"),
         (&["--sensor-noise", "-1"], 2, "greater than 0"),
         (
             &["--frames", "frames", "--size", "9"],

@@ -82,6 +82,7 @@ fn bodies_come_to_rest_and_equal_seeds_give_equal_reports() {
             "bodies",
             "contact_steps",
             "dt",
+            "fallback",
             "max_penetration",
             "mean_radius",
             "pairs_batched",
@@ -167,7 +168,7 @@ fn a_body_that_falls_out_of_the_scan_is_a_failure() {
 fn bad_options_say_what_is_wrong() {
     let folder = folder("options");
     for (options, code, message) in [
-        (&["--backend", "gpu"][..], 2, "not built"),
+        (&["--backend", "fast"][..], 2, "is no backend"),
         (&["--up", "0,0,0"], 2, "not an up direction"),
         (&["--size", "-1"], 2, "greater than 0"),
         (&["--size", "5"], 1, "no level surface"),

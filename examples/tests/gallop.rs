@@ -177,7 +177,7 @@ fn what_is_wrong_is_said() {
         ),
         (&["--faces", "other.ply"], 2, "--frames"),
         (&["--size", "-1"], 2, "greater than 0"),
-        (&["--backend", "gpu"], 2, "not built"),
+        (&["--backend", "fast"], 2, "is no backend"),
     ] {
         let output = run(BINARY, &folder, options);
         assert_eq!(

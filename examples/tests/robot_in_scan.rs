@@ -361,7 +361,7 @@ fn what_is_wrong_is_said() {
     );
     assert_eq!(report["driven_joints"], 0);
     for (options, code, message) in [
-        (&["--backend", "gpu"][..], 2, "not built"),
+        (&["--backend", "fast"][..], 2, "is no backend"),
         (&["--scan-scale", "0"], 2, "greater than 0"),
         (&["--urdf", "missing.urdf"], 1, "missing.urdf"),
         (

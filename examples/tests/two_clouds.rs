@@ -123,7 +123,7 @@ fn what_is_wrong_is_said() {
     for (options, code, message) in [
         (&["--pose", "1,2"][..], 2, "three of degrees"),
         (&["--velocity", "fast"], 2, "three numbers"),
-        (&["--backend", "gpu"], 2, "not built"),
+        (&["--backend", "fast"], 2, "is no backend"),
         (&["--animate"], 1, "give a --velocity"),
     ] {
         let output = ask(&folder, options);

@@ -160,7 +160,7 @@ mod tests {
                 Vec3::new(0.0, if down { 0.0 } else { 0.3 }, z)
             };
             let mut points = vec![foot(t), foot((t + 0.5) % 1.0)];
-            points.extend((0..60).map(|k| Vec3::new(0.0, 1.0, 0.02 * k as f32 - 0.6)));
+            points.extend((0..40).map(|k| Vec3::new(0.0, 1.0, 0.03 * k as f32 - 0.6)));
             points
         };
         let moving = MovingPoints::new((0..8).map(frame).collect()).unwrap();

@@ -314,16 +314,18 @@ mod tests {
             weight: 1.0,
         };
         let mut rng = fastrand::Rng::with_seed(1);
+        let mut reached_count = 0;
         for _ in 0..50 {
             let there: Vec<f32> = (0..3).map(|_| 3.0 * rng.f32() - 1.5).collect();
             let target = arm.poses(&there)[3] * tip;
             let (found, distance) = arm.reach(3, &[aim(target)], &[0.1, 0.4, 0.4]);
             let reached = arm.poses(&found)[3] * tip;
             assert!((reached.distance(target) - distance).abs() < 1e-5);
-            // Coordinate descent may end at the limits; most it reaches.
-            assert!(distance < 0.1, "{there:?} {distance}");
+            reached_count += usize::from(distance < 0.1);
             assert!(found.iter().all(|p| p.abs() <= 2.0));
         }
+        // Coordinate descent may end at the limits; most it reaches.
+        assert!(reached_count >= 40, "{reached_count} of 50");
         let far = aim(Vec3::new(3.0, 0.0, 0.3));
         let (_, distance) = arm.reach(3, &[far], &[0.0, 0.1, 0.1]);
         assert!((distance - 2.0).abs() < 0.02, "{distance}");
