@@ -44,7 +44,8 @@ impl Spacing {
     /// use tldi_examples::robot::Spacing;
     /// let spacing = Spacing { scan_radius: 0.01 };
     /// assert_eq!(spacing.of(Vec3::new(0.5, 0.2, 0.2)), 0.01);
-    /// assert_eq!(spacing.of(Vec3::new(0.02, 0.05, 0.02)), 0.002); // a finger
+    /// let of_finger = spacing.of(Vec3::new(0.02, 0.05, 0.02));
+    /// assert!((of_finger - 0.002).abs() < 1e-6);
     /// ```
     pub fn of(&self, extents: tldi::glamx::Vec3) -> f32 {
         let mut extents = extents.to_array();
