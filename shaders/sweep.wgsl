@@ -71,39 +71,93 @@ fn is_same_layer(key: u32, next: u32, merge_steps: u32) -> bool {
     return key >> DEPTH_BITS == next >> DEPTH_BITS && depth_of(next) - depth_of(key) <= merge_steps;
 }
 
+fn weight_of(f: vec2u) -> u32 {
+    return f.y & 0xffu;
+}
+
+// In steps.
+fn normal_of(f: vec2u) -> vec3i {
+    let splat = f.y >> 8u;
+    let xy = splats[splat].normal_xy;
+    return vec3i(i32(xy << 16u) >> 16u, i32(xy) >> 16u, i32(splats[splat].normal_z));
+}
+
+// Whether the first of two fragments is the lighter one; of like ones, the one that comes first by
+// its key and normal.
+fn is_lighter(f: vec2u, g: vec2u) -> bool {
+    if weight_of(f) != weight_of(g) {
+        return weight_of(f) < weight_of(g);
+    }
+    if f.x != g.x {
+        return f.x < g.x;
+    }
+    let n = normal_of(f);
+    let m = normal_of(g);
+    if n.x != m.x {
+        return n.x < m.x;
+    }
+    return select(n.z < m.z, n.y < m.y, n.y != m.y);
+}
+
+// Weighted depths above a first one: sums of 48 bits, in words of 16 and 32.
+struct DepthSum {
+    weight: u32,
+    low: u32,
+    high: u32,
+}
+
+fn add_depth(sum: ptr<function, DepthSum>, w: u32, above_first: u32) {
+    (*sum).weight += w;
+    (*sum).low += w * (above_first & 0xffffu);
+    (*sum).high += w * (above_first >> 16u) + ((*sum).low >> 16u);
+    (*sum).low &= 0xffffu;
+}
+
+// Of the fragments that are on the face of the heaviest one.
+fn depths_of_face(start: u32, end: u32) -> DepthSum {
+    var heaviest = start;
+    for (var k = start + 1u; k < end; k++) {
+        if is_lighter(fragments[heaviest], fragments[k]) {
+            heaviest = k;
+        }
+    }
+    let face = normal_of(fragments[heaviest]);
+    var sum: DepthSum;
+    for (var k = start; k < end; k++) {
+        let f = fragments[k];
+        if f32(dot(face, normal_of(f))) >= SAME_FACE * (NORMAL_STEPS * NORMAL_STEPS) {
+            add_depth(&sum, weight_of(f), depth_of(f.x) - depth_of(fragments[start].x));
+        }
+    }
+    return sum;
+}
+
 // The layer of the fragments from `start` to before `end`.
 fn layer_of(start: u32, end: u32, oriented: bool, view: u32) -> Layer {
     let first_depth = depth_of(fragments[start].x);
-    var weight = 0u;
-    // Sums of 48 bits, in words of 16 and 32.
-    var depth_low = 0u;
-    var depth_high = 0u;
+    var depths: DepthSum;
+    // Sums of 48 bits, too.
     var normal_low = vec3i();
     var normal_high = vec3i();
     for (var k = start; k < end; k++) {
         let f = fragments[k];
-        let w = f.y & 0xffu;
-        weight += w;
-        let above_first = depth_of(f.x) - first_depth;
-        depth_low += w * (above_first & 0xffffu);
-        depth_high += w * (above_first >> 16u) + (depth_low >> 16u);
-        depth_low &= 0xffffu;
-        let of_splat = f.y >> 8u;
-        let xy = splats[of_splat].normal_xy;
-        let n = vec3i(i32(xy << 16u) >> 16u, i32(xy) >> 16u, i32(splats[of_splat].normal_z));
-        normal_low += i32(w) * n;
+        add_depth(&depths, weight_of(f), depth_of(f.x) - first_depth);
+        normal_low += i32(weight_of(f)) * normal_of(f);
         normal_high += normal_low >> vec3u(12u);
         normal_low &= vec3i(0xfff);
+    }
+    let sum = vec3f(normal_high) * 4096.0 + vec3f(normal_low);
+    if length(sum) < CREASED * NORMAL_STEPS * f32(depths.weight) {
+        depths = depths_of_face(start, end);
     }
     let class_of_run = fragments[start].x >> DEPTH_BITS;
     let step = pairs[view / MAX_VIEWS].depth_step;
     let zero = views[view].depth_zero;
-    let mean = (f32(depth_high) * 65536.0 + f32(depth_low)) / f32(weight);
+    let mean = (f32(depths.high) * 65536.0 + f32(depths.low)) / f32(depths.weight);
     var layer: Layer;
     layer.near = zero + f32(first_depth) * step;
     layer.far = zero + f32(depth_of(fragments[end - 1u].x)) * step;
     layer.depth = zero + (f32(first_depth) + mean) * step;
-    let sum = vec3f(normal_high) * 4096.0 + vec3f(normal_low);
     layer.normal = unit_or(sum, vec3f(0.0, 0.0, -1.0));
     layer.facing = select(UNKNOWN, EXIT, class_of_run == 1u && oriented);
     layer.facing = select(layer.facing, ENTRY, class_of_run == 0u);

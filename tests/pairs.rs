@@ -186,7 +186,12 @@ fn a_box_deep_in_a_floor() {
 /// between both sees, and a slab, whose narrow side takes a view of its own.
 #[test]
 fn corner() {
-    let mut rng = fastrand::Rng::with_seed(3);
+    for seed in 0..10 {
+        in_a_corner(fastrand::Rng::with_seed(seed));
+    }
+}
+
+fn in_a_corner(mut rng: fastrand::Rng) {
     let mut room = sampled_plane(0.8, R, &mut rng);
     for (p, n) in room.points.iter_mut().zip(&mut room.normals) {
         if p.x < 0.0 {

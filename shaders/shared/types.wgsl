@@ -10,6 +10,8 @@ override LEAST_PLANAR: f32;
 override LEAST_RADIUS_PX: f32;
 override EDGE_ON: f32;
 override NORMAL_STEPS: f32;
+override CREASED: f32;
+override SAME_FACE: f32;
 override MAX_WEIGHT: f32;
 override DEPTH_BITS: u32;
 override MAX_DEPTH: f32;

@@ -2,7 +2,7 @@
 //! stages. All backends start from here.
 
 use crate::camera_policy;
-use crate::cpu::{columns, compare, normals, splat};
+use crate::cpu::{columns, compare, normals, splat, sweep};
 use crate::{Aabb, BLOCK, PairQuery, Params, Surface, View};
 use glamx::{Pose3, Vec3};
 
@@ -193,6 +193,7 @@ pub fn stage_constants() -> Vec<(&'static str, f64)> {
     let mut all = vec![("BLOCK", BLOCK as f64), ("AIM_SAMPLES", AIM_SAMPLES as f64)];
     all.extend(normals::CONSTANTS);
     all.extend(splat::CONSTANTS);
+    all.extend(sweep::CONSTANTS);
     all.extend(columns::CONSTANTS);
     all.extend(compare::CONSTANTS);
     all.extend(camera_policy::CONSTANTS);

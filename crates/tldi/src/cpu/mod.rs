@@ -15,7 +15,7 @@ pub(crate) mod normals;
 mod pair;
 mod side;
 pub(crate) mod splat;
-mod sweep;
+pub(crate) mod sweep;
 pub(crate) mod zone;
 
 use crate::supported::supported_surfaces;

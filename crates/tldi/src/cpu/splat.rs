@@ -24,7 +24,7 @@ pub(crate) const EDGE_ON: f32 = 0.2;
 const DEPTH_STEPS: f32 = 4096.0;
 
 /// Steps of a normal's component in the integer sums.
-const NORMAL_STEPS: f32 = 16384.0;
+pub(crate) const NORMAL_STEPS: f32 = 16384.0;
 
 /// Largest weight of a fragment.
 const MAX_WEIGHT: f32 = 255.0;
