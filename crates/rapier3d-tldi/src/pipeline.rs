@@ -3,8 +3,8 @@
 use crate::batching::{Frame, PairMemory};
 use crate::candidates::CandidateSearch;
 use crate::exact::ExactShape;
-use crate::parts::{PartPair, append_queries};
-use crate::prepared::{Batch, PROBE_ANSWER, Shared};
+use crate::parts::append_queries;
+use crate::prepared::{PROBE_ANSWER, Shared};
 use crate::report::{ComparedBy, cloud_pairs, contacts_of};
 use crate::surface_motion::{SurfaceMotions, TldiHooks};
 use crate::surface_push;
@@ -18,7 +18,7 @@ use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher};
 use rapier3d::pipeline::{ActiveHooks, EventHandler, PhysicsHooks, PhysicsWorld};
 use std::sync::Arc;
 use std::time::Instant;
-use tldi::{Backend, BackendError, CloudError, PairQuery, PointCloud};
+use tldi::{Backend, CloudError, PairQuery, PointCloud};
 
 /// Finds the contacts of point clouds for one physics world.
 ///
@@ -358,7 +358,7 @@ impl TldiPipeline {
         append_queries(&batch.parts, &sides, &mut queries);
         let outcome = self.backend.compare(&queries, &mut batch.results);
         self.compared_by.update(&*self.backend);
-        let error = outcome.err().map(|source| name_the_pair(source, &batch));
+        let error = outcome.err().map(|source| batch.error(source));
         self.queries = emptied(queries);
         self.sides = emptied(sides);
         if error.is_some() {
@@ -504,33 +504,6 @@ impl TldiPipeline {
             .query_dispatcher()
             .distance(&Pose::IDENTITY, probe, probe)
             .is_ok_and(|answer| answer.distance == PROBE_ANSWER)
-    }
-}
-
-/// A failed batch's error, with the colliders it is about.
-fn name_the_pair(source: BackendError, batch: &Batch) -> TldiError {
-    let query_of_error = match &source {
-        BackendError::Unsupported { pair, .. } => Some(*pair),
-        _ => None,
-    };
-    let is_culprit = |part: &PartPair| {
-        let query = part.comparison.as_ref().map(|c| c.query);
-        query.is_some() && query == query_of_error
-    };
-    let culprit = batch
-        .pairs
-        .iter()
-        .find(|pair| batch.parts[pair.parts.clone()].iter().any(is_culprit));
-    match culprit {
-        Some(pair) => TldiError::Pair {
-            collider1: pair.colliders[0],
-            collider2: pair.colliders[1],
-            source,
-        },
-        None => TldiError::Batch {
-            pairs: batch.pairs.len(),
-            source,
-        },
     }
 }
 

@@ -1,9 +1,9 @@
 //! What the pipeline and the dispatchers it handed to rapier share: the results of the batch, the
 //! workspaces for pairs that are not in it, and the errors that rapier would drop.
 
-use crate::TldiConfig;
 use crate::measured::{Measured, rolls};
 use crate::parts::{Hint, PartPair, ShapePair, append_part_pairs, append_queries, within_reach};
+use crate::{TldiConfig, TldiError};
 use rapier3d::geometry::{ColliderHandle, SharedShape};
 use rapier3d::math::{Pose, Rotation};
 use rapier3d::parry::shape::{Ball, Shape};
@@ -79,6 +79,33 @@ impl Batch {
     pub(crate) fn push(&mut self, key: PairKey, pair: PreparedPair) {
         self.index.entry(key).or_insert(self.pairs.len());
         self.pairs.push(pair);
+    }
+
+    /// The error of the backend, with the colliders it is about.
+    pub(crate) fn error(&self, source: BackendError) -> TldiError {
+        let query_of_error = match &source {
+            BackendError::Unsupported { pair, .. } => Some(*pair),
+            _ => None,
+        };
+        let is_culprit = |part: &PartPair| {
+            let query = part.comparison.as_ref().map(|c| c.query);
+            query.is_some() && query == query_of_error
+        };
+        let culprit = self
+            .pairs
+            .iter()
+            .find(|pair| self.parts[pair.parts.clone()].iter().any(is_culprit));
+        match culprit {
+            Some(pair) => TldiError::Pair {
+                collider1: pair.colliders[0],
+                collider2: pair.colliders[1],
+                source,
+            },
+            None => TldiError::Batch {
+                pairs: self.pairs.len(),
+                source,
+            },
+        }
     }
 
     /// Forgets the measurements that do not outlive the step, once the results are there.

@@ -1,6 +1,7 @@
 //! The GPU where it gains, else the CPU; and the CPU where the GPU fails.
 
 use crate::{AdapterChoice, Gpu, GpuError, WgpuBackend};
+use std::sync::OnceLock;
 use std::time::Instant;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
@@ -22,12 +23,12 @@ pub struct AutoBackend {
 }
 
 impl AutoBackend {
-    /// On the hardware GPU of this process; measures from which size on it gains. Takes some tenths
-    /// of a second where there is one.
+    /// On the hardware GPU of this process; from which size on it gains is measured once, which takes
+    /// some tenths of a second where there is one.
     pub fn new() -> Self {
         let opened = Gpu::of_process(AdapterChoice::Hardware);
         let measured = opened.and_then(WgpuBackend::new).and_then(|mut gpu| {
-            let least_points = crossover(&mut gpu)?;
+            let least_points = crossover_of_process(&mut gpu)?;
             Ok((gpu, least_points))
         });
         match measured {
@@ -105,6 +106,16 @@ impl Backend for AutoBackend {
 
 /// Points of the sheets that are timed.
 const TIMED: [usize; 2] = [1 << 13, 1 << 16];
+
+/// [`crossover`], measured by the first who asks.
+fn crossover_of_process(gpu: &mut WgpuBackend) -> Result<usize, GpuError> {
+    static MEASURED: OnceLock<usize> = OnceLock::new();
+    if let Some(points) = MEASURED.get() {
+        return Ok(*points);
+    }
+    let points = crossover(gpu)?;
+    Ok(*MEASURED.get_or_init(|| points))
+}
 
 /// Points from which on the GPU is faster than the CPU, by two sheets that touch, of two sizes:
 /// what the GPU needs for a batch of any size, and what both need for a point more.

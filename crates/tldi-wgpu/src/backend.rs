@@ -393,8 +393,8 @@ impl WgpuBackend {
         let slice = buffer.slice(..);
         let (mapped, answer) = mpsc::channel();
         slice.map_async(wgpu::MapMode::Read, move |result| {
-            // Nobody listens any more after an error.
-            let _ = mapped.send(result);
+            // Nobody listens any more after an error, which is told already.
+            mapped.send(result).unwrap_or_default();
         });
         self.gpu
             .device

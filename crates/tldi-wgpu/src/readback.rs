@@ -5,11 +5,13 @@ use crate::layout::{
     SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES,
 };
 use crate::upload::Upload;
+use bytemuck::{Pod, Zeroable};
 use tldi::glamx::Vec3;
 use tldi::{ContactPixel, PairQuery, PairResult, View, VirtualCamera};
 
 /// Elements that a batch needs of each buffer whose size is not known before.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Counters {
     pub(crate) survivors: u32,
     pub(crate) tiles: u32,
@@ -71,59 +73,22 @@ impl Counters {
         all.into_iter().filter(runs).collect()
     }
 
-    fn to_array(self) -> [u32; 7] {
-        let Self {
-            survivors,
-            tiles,
-            pixels,
-            splats,
-            fragments,
-            layers,
-            contacts,
-        } = self;
-        [
-            survivors, tiles, pixels, splats, fragments, layers, contacts,
-        ]
-    }
-
-    fn from_array(all: [u32; 7]) -> Self {
-        let [
-            survivors,
-            tiles,
-            pixels,
-            splats,
-            fragments,
-            layers,
-            contacts,
-        ] = all;
-        Self {
-            survivors,
-            tiles,
-            pixels,
-            splats,
-            fragments,
-            layers,
-            contacts,
-        }
-    }
-
     /// Whether buffers of this size are large enough.
     pub(crate) fn holds(&self, needed: &Self) -> bool {
-        let needed = needed.to_array();
-        self.to_array()
-            .into_iter()
-            .zip(needed)
-            .all(|(own, n)| n <= own)
+        let words = |c| -> [u32; 7] { bytemuck::cast(c) };
+        let mut all = words(*self).into_iter().zip(words(*needed));
+        all.all(|(own, needed)| needed <= own)
     }
 
     /// Grows what is too small, by doubling.
     pub(crate) fn grow(&mut self, needed: &Self) {
-        let (own, needed) = (self.to_array(), needed.to_array());
-        let grown = |k: usize| match needed[k] > own[k] {
-            true => needed[k].checked_next_power_of_two().unwrap_or(u32::MAX),
-            false => own[k],
-        };
-        *self = Self::from_array(std::array::from_fn(grown));
+        let needed: [u32; 7] = bytemuck::cast(*needed);
+        let own: &mut [u32; 7] = bytemuck::cast_mut(self);
+        for (own, needed) in own.iter_mut().zip(needed) {
+            if needed > *own {
+                *own = needed.checked_next_power_of_two().unwrap_or(u32::MAX);
+            }
+        }
     }
 }
 
@@ -152,7 +117,12 @@ impl<'a> Readback<'a> {
     }
 
     pub(crate) fn counters(&self) -> Counters {
-        Counters::from_array(std::array::from_fn(|k| self.counters[k]))
+        bytemuck::cast(
+            *self
+                .counters
+                .first_chunk::<7>()
+                .expect("the device has more counters"),
+        )
     }
 
     /// Whether the `k`-th pair on the device has a pixel with too many fragments.

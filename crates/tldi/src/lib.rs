@@ -5,6 +5,7 @@
 //! to rapier.
 
 mod aabb;
+mod approach;
 mod backend;
 mod builder;
 mod camera;

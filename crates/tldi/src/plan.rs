@@ -1,12 +1,12 @@
 //! What is known of a pair before any of its points is looked at; and the numbers that decide the
 //! stages. All backends start from here.
 
-use crate::camera_policy;
 use crate::cpu::{columns, compare, normals, splat, sweep};
 use crate::{Aabb, BLOCK, PairQuery, Params, Surface, View};
+use crate::{approach, camera_policy};
 use glamx::{Pose3, Vec3};
 
-pub use crate::camera_policy::{Approach, Body};
+pub use crate::approach::{Approach, Body};
 pub use crate::cpu::cull::Region;
 pub use crate::cpu::normals::SUPPORT;
 pub use crate::cpu::splat::DepthScale;
@@ -197,5 +197,6 @@ pub fn stage_constants() -> Vec<(&'static str, f64)> {
     all.extend(columns::CONSTANTS);
     all.extend(compare::CONSTANTS);
     all.extend(camera_policy::CONSTANTS);
+    all.extend(approach::CONSTANTS);
     all
 }

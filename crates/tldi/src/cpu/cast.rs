@@ -1,6 +1,6 @@
 //! Stage `cast`: the image of an exact surface, one ray a pixel.
 
-use super::splat::Rect;
+use super::rect::Rect;
 use crate::{Facing, Layer, RayHit, RaySurface, Tldi, VirtualCamera};
 use glamx::Pose3;
 

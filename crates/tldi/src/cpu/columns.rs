@@ -7,7 +7,8 @@
 
 use super::cull::Survivors;
 use super::lanes::{multiversioned, truncated};
-use super::splat::{Footprint, Rect, splat_radius};
+use super::rect::{Footprint, Rect};
+use super::splat::splat_radius;
 use crate::{Projection, VirtualCamera};
 use glamx::{Mat3, Vec3};
 

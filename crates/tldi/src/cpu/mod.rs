@@ -13,6 +13,7 @@ mod impact;
 mod lanes;
 pub(crate) mod normals;
 mod pair;
+mod rect;
 mod side;
 pub(crate) mod splat;
 pub(crate) mod sweep;
