@@ -176,9 +176,7 @@ fn contact_pixels(look: ptr<function, Look>, a: Column, b: Column, view: u32, pi
         let normal_b = facing_camera(layers[kb].normal, 1.0);
         let normal = unit_or(normal_a - normal_b, vec3f(0.0, 0.0, -1.0));
         let gap = (layers[ka].depth - layers[kb].depth) * abs(normal.z);
-        if !is_best_seen(look, normal)
-            || !is_best_seen(look, normal_a)
-            || !is_best_seen(look, normal_b) {
+        if !is_best_seen(look, normal) {
             continue;
         }
         if gap > (*look).params.prediction {

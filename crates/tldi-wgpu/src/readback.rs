@@ -117,12 +117,8 @@ impl<'a> Readback<'a> {
     }
 
     pub(crate) fn counters(&self) -> Counters {
-        bytemuck::cast(
-            *self
-                .counters
-                .first_chunk::<7>()
-                .expect("the device has more counters"),
-        )
+        let words: [u32; 7] = std::array::from_fn(|k| self.counters[k]);
+        bytemuck::cast(words)
     }
 
     /// Whether the `k`-th pair on the device has a pixel with too many fragments.

@@ -20,6 +20,9 @@ pub const MAX_PATCHES: usize = 32;
 /// Linked pixels belong to one group if their smoothed normals are within 30°.
 const SAME_GROUP: f32 = 0.866;
 
+/// Cosine of the angle (35°) within which two faces face each other.
+const FACE_TO_FACE: f32 = 0.82;
+
 /// A patch whose unit normals have a mean shorter than this (a spread of about 14°) is split.
 const FLAT: f32 = 0.97;
 
@@ -104,6 +107,7 @@ impl PatchScratch {
     /// them if need be.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         order(&mut result.contacts);
+        drop_between_faces(result);
         self.links.find(&result.contacts, params);
         self.links.confirm(result, params);
         let (contacts, out) = (&result.contacts, &mut result.patches);
@@ -227,6 +231,24 @@ impl PatchScratch {
         for k in 0..self.group.len() as u32 {
             self.group[k as usize] = root(&mut self.group, k);
         }
+    }
+}
+
+/// Drops the contact pixels of faces that do not face each other and of which another view sees one
+/// better, as of a floor's edge and the wall behind it: far along the view, and near beside it. Where
+/// they are half of all or more there is nothing better.
+fn drop_between_faces(result: &mut PairResult) {
+    let PairResult { axes, contacts, .. } = result;
+    let is_between = |contact: &ContactPixel| {
+        let seen_better = |normal: Vec3| {
+            let here = normal.dot(axes[contact.view as usize]).abs();
+            axes.iter().any(|axis| normal.dot(*axis).abs() > here)
+        };
+        contact.normal_a.dot(contact.normal_b) > -FACE_TO_FACE
+            && (seen_better(contact.normal_a) || seen_better(contact.normal_b))
+    };
+    if axes.len() > 1 && 2 * contacts.iter().filter(|c| is_between(c)).count() < contacts.len() {
+        contacts.retain(|contact| !is_between(contact));
     }
 }
 

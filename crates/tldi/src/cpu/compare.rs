@@ -199,11 +199,7 @@ fn contact_pixels([a, b]: [Column; 2], at: &PixelView, params: &Params, result: 
         let normal = (normal_a - normal_b).normalize_or(-Vec3::Z);
         let along_view = entry.depth - exit.depth;
         let gap = along_view * normal.z.abs();
-        // A wall in the columns of a floor that a body stands on is left to the view of the wall.
-        if ![normal, normal_a, normal_b]
-            .iter()
-            .all(|n| best_seen(*n, at.others))
-        {
+        if !best_seen(normal, at.others) {
             continue;
         }
         if gap > params.prediction {
