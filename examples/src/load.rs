@@ -106,7 +106,8 @@ pub fn resized(cloud: &PointCloud<'_>, size: f32) -> Result<PointCloud<'static>,
 }
 
 /// Every `step`-th point of a cloud with its normal and colour, at another place and with another
-/// radius. Normals stay: `place` must not turn the cloud.
+/// radius. Normals stay (`place` must not turn the cloud); those without a known side are estimated
+/// anew, and stay without.
 ///
 /// # Errors
 /// [`CloudError`] if places or radii are refused.
@@ -133,14 +134,27 @@ pub fn subset(
     let kept = || indices.iter().copied();
     let points: Vec<Vec3> = kept().map(|i| place(cloud.point(i))).collect();
     let radii: Vec<f32> = kept().map(|i| radius(cloud.radius(i))).collect();
-    let mut builder = PointCloud::builder(points).radii(radii);
-    if let Some(normals) = cloud.normals() {
-        builder = builder.normals(kept().map(|i| normals[i]).collect::<Vec<_>>());
-    }
+    let mut builder = with_normals(PointCloud::builder(points).radii(radii), cloud, kept());
     if let Some(colors) = cloud.colors() {
         builder = builder.colors(kept().map(|i| colors[i]).collect::<Vec<_>>());
     }
-    builder.build()
+    Ok(builder.build()?.into_owned())
+}
+
+/// The normals of some points of a cloud for a cloud of these points. What is given to a builder
+/// counts as known to point outward: normals that do not are estimated anew.
+fn with_normals<'a>(
+    builder: CloudBuilder<'a>,
+    cloud: &PointCloud<'_>,
+    kept: impl Iterator<Item = usize>,
+) -> CloudBuilder<'a> {
+    match cloud.normals() {
+        Some(normals) if cloud.normals_oriented() => {
+            builder.normals(kept.map(|i| normals[i]).collect::<Vec<_>>())
+        }
+        Some(_) => builder.pca_normals(SCAN_NORMAL_NEIGHBORS),
+        None => builder,
+    }
 }
 
 /// The cloud with a colour (red, green, blue, alpha) for each point.
@@ -154,11 +168,8 @@ pub fn painted(
     let points: Vec<Vec3> = cloud.points().collect();
     let radii: Vec<f32> = (0..cloud.len()).map(|i| cloud.radius(i)).collect();
     let colors: Vec<[u8; 4]> = (0..cloud.len()).map(color).collect();
-    let mut builder = PointCloud::builder(points).radii(radii).colors(colors);
-    if let Some(normals) = cloud.normals() {
-        builder = builder.normals(normals.to_vec());
-    }
-    builder.build()
+    let builder = PointCloud::builder(points).radii(radii).colors(colors);
+    with_normals(builder, cloud, 0..cloud.len()).build()
 }
 
 /// The name of a file without its folder and extensions.
