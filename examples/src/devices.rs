@@ -1,9 +1,11 @@
 //! What compared the clouds of a run.
 
 use rapier3d_tldi::prelude::StepReport;
+use serde::Serialize;
+use tldi::Backend;
 
-/// The backends of all steps so far.
-#[derive(Clone, Debug, Default)]
+/// The backends of all steps so far; reports flatten it.
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Devices {
     /// Name of the backend: that of the GPU, if it compared at least once.
     pub backend: String,
@@ -14,6 +16,15 @@ pub struct Devices {
 }
 
 impl Devices {
+    /// What a backend did on its own.
+    pub fn of(backend: &dyn Backend) -> Self {
+        Self {
+            backend: backend.name().to_owned(),
+            adapter: backend.adapter().map(str::to_owned),
+            fallback: backend.fallback().map(str::to_owned),
+        }
+    }
+
     /// Takes note of a step.
     pub fn note(&mut self, report: &StepReport) {
         if self.backend.is_empty() || (report.adapter.is_some() && self.adapter.is_none()) {

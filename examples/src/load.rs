@@ -102,11 +102,17 @@ pub fn default_size(file_size: f32, scan_radius: f32) -> f32 {
 pub fn resized(cloud: &PointCloud<'_>, size: f32) -> Result<PointCloud<'static>, CloudError> {
     let center = cloud.bounds().center();
     let scale = size / cloud.bounds().extents().max_element();
-    derived(cloud, 1, |p| scale * (p - center), |radius| scale * radius)
+    let all: Vec<usize> = (0..cloud.len()).collect();
+    subset(
+        cloud,
+        &all,
+        |p| scale * (p - center),
+        |radius| scale * radius,
+    )
 }
 
-/// Every `step`-th point of a cloud with its normal and colour, at another place and with another
-/// radius. Normals stay: `place` must not turn the cloud.
+/// Every `step`-th point of a cloud, to be drawn: with its normal and colour, at another place and
+/// with another radius. `place` must not turn the cloud. All normals count as known to point outward.
 ///
 /// # Errors
 /// [`CloudError`] if places or radii are refused.
@@ -117,10 +123,12 @@ pub fn derived(
     radius: impl Fn(f32) -> f32,
 ) -> Result<PointCloud<'static>, CloudError> {
     let kept: Vec<usize> = (0..cloud.len()).step_by(step).collect();
-    subset(cloud, &kept, place, radius)
+    part(cloud, &kept, place, radius, true)
 }
 
-/// The points of a cloud with these indices, as [`derived`].
+/// The points of a cloud with these indices, with their normals and colours, at another place and with
+/// another radius. `place` must not turn the cloud. Normals that do not know their side are estimated
+/// anew, and do not know it then either.
 ///
 /// # Errors
 /// [`CloudError`] if there is none, or places or radii are refused.
@@ -130,20 +138,36 @@ pub fn subset(
     place: impl Fn(Vec3) -> Vec3,
     radius: impl Fn(f32) -> f32,
 ) -> Result<PointCloud<'static>, CloudError> {
+    part(cloud, indices, place, radius, cloud.normals_oriented())
+}
+
+/// `keep_normals`: hand them on. What is given to a builder counts as known to point outward; else
+/// they are estimated anew.
+fn part(
+    cloud: &PointCloud<'_>,
+    indices: &[usize],
+    place: impl Fn(Vec3) -> Vec3,
+    radius: impl Fn(f32) -> f32,
+    keep_normals: bool,
+) -> Result<PointCloud<'static>, CloudError> {
     let kept = || indices.iter().copied();
     let points: Vec<Vec3> = kept().map(|i| place(cloud.point(i))).collect();
     let radii: Vec<f32> = kept().map(|i| radius(cloud.radius(i))).collect();
     let mut builder = PointCloud::builder(points).radii(radii);
-    if let Some(normals) = cloud.normals() {
-        builder = builder.normals(kept().map(|i| normals[i]).collect::<Vec<_>>());
-    }
+    builder = match cloud.normals() {
+        Some(normals) if keep_normals => {
+            builder.normals(kept().map(|i| normals[i]).collect::<Vec<_>>())
+        }
+        Some(_) => builder.pca_normals(SCAN_NORMAL_NEIGHBORS),
+        None => builder,
+    };
     if let Some(colors) = cloud.colors() {
         builder = builder.colors(kept().map(|i| colors[i]).collect::<Vec<_>>());
     }
-    builder.build()
+    Ok(builder.build()?.into_owned())
 }
 
-/// The cloud with a colour (red, green, blue, alpha) for each point.
+/// The cloud with a colour (red, green, blue, alpha) for each point, to be drawn, as [`derived`].
 ///
 /// # Errors
 /// [`CloudError`]; not for a cloud that was valid.

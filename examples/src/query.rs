@@ -1,5 +1,6 @@
 //! One query about two clouds: do they collide, how far apart are they, where do they touch.
 
+use crate::devices::Devices;
 use anyhow::Context;
 use rapier3d::parry::query::QueryDispatcher;
 use rapier3d_tldi::prelude::*;
@@ -56,12 +57,9 @@ pub struct QueryReport {
     pub contact_pixels: usize,
     /// Directions of the views, from `b` towards `a`.
     pub axes: Vec<[f32; 3]>,
-    /// Name of the backend.
-    pub backend: String,
-    /// Name of the GPU, if one did the work.
-    pub adapter: Option<String>,
-    /// Why the CPU had to do though a GPU would have been taken.
-    pub fallback: Option<String>,
+    /// What compared the clouds.
+    #[serde(flatten)]
+    pub devices: Devices,
     /// Wall-clock time of the comparison in seconds.
     pub wall_seconds: f64,
 }
@@ -127,9 +125,7 @@ impl CloudQuery {
             prediction: params.prediction,
             contact_pixels: result.contacts.len(),
             axes: result.axes.iter().map(Vec3::to_array).collect(),
-            backend: backend.name().to_owned(),
-            adapter: backend.adapter().map(str::to_owned),
-            fallback: backend.fallback().map(str::to_owned),
+            devices: Devices::of(backend),
             wall_seconds,
         };
         Ok(Answer {
@@ -239,7 +235,7 @@ impl QueryReport {
             self.contact_pixels,
             self.axes.len(),
             1e3 * self.wall_seconds,
-            self.backend
+            self.devices.backend
         )
     }
 }

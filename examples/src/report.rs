@@ -1,17 +1,15 @@
 //! Results as JSON and as a table.
 
+use crate::devices::Devices;
 use serde::Serialize;
 use std::io::{self, Write};
 
 /// What a run of `drop` found, as written to `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct DropReport {
-    /// Name of the backend that compared the clouds.
-    pub backend: String,
-    /// Name of the GPU, if one did the work.
-    pub adapter: Option<String>,
-    /// Why the CPU had to do though a GPU would have been taken.
-    pub fallback: Option<String>,
+    /// What compared the clouds.
+    #[serde(flatten)]
+    pub devices: Devices,
     /// Steps simulated.
     pub steps: usize,
     /// Length of a step in seconds.
@@ -101,7 +99,7 @@ impl DropReport {
             self.dt,
             self.wall_seconds,
             self.real_time_factor,
-            self.backend,
+            self.devices.backend,
             self.scan_points,
             self.pairs_batched,
             self.pairs_missed,

@@ -182,9 +182,7 @@ impl DropSimulation {
             .iter()
             .map(|body| body.named.cloud.mean_radius());
         DropReport {
-            backend: self.devices.backend.clone(),
-            adapter: self.devices.adapter.clone(),
-            fallback: self.devices.fallback.clone(),
+            devices: self.devices.clone(),
             steps: self.steps,
             dt: DT,
             wall_seconds: self.wall_seconds,

@@ -2,16 +2,14 @@
 
 mod common;
 
-use common::{data, folder, json, keys, run, stderr};
+use common::{
+    PICTURES, assert_keys, assert_pictures, assert_refused, data, folder, number, without_times,
+};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_depth_camera");
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap()
-}
 
 /// Frames of a camera 1.5 m over a floor, straight down, 160 × 120 pixels; where `plate` says so, a
 /// plate of 50 cm across is 30 cm over the floor. The camera's y is the world's −y: z is up.
@@ -48,13 +46,7 @@ fn write_frames(folder: &Path, plates: &[bool]) {
 }
 
 fn report(folder: &Path, options: &[&str]) -> Value {
-    let output = run(
-        BINARY,
-        folder,
-        &[&["--json", "report.json"], options].concat(),
-    );
-    assert!(output.status.success(), "{options:?}: {}", stderr(&output));
-    json(folder.join("report.json"))
+    common::report(BINARY, folder, options)
 }
 
 /// A body lies on the plate; the plate leaves the view, and the body falls to the floor.
@@ -105,15 +97,13 @@ fn the_generated_ball_pushes_and_equal_seeds_give_equal_reports() {
     let folder = folder("depth_generated");
     let run = || {
         let mut report = report(&folder, &[]);
-        for key in [
+        let times = [
             "wall_seconds",
             "real_time_factor",
             "median_latency_ms",
             "max_latency_ms",
-        ] {
-            assert!(number(&report[key]) > 0.0, "{key}");
-            report[key] = Value::Null;
-        }
+        ];
+        without_times(&mut report, &times);
         for frame in report["frames"].as_array_mut().unwrap() {
             for key in [
                 "decode_ms",
@@ -129,17 +119,18 @@ fn the_generated_ball_pushes_and_equal_seeds_give_equal_reports() {
     };
     let first = run();
     assert_eq!(run(), first);
-    for key in [
-        "backend",
-        "adapter",
-        "steps",
-        "frames",
-        "bodies",
-        "contact_steps",
-        "pairs_missed",
-    ] {
-        assert!(keys(&first).contains(&key), "{key}");
-    }
+    assert_keys(
+        &first,
+        &[
+            "backend",
+            "adapter",
+            "steps",
+            "frames",
+            "bodies",
+            "contact_steps",
+            "pairs_missed",
+        ],
+    );
     assert_eq!(first["pairs_missed"], 0);
     let bodies = first["bodies"].as_array().unwrap();
     // They rest on the table, the pebble after some rolling, and the ball, 22 cm wide, moves what is
@@ -152,10 +143,7 @@ fn the_generated_ball_pushes_and_equal_seeds_give_equal_reports() {
             .any(|body| number(&body["displacement"]) > 0.05),
         "{bodies:?}"
     );
-    for name in ["initial.png", "mid.png", "final.png"] {
-        let png = fs::read(folder.join("out/depth_camera").join(name)).unwrap();
-        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
-    }
+    assert_pictures(&folder.join("out/depth_camera"), &PICTURES);
 }
 
 #[test]
@@ -163,7 +151,7 @@ fn what_is_wrong_is_said() {
     let folder = folder("depth_errors");
     write_frames(&folder.join("frames"), &[false; 3]);
     fs::create_dir_all(folder.join("empty")).unwrap();
-    for (options, code, message) in [
+    let cases: [(&[&str], i32, &str); 6] = [
         (&["--frames", "empty"][..], 1, "holds intrinsics.txt"),
         (&["--frames", "missing"], 1, "missing"),
         (&["--backend", "fast"], 2, "is no backend"),
@@ -174,20 +162,8 @@ fn what_is_wrong_is_said() {
             "no level surface",
         ),
         (&["--hold", "-1"], 2, "unexpected argument"),
-    ] {
-        let output = run(BINARY, &folder, options);
-        assert_eq!(
-            output.status.code(),
-            Some(code),
-            "{options:?}: {}",
-            stderr(&output)
-        );
-        assert!(
-            stderr(&output).contains(message),
-            "{options:?}: {}",
-            stderr(&output)
-        );
-    }
+    ];
+    assert_refused(BINARY, &folder, &cases);
     // A frame that is missing is named, and passed over.
     fs::remove_file(folder.join("frames/001.png")).unwrap();
     let report = report(
@@ -210,13 +186,8 @@ fn what_is_wrong_is_said() {
         "160 120 140 140 79.5 59.5 1\n",
     )
     .unwrap();
-    let output = run(BINARY, &folder, &["--frames", "frames"]);
-    assert_eq!(output.status.code(), Some(1));
-    assert!(
-        stderr(&output).contains("is the depth unit right?"),
-        "{}",
-        stderr(&output)
-    );
+    let case: (&[&str], i32, &str) = (&["--frames", "frames"], 1, "is the depth unit right?");
+    assert_refused(BINARY, &folder, &[case]);
 }
 
 #[test]

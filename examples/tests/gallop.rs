@@ -2,25 +2,17 @@
 
 mod common;
 
-use common::{data, folder, json, keys, run, stderr};
+use common::{
+    PICTURES, assert_keys, assert_pictures, assert_refused, data, folder, number, without_times,
+};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gallop");
 
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap()
-}
-
 fn report(folder: &Path, options: &[&str]) -> Value {
-    let output = run(
-        BINARY,
-        folder,
-        &[&["--json", "report.json"], options].concat(),
-    );
-    assert!(output.status.success(), "{options:?}: {}", stderr(&output));
-    json(folder.join("report.json"))
+    common::report(BINARY, folder, options)
 }
 
 /// A ball of 400 points that hops: z up, frames × points × 3 as numpy.save writes them.
@@ -52,31 +44,27 @@ fn the_creature_kicks_and_equal_seeds_give_equal_reports() {
     let folder = folder("gallop_generated");
     let run = |seed: &str| {
         let mut report = report(&folder, &["--seed", seed, "--steps", "150"]);
-        for key in ["wall_seconds", "real_time_factor"] {
-            assert!(number(&report[key]) > 0.0, "{key}");
-            report[key] = Value::Null;
-        }
+        without_times(&mut report, &["wall_seconds", "real_time_factor"]);
         for frame in report["frames"].as_array_mut().unwrap() {
-            assert!(number(&frame["deform_ms"]) > 0.0 && number(&frame["step_ms"]) > 0.0);
-            frame["deform_ms"] = Value::Null;
-            frame["step_ms"] = Value::Null;
+            without_times(frame, &["deform_ms", "step_ms"]);
         }
         report
     };
     let first = run("1");
     assert_eq!(run("1"), first);
     assert_ne!(run("2"), first);
-    for key in [
-        "backend",
-        "adapter",
-        "steps",
-        "dt",
-        "frames",
-        "contact_steps",
-        "max_penetration",
-    ] {
-        assert!(keys(&first).contains(&key), "{key}");
-    }
+    assert_keys(
+        &first,
+        &[
+            "backend",
+            "adapter",
+            "steps",
+            "dt",
+            "frames",
+            "contact_steps",
+            "max_penetration",
+        ],
+    );
     assert_eq!(first["frames"].as_array().unwrap().len(), 150);
     assert_eq!(first["pairs_missed"], 0);
     // Feet are down for a good part of every cycle, and off the ground in others.
@@ -94,10 +82,7 @@ fn the_creature_kicks_and_equal_seeds_give_equal_reports() {
         let height = number(&body["translation"][1]);
         assert!((-0.05..0.25).contains(&height), "{body}");
     }
-    for name in ["initial.png", "mid.png", "final.png"] {
-        let png = fs::read(folder.join("out/gallop").join(name)).unwrap();
-        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
-    }
+    assert_pictures(&folder.join("out/gallop"), &PICTURES);
 }
 
 /// It touches where the ground, whose waves are known, is higher than its lowest point.
@@ -166,7 +151,7 @@ fn what_is_wrong_is_said() {
         )
     };
     fs::write(folder.join("other.ply"), ply("3 0 1 450")).unwrap();
-    for (options, code, message) in [
+    let cases: [(&[&str], i32, &str); 7] = [
         (&["--frames", "short.npy"][..], 1, "frame 3 of 8 ends early"),
         (&["--frames", "empty"], 1, "no cloud in empty"),
         (&["--frames", "lost.npy"], 1, "lost.npy"),
@@ -178,20 +163,8 @@ fn what_is_wrong_is_said() {
         (&["--faces", "other.ply"], 2, "--frames"),
         (&["--size", "-1"], 2, "greater than 0"),
         (&["--backend", "fast"], 2, "is no backend"),
-    ] {
-        let output = run(BINARY, &folder, options);
-        assert_eq!(
-            output.status.code(),
-            Some(code),
-            "{options:?}: {}",
-            stderr(&output)
-        );
-        assert!(
-            stderr(&output).contains(message),
-            "{options:?}: {}",
-            stderr(&output)
-        );
-    }
+    ];
+    assert_refused(BINARY, &folder, &cases);
 }
 
 #[test]

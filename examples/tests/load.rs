@@ -2,7 +2,7 @@
 
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
-use tldi_examples::load::resized;
+use tldi_examples::load::{resized, subset};
 
 #[test]
 fn a_resized_cloud_is_scaled_about_its_middle_and_so_are_its_radii() {
@@ -19,4 +19,27 @@ fn a_resized_cloud_is_scaled_about_its_middle_and_so_are_its_radii() {
     assert_eq!([half.radius(0), half.radius(1)], [0.25, 0.5]);
     assert_eq!(half.normals(), cloud.normals());
     assert_eq!(half.colors(), cloud.colors());
+}
+
+/// Estimated normals do not know their side: no cloud that is made of theirs may claim to.
+#[test]
+fn only_normals_with_a_side_count_as_such() {
+    let points: Vec<Vec3> = (0..100)
+        .map(|k| Vec3::new((k % 10) as f32, (k / 10) as f32, 0.0))
+        .collect();
+    let bare = || PointCloud::builder(points.clone()).radius(1.0);
+    for (builder, is_oriented) in [
+        (bare().pca_normals(8), false),
+        (bare().normals(vec![Vec3::Z; 100]), true),
+    ] {
+        let cloud = builder.build().unwrap();
+        let half = resized(&cloud, 2.0).unwrap();
+        let indices: Vec<usize> = (0..50).collect();
+        let part = subset(&cloud, &indices, |p| p, |r| r).unwrap();
+        for made in [&cloud, &half, &part] {
+            assert_eq!(made.normals_oriented(), is_oriented);
+            let normals = made.normals().expect("they are kept or estimated");
+            assert!(normals.iter().all(|n| n.z.abs() > 0.999));
+        }
+    }
 }

@@ -1,17 +1,15 @@
 //! What a run of `depth_camera` found.
 
+use crate::devices::Devices;
 use serde::Serialize;
 use std::io::{self, Write};
 
 /// As written to `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct DepthReport {
-    /// Name of the backend that compared the clouds.
-    pub backend: String,
-    /// Name of the GPU, if one did the work.
-    pub adapter: Option<String>,
-    /// Why the CPU had to do though a GPU would have been taken.
-    pub fallback: Option<String>,
+    /// What compared the clouds.
+    #[serde(flatten)]
+    pub devices: Devices,
     /// Steps simulated.
     pub steps: usize,
     /// Length of a step in seconds.
@@ -145,7 +143,7 @@ impl DepthReport {
             self.dt,
             self.wall_seconds,
             self.real_time_factor,
-            self.backend,
+            self.devices.backend,
             self.contact_steps,
             1e3 * self.max_penetration,
             self.pairs_batched,

@@ -278,9 +278,7 @@ impl DepthSimulation {
         let last = latencies.len().saturating_sub(1);
         let latency = |k: usize| latencies.get(k).copied().unwrap_or(0.0);
         DepthReport {
-            backend: self.devices.backend.clone(),
-            adapter: self.devices.adapter.clone(),
-            fallback: self.devices.fallback.clone(),
+            devices: self.devices.clone(),
             steps: self.steps,
             dt: DT,
             frame_rate: 1.0 / (DT * STEPS_PER_FRAME as f32),

@@ -1,17 +1,15 @@
 //! What a run of `gallop` found.
 
+use crate::devices::Devices;
 use serde::Serialize;
 use std::io::{self, Write};
 
 /// As written to `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct GallopReport {
-    /// Name of the backend that compared the clouds.
-    pub backend: String,
-    /// Name of the GPU, if one did the work.
-    pub adapter: Option<String>,
-    /// Why the CPU had to do though a GPU would have been taken.
-    pub fallback: Option<String>,
+    /// What compared the clouds.
+    #[serde(flatten)]
+    pub devices: Devices,
     /// Steps simulated; a frame is a step.
     pub steps: usize,
     /// Length of a step in seconds.
@@ -116,7 +114,7 @@ impl GallopReport {
             self.dt,
             self.wall_seconds,
             self.real_time_factor,
-            self.backend,
+            self.devices.backend,
             1e3 * self.max_penetration,
             self.pairs_batched,
             self.pairs_missed

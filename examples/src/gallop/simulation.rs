@@ -230,9 +230,7 @@ impl GallopSimulation {
         let [cycle_frames, points] = self.scene.runner.counts();
         let steps = self.frames.len();
         GallopReport {
-            backend: self.devices.backend.clone(),
-            adapter: self.devices.adapter.clone(),
-            fallback: self.devices.fallback.clone(),
+            devices: self.devices.clone(),
             steps,
             dt: DT,
             wall_seconds: self.wall_seconds,

@@ -1,17 +1,15 @@
 //! What a run of `robot_in_scan` found.
 
+use crate::devices::Devices;
 use serde::Serialize;
 use std::io::{self, Write};
 
 /// As written to `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct RobotReport {
-    /// Name of the backend that compared the clouds.
-    pub backend: String,
-    /// Name of the GPU, if one did the work.
-    pub adapter: Option<String>,
-    /// Why the CPU had to do though a GPU would have been taken.
-    pub fallback: Option<String>,
+    /// What compared the clouds.
+    #[serde(flatten)]
+    pub devices: Devices,
     /// Steps simulated.
     pub steps: usize,
     /// Length of a step in seconds.
@@ -123,7 +121,7 @@ impl RobotReport {
             self.dt,
             self.wall_seconds,
             self.real_time_factor,
-            self.backend,
+            self.devices.backend,
             self.scan_points,
             self.self_filtered_points,
             self.contact_steps,

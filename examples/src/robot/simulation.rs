@@ -3,21 +3,21 @@
 use super::assembly::{Assembled, assemble};
 use super::description::Description;
 use super::links::{LinkCloud, Spacing, clouds_of_links, world_groups};
-use super::placing::{Placement, Site, place};
+use super::loose_bodies::{LooseBody, lay_bodies, loose_size};
+use super::own_camera::OwnCamera;
+use super::placing::{Site, place};
 use super::plan::{Build, Tip, plan_motion, start_pose};
-use super::report::{LinkReport, LooseBodyReport, RobotReport};
+use super::report::{LinkReport, RobotReport};
 use super::{Motion, SelfFilter};
 use crate::devices::Devices;
 use crate::load;
-use crate::scene::BodyShape;
 use anyhow::bail;
-use fastrand::Rng;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 use std::collections::HashMap;
 use std::time::Instant;
 use tldi::Backend;
-use tldi::glamx::{Pose3, Quat, Vec3};
+use tldi::glamx::{Pose3, Vec3};
 
 /// Length of a step in seconds.
 pub const DT: f32 = 1.0 / 60.0;
@@ -27,15 +27,6 @@ const GRAVITY: f32 = 9.81;
 /// Speed in m/s at which penetrations are pushed out: an arm that motors press into a scan does not
 /// jump back.
 const PUSH_OUT_SPEED: f32 = 0.5;
-/// Mass per volume of the loose bodies in kg/m³: cardboard boxes with something in them.
-const LOOSE_DENSITY: f32 = 150.0;
-/// Width of a loose body in metres, and at least this many mean radii of the scan.
-const LOOSE_SIZE: f32 = 0.12;
-const LOOSE_RADII: f32 = 10.0;
-/// Distance of the points of a loose body, as a share of its width.
-const LOOSE_SPACING: f32 = 0.04;
-/// Height of a loose body over its surface at the start, metres.
-const LOOSE_DROP: f32 = 0.01;
 /// Height of a robot that is not fixed over its surface at the start, metres.
 const ROBOT_DROP: f32 = 0.005;
 /// Distance within which a place counts as blocked by a point of the scan, metres.
@@ -130,21 +121,6 @@ struct LinkTally {
     force_sum: f64,
 }
 
-struct LooseBody {
-    name: String,
-    cloud: PointCloud<'static>,
-    handle: RigidBodyHandle,
-    collider: ColliderHandle,
-    start: Vec3,
-    touched: bool,
-}
-
-/// A camera that sees the scan and the robot.
-struct OwnCamera {
-    noise: f32,
-    rng: Rng,
-}
-
 impl RobotSimulation {
     /// Samples the links, finds a place, lays the bodies, and plans the motion.
     ///
@@ -160,7 +136,7 @@ impl RobotSimulation {
         let start = start_pose(&robot.kinematics, &build);
         let root_from_link = robot.kinematics.poses(&start);
         let margin = NOISE_MARGIN * scene.sensor_noise;
-        let loose_size = LOOSE_SIZE.max(LOOSE_RADII * scan_radius);
+        let loose_size = loose_size(scan_radius);
         let site = Site {
             footprint: build.footprint,
             lift: build.lift + if build.is_fixed { 0.0 } else { ROBOT_DROP },
@@ -230,10 +206,9 @@ impl RobotSimulation {
         );
         Ok(Self {
             tally: vec![LinkTally::default(); clouds.len()],
-            own_camera: scene.own_camera.then(|| OwnCamera {
-                noise: scene.sensor_noise,
-                rng: Rng::with_seed(seed ^ 0x6361_6d65),
-            }),
+            own_camera: scene
+                .own_camera
+                .then(|| OwnCamera::new(scene.sensor_noise, seed)),
             world,
             tldi,
             scan,
@@ -315,11 +290,7 @@ impl RobotSimulation {
         let world_from_link: Vec<Pose3> = (self.assembled.links.iter())
             .map(|body| *self.world.bodies[*body].position())
             .collect();
-        let mut frame: Vec<Vec3> = self.scan.points().collect();
-        for link in &self.clouds {
-            let pose = world_from_link[link.link];
-            frame.extend(link.cloud.points().map(|p| pose * p + camera.error()));
-        }
+        let mut frame = camera.frame(&self.scan, &self.clouds, &world_from_link);
         if let Some(filter) = &self.filter {
             let on_robot = filter.on_robot(&frame, &world_from_link);
             self.self_filtered = count(&on_robot);
@@ -425,9 +396,7 @@ impl RobotSimulation {
         };
         let links: Vec<LinkReport> = self.clouds.iter().zip(&self.tally).map(link).collect();
         RobotReport {
-            backend: self.devices.backend.clone(),
-            adapter: self.devices.adapter.clone(),
-            fallback: self.devices.fallback.clone(),
+            devices: self.devices.clone(),
             steps: self.steps,
             dt: DT,
             wall_seconds: self.wall_seconds,
@@ -448,21 +417,9 @@ impl RobotSimulation {
             bodies: self
                 .loose
                 .iter()
-                .map(|body| self.loose_report(body))
+                .map(|body| body.report(&self.world.bodies))
                 .collect(),
             warnings: self.robot.warnings.clone(),
-        }
-    }
-
-    fn loose_report(&self, body: &LooseBody) -> LooseBodyReport {
-        let rigid_body = &self.world.bodies[body.handle];
-        LooseBodyReport {
-            name: body.name.clone(),
-            points: body.cloud.len(),
-            translation: rigid_body.translation().to_array(),
-            displacement: rigid_body.translation().distance(body.start),
-            touched: body.touched,
-            sleeping: rigid_body.is_sleeping(),
         }
     }
 
@@ -474,54 +431,6 @@ impl RobotSimulation {
     }
 }
 
-impl OwnCamera {
-    /// A measuring error.
-    fn error(&mut self) -> Vec3 {
-        // A sum of three uniform numbers is near enough to a normal distribution (variance 1/4).
-        let mut component =
-            || 2.0 * self.noise * (self.rng.f32() + self.rng.f32() + self.rng.f32() - 1.5);
-        Vec3::new(component(), component(), component())
-    }
-}
-
 fn count(flags: &[bool]) -> usize {
     flags.iter().filter(|flag| **flag).count()
-}
-
-/// Bodies stand where the placement has them, their y axis up.
-fn lay_bodies(
-    world: &mut PhysicsWorld,
-    tldi: &TldiPipeline,
-    up: Vec3,
-    size: f32,
-    placement: &Placement,
-    seed: u64,
-) -> anyhow::Result<Vec<LooseBody>> {
-    let shapes = [BodyShape::RoundedBox, BodyShape::Pebble, BodyShape::Star];
-    let mut bodies = Vec::new();
-    for (k, surface) in placement.bodies.iter().enumerate() {
-        let shape = shapes[k % shapes.len()];
-        let sample = load::body_from_surface(shape.sample(LOOSE_SPACING, seed))?;
-        let cloud = load::resized(&sample, size)?;
-        let half_height = 0.5 * cloud.bounds().extents().y;
-        let pose = Pose3::from_parts(
-            *surface + (half_height + LOOSE_DROP) * up,
-            Quat::from_rotation_arc(Vec3::Y, up),
-        );
-        let (handle, collider) = world.insert(
-            RigidBodyBuilder::dynamic().pose(pose).angular_damping(1.0),
-            tldi.collider(cloud.clone())
-                .density(LOOSE_DENSITY)
-                .collision_groups(world_groups()),
-        );
-        bodies.push(LooseBody {
-            name: format!("{} {}", shape.name(), k + 1),
-            cloud,
-            handle,
-            collider,
-            start: pose.translation,
-            touched: false,
-        });
-    }
-    Ok(bodies)
 }

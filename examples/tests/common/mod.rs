@@ -29,6 +29,9 @@ pub(crate) fn write_ply(path: &Path, points: &[[f32; 3]]) {
     fs::write(path, text).unwrap();
 }
 
+/// The pictures of a run.
+pub(crate) const PICTURES: [&str; 3] = ["initial.png", "mid.png", "final.png"];
+
 /// The content of a JSON file.
 pub(crate) fn json(path: PathBuf) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
@@ -53,6 +56,55 @@ pub(crate) fn run(binary: &str, folder: &Path, options: &[&str]) -> Output {
         .args(options)
         .output()
         .unwrap()
+}
+
+/// Runs a binary in `folder` and gives its report; it must succeed.
+pub(crate) fn report(binary: &str, folder: &Path, options: &[&str]) -> Value {
+    let output = run(
+        binary,
+        folder,
+        &[&["--json", "report.json"], options].concat(),
+    );
+    assert!(output.status.success(), "{options:?}: {}", stderr(&output));
+    json(folder.join("report.json"))
+}
+
+/// Runs a binary with options that it must refuse: with this exit status, and a message that says so.
+pub(crate) fn assert_refused(binary: &str, folder: &Path, cases: &[(&[&str], i32, &str)]) {
+    for (options, code, message) in cases {
+        let output = run(binary, folder, options);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(*code), "{options:?}: {said}");
+        assert!(said.contains(message), "{options:?}: {said}");
+    }
+}
+
+/// Takes numbers that differ from run to run, as times do, out of a report; they must be above 0.
+pub(crate) fn without_times(report: &mut Value, keys: &[&str]) {
+    for key in keys {
+        assert!(number(&report[key]) > 0.0, "{key}: {}", report[key]);
+        report[key] = Value::Null;
+    }
+}
+
+/// Asserts that a report has all of these fields.
+pub(crate) fn assert_keys(report: &Value, expected: &[&str]) {
+    for key in expected {
+        assert!(keys(report).contains(key), "{key}");
+    }
+}
+
+/// Asserts that these pictures lie in a folder.
+pub(crate) fn assert_pictures(folder: &Path, names: &[&str]) {
+    for name in names {
+        let png = fs::read(folder.join(name)).unwrap();
+        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n", "{name}");
+    }
+}
+
+/// A number of a report.
+pub(crate) fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
 }
 
 /// What a run wrote for people, to its standard error.

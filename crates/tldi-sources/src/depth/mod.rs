@@ -2,6 +2,7 @@
 
 mod camera;
 mod sequence;
+mod tile;
 
 pub use camera::{DepthCamera, DepthCloud, Intrinsics, SensorModel};
 pub use sequence::{DepthError, DepthFrame, DepthSequence};

@@ -1,0 +1,45 @@
+//! A robot's own camera, which sees the scan and the robot.
+
+use super::links::LinkCloud;
+use fastrand::Rng;
+use tldi::PointCloud;
+use tldi::glamx::{Pose3, Vec3};
+
+/// A camera that sees the scan and the robot.
+pub(super) struct OwnCamera {
+    noise: f32,
+    rng: Rng,
+}
+
+impl OwnCamera {
+    /// A camera whose points are off by `noise` metres (standard deviation).
+    pub(super) fn new(noise: f32, seed: u64) -> Self {
+        Self {
+            noise,
+            rng: Rng::with_seed(seed ^ 0x6361_6d65),
+        }
+    }
+
+    /// A frame: the scan, and the links where they are (by index of the URDF).
+    pub(super) fn frame(
+        &mut self,
+        scan: &PointCloud<'_>,
+        links: &[LinkCloud],
+        world_from_link: &[Pose3],
+    ) -> Vec<Vec3> {
+        let mut frame: Vec<Vec3> = scan.points().collect();
+        for link in links {
+            let pose = world_from_link[link.link];
+            frame.extend(link.cloud.points().map(|p| pose * p + self.error()));
+        }
+        frame
+    }
+
+    /// A measuring error.
+    fn error(&mut self) -> Vec3 {
+        // A sum of three uniform numbers is near enough to a normal distribution (variance 1/4).
+        let mut component =
+            || 2.0 * self.noise * (self.rng.f32() + self.rng.f32() + self.rng.f32() - 1.5);
+        Vec3::new(component(), component(), component())
+    }
+}
