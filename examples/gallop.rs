@@ -240,8 +240,9 @@ fn draw(
 
 /// A camera beside what runs, a little ahead and above.
 fn beside(snapshot: &GallopSnapshot, size: f32, pixels: [u32; 2]) -> VirtualCamera {
-    let middle = snapshot.world_from_runner.translation + 0.3 * size * Vec3::Y;
-    let eye = middle + size * Vec3::new(0.75, 0.6, 1.35);
+    // Room for a head that is held as high as the body is long.
+    let middle = snapshot.world_from_runner.translation + 0.4 * size * Vec3::Y;
+    let eye = middle + size * Vec3::new(0.85, 0.65, 1.55);
     VirtualCamera::perspective(
         eye,
         middle,
