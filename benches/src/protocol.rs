@@ -13,6 +13,8 @@ pub const ALL_CASES: usize = DISTANCES * ROTATIONS * ROTATIONS;
 /// One case.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
+    /// Its number among [`ALL_CASES`].
+    pub number: usize,
     /// Distance of the middles along x, in units of which the model is 2 large.
     pub distance: f32,
     /// From the frame of the second copy into that of the first.
@@ -21,11 +23,13 @@ pub struct Case {
 
 /// The case of a distance and a rotation, by their numbers.
 fn case(distance: usize, rotation: usize) -> Case {
+    let number = distance * ROTATIONS * ROTATIONS + rotation;
     let distance = 3.0 - 0.1 * distance as f32;
     let turn = |k: usize| std::f32::consts::TAU * k as f32 / ROTATIONS as f32;
     let about_y = Quat::from_rotation_y(turn(rotation / ROTATIONS));
     let about_z = Quat::from_rotation_z(turn(rotation % ROTATIONS));
     Case {
+        number,
         distance,
         a_from_b: Pose3::from_parts(distance.max(0.0) * Vec3::X, about_y * about_z),
     }

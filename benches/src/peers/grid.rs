@@ -13,6 +13,7 @@ const MAX_CELLS: f32 = (1 << 24) as f32;
 pub struct Grid {
     cells: Vec<u32>,
     starts: Vec<u32>,
+    cursors: Vec<u32>,
     sorted: Vec<Vec3>,
 }
 
@@ -81,9 +82,9 @@ impl Grid {
             self.starts[k] += self.starts[k - 1];
         }
         self.sorted.resize(points.len(), Vec3::ZERO);
-        let mut cursors = self.starts.clone();
+        self.cursors.clone_from(&self.starts);
         for (p, cell) in points.iter().zip(&self.cells) {
-            let cursor = &mut cursors[*cell as usize];
+            let cursor = &mut self.cursors[*cell as usize];
             self.sorted[*cursor as usize] = *p;
             *cursor += 1;
         }
