@@ -14,6 +14,10 @@ const FRONT: Look = Look {
     line: Line::Dashed,
 };
 
+const RADIUS_NOTE: &str = "r: the points' mean radius, 0.65 × the distance of the 7th neighbour. On \
+                           the front no other method that is given points alone is both faster and \
+                           more often right.";
+
 type Run = Stored<AccuracyRow>;
 
 /// The main chart, the same for smaller models, and what kinds of errors are made.
@@ -98,8 +102,7 @@ fn figure(runs: &[&Run], name: String) -> Figure {
         .collect();
     legend.push(Entry {
         look: FRONT,
-        label: "Pareto front: with points alone, nothing is both faster and more often right"
-            .to_owned(),
+        label: "Pareto front (points alone)".to_owned(),
     });
     Figure {
         name,
@@ -119,6 +122,7 @@ fn figure(runs: &[&Run], name: String) -> Figure {
         legend,
         notes: vec![
             settings_note(runs),
+            RADIUS_NOTE.to_owned(),
             "Thin bars, on the front: the middle half of the cases. \"culled\": points outside of the overlap of \
              both bounds are dropped first. Meshes are given their triangles, the others only \
              points."
@@ -161,11 +165,7 @@ fn settings_note(runs: &[&Run]) -> String {
             span(images)
         ));
     }
-    format!(
-        "Along a curve varies, of {}; r is the points' mean radius, 0.65 × the distance of the 7th \
-         neighbour.",
-        parts.join("; of ")
-    )
+    format!("Along a curve varies, of {}.", parts.join("; of "))
 }
 
 fn panel(run: &Run, grouped: &[(&str, Vec<&AccuracyRow>)]) -> Panel {
@@ -308,6 +308,7 @@ fn kinds_figure(runs: &[&Run], name: String) -> Figure {
         legend,
         notes: vec![
             settings_note(runs),
+            RADIUS_NOTE.to_owned(),
             origin(runs.iter().map(|run| &run.provenance)),
         ],
     }
