@@ -15,7 +15,7 @@ use tldi::{CpuBackend, PointCloud};
 use tldi_benches::accuracy::{Contender, Copies, Truth, measure};
 use tldi_benches::mesh_truth::ExactMesh;
 use tldi_benches::model::Model;
-use tldi_benches::peers::{Frame, Method, TldiPeer, all_peers};
+use tldi_benches::peers::{Frame, Method, TldiPeer, all_peers, is_wanted};
 use tldi_benches::protocol::{ALL_CASES, Case, cases};
 use tldi_benches::stored::{self, AccuracyRow, Provenance};
 use tldi_tests::standard_normal;
@@ -70,6 +70,9 @@ struct Args {
     /// Only peers with one of these words in their names, several by commas
     #[arg(long, value_name = "WORD,WORD", value_delimiter = ',')]
     only: Vec<String>,
+    /// No peers with one of these words in their names, several by commas
+    #[arg(long, value_name = "WORD,WORD", value_delimiter = ',')]
+    without: Vec<String>,
     /// Where clouds are compared, on one thread
     #[arg(long, value_name = "auto|cpu|gpu", default_value_t = BackendChoice::Cpu)]
     backend: BackendChoice,
@@ -239,7 +242,7 @@ fn contenders(args: &Args, model: &Model) -> anyhow::Result<Vec<Contender>> {
                     .into_iter()
                     .filter(|peer| peer.needs_faces() == radius_scale.is_none())
                     .filter(|peer| peer.refuses(&frame).is_none())
-                    .filter(|peer| is_named(&peer.name(), &args.only))
+                    .filter(|peer| is_wanted(&peer.name(), &args.only, &args.without))
                     .map(|peer| Contender {
                         variant: peer.name(),
                         peer,
@@ -251,12 +254,8 @@ fn contenders(args: &Args, model: &Model) -> anyhow::Result<Vec<Contender>> {
             );
         }
     }
-    ensure!(!all.is_empty(), "no method has any of the words of --only");
+    ensure!(!all.is_empty(), "--only and --without leave no method");
     Ok(all)
-}
-
-fn is_named(name: &str, only: &[String]) -> bool {
-    only.is_empty() || only.iter().any(|word| name.contains(word.as_str()))
 }
 
 fn print_head(model: &Model, cases: usize) {

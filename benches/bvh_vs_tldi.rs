@@ -10,13 +10,13 @@ use clap::Parser;
 use indicatif::ProgressBar;
 use peak_alloc::PeakAlloc;
 use std::path::PathBuf;
-use std::time::Instant;
 use tldi::CpuBackend;
 use tldi::glamx::Pose3;
 use tldi_benches::floor::Coordinates;
 use tldi_benches::model::Model;
-use tldi_benches::peers::{Found, Frame, Method, Peer, TldiPeer, all_peers};
+use tldi_benches::peers::{Found, Frame, Method, Peer, TldiPeer, all_peers, is_wanted};
 use tldi_benches::placements::{Placement, Source, bounds};
+use tldi_benches::stopwatch::Stopwatch;
 use tldi_benches::stored::{self, FrameRow, Provenance};
 use tldi_wgpu::BackendChoice;
 
@@ -40,6 +40,9 @@ struct Args {
     /// Only methods with one of these words in their names, several by commas
     #[arg(long, value_name = "WORD,WORD", value_delimiter = ',')]
     only: Vec<String>,
+    /// No methods with one of these words in their names, several by commas
+    #[arg(long, value_name = "WORD,WORD", value_delimiter = ',')]
+    without: Vec<String>,
     /// Measure our method on this backend too
     #[arg(long, value_name = "auto|cpu|gpu", default_value_t = BackendChoice::Cpu)]
     backend: BackendChoice,
@@ -120,12 +123,9 @@ fn methods(args: &Args) -> anyhow::Result<Vec<Measured>> {
         all.push(ours(args.backend.open()?, cores)?);
     }
     all.extend(all_peers().into_iter().map(|peer| (peer, 1)));
-    let is_wanted = |(peer, _): &Measured| {
-        let name = peer.name();
-        args.only.is_empty() || args.only.iter().any(|word| name.contains(word.as_str()))
-    };
-    all.retain(is_wanted);
-    ensure!(!all.is_empty(), "no method has any of the words of --only");
+    let is_kept = |(peer, _): &Measured| is_wanted(&peer.name(), &args.only, &args.without);
+    all.retain(is_kept);
+    ensure!(!all.is_empty(), "--only and --without leave no method");
     Ok(all)
 }
 
@@ -211,11 +211,11 @@ fn floor(frame: &Frame) -> f64 {
     let pose = Pose3::translation(1e-6, 0.0, 0.0);
     let mut seconds = 0.0;
     for _ in 0..2 {
-        let start = Instant::now();
+        let start = Stopwatch::of_thread();
         for cloud in &clouds {
             std::hint::black_box(cloud.moved_into(&pose, overlap));
         }
-        seconds = start.elapsed().as_secs_f64();
+        seconds = start.seconds();
     }
     seconds
 }

@@ -8,6 +8,7 @@ pub mod model;
 pub mod peers;
 pub mod placements;
 pub mod protocol;
+pub mod stopwatch;
 pub mod stored;
 
 use std::collections::HashMap;

@@ -134,8 +134,8 @@ fn notes(run: &Run) -> Vec<String> {
     ]
 }
 
-const ABOUT: &str = "Time from points to contacts, all points new: building what the method needs, and \
-                     the query.";
+const ABOUT: &str = "From points to contacts, all points new: building what the method needs, and the query. \
+                     Processor time on one thread, by the clock on several.";
 
 fn by_points(run: &Run) -> Figure {
     let panels = placements(run)

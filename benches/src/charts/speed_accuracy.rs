@@ -113,7 +113,7 @@ fn figure(runs: &[&Run], name: String) -> Figure {
              alone; the truth is exact tests of the mesh's triangles."
                 .to_owned(),
             "Every case is a frame of new points: building what the method needs and finding all \
-             contacts is counted, on one thread. Lower left is better."
+             contacts is counted, in processor time of one thread. Lower left is better."
                 .to_owned(),
         ],
         columns: panels.len().min(2),

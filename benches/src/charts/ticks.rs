@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn labels_are_short() {
-        let labels = [0.05, 3.0, 20_000.0, 5e6, 0.001, 544_000.0].map(label);
-        assert_eq!(labels, ["0.05", "3", "20k", "5M", "0.001", "544k"]);
+        let labels = [0.05, 3.0, 2_048.0, 20_000.0, 5e6, 0.001, 544_000.0].map(label);
+        assert_eq!(labels, ["0.05", "3", "2048", "20k", "5M", "0.001", "544k"]);
     }
 }

@@ -1,9 +1,9 @@
 //! A ball for each point, as rapier's own primitives.
 
 use super::{Found, Frame, Peer, touching_points, vector};
+use crate::stopwatch::Stopwatch;
 use rapier3d::math::Pose;
 use rapier3d::parry::shape::{Compound, SharedShape};
-use std::time::Instant;
 use tldi::glamx::Vec3;
 
 /// A compound of balls for each body, both built anew, with rapier's contact manifolds.
@@ -24,7 +24,7 @@ impl Peer for BallCompound {
     }
 
     fn compare(&mut self, frame: &Frame) -> Found {
-        let start = Instant::now();
+        let start = Stopwatch::of_thread();
         let ball = SharedShape::ball(frame.radius);
         let build = |points: &[Vec3]| {
             let placed = points
@@ -33,11 +33,11 @@ impl Peer for BallCompound {
             Compound::new(placed.collect())
         };
         let (a, b) = (build(frame.a), build(frame.b));
-        let built = start.elapsed().as_secs_f64();
+        let built = start.seconds();
         let contacts = touching_points(&a, &b).unwrap_or(0);
         Found {
             build_seconds: built,
-            query_seconds: start.elapsed().as_secs_f64() - built,
+            query_seconds: start.seconds() - built,
             collides: contacts > 0,
             contacts,
         }

@@ -2,7 +2,7 @@
 
 use super::grid::{Cells, Grid};
 use super::{Found, Frame, Peer};
-use std::time::Instant;
+use crate::stopwatch::Stopwatch;
 use tldi::glamx::Vec3;
 
 /// Bits of the cells around the points of the first body select the points of the second, and bits of
@@ -44,7 +44,7 @@ impl Peer for BitGrid {
     }
 
     fn compare(&mut self, frame: &Frame) -> Found {
-        let start = Instant::now();
+        let start = Stopwatch::of_thread();
         let reach = 2.0 * frame.radius;
         let cells = Cells::new(frame.a, reach);
         self.mark(frame.a.iter().copied(), &cells);
@@ -58,7 +58,7 @@ impl Peer for BitGrid {
             near_a.extend(frame.a.iter().filter(|p| self.is_marked(**p, &cells)));
         }
         (self.near_a, self.near_b) = (near_a, near_b);
-        let built = start.elapsed().as_secs_f64();
+        let built = start.seconds();
         let mut contacts = 0;
         if !self.near_a.is_empty() {
             let cells = Cells::new(&self.near_a, reach);
@@ -68,7 +68,7 @@ impl Peer for BitGrid {
         }
         Found {
             build_seconds: built,
-            query_seconds: start.elapsed().as_secs_f64() - built,
+            query_seconds: start.seconds() - built,
             collides: contacts > 0,
             contacts,
         }

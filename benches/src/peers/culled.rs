@@ -1,7 +1,7 @@
 //! Any peer after the points outside of the overlap of the bounds have been dropped.
 
 use super::{Found, Frame, Peer};
-use std::time::Instant;
+use crate::stopwatch::Stopwatch;
 use tldi::Aabb;
 use tldi::glamx::Vec3;
 
@@ -81,7 +81,7 @@ impl<P: Peer> Peer for Culled<P> {
     }
 
     fn compare(&mut self, frame: &Frame) -> Found {
-        let start = Instant::now();
+        let start = Stopwatch::of_thread();
         let margin = 2.0 * frame.radius;
         let overlap = bounds(frame.a)
             .loosened(margin)
@@ -93,7 +93,7 @@ impl<P: Peer> Peer for Culled<P> {
                 None => self.kept[side].keep_points(points, &overlap),
             }
         }
-        let cull_seconds = start.elapsed().as_secs_f64();
+        let cull_seconds = start.seconds();
         let mut found = Found::default();
         let [a, b] = &self.kept;
         if !a.points.is_empty() && !b.points.is_empty() {

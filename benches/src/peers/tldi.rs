@@ -1,11 +1,11 @@
 //! Ours, and the paper's, as a peer: clouds get new points, then are compared.
 
 use super::{Found, Frame, Peer};
+use crate::stopwatch::Stopwatch;
 use ::tldi::glamx::{Pose3, Vec3};
 use ::tldi::{
     Backend, PairQuery, PairResult, Params, PointCloud, Radii, Surface, View, VirtualCamera,
 };
-use std::time::Instant;
 
 /// How clouds are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,7 +120,7 @@ impl Peer for TldiPeer {
             results,
         } = self;
         threads.install(|| {
-            let start = Instant::now();
+            let start = Stopwatch::of_threads(threads.current_num_threads());
             let clouds = clouds.get_or_insert_with(|| {
                 [frame.a, frame.b].map(|points| {
                     let builder = PointCloud::builder(points.to_vec()).radius(frame.radius);
@@ -130,7 +130,7 @@ impl Peer for TldiPeer {
             for (side, cloud) in clouds.iter_mut().enumerate() {
                 fill(cloud, frame, side);
             }
-            let built = start.elapsed().as_secs_f64();
+            let built = start.seconds();
             let [a, b] = &*clouds;
             let query = PairQuery {
                 a: Surface::Cloud(a),
@@ -144,7 +144,7 @@ impl Peer for TldiPeer {
                 .expect("two clouds are supported");
             Found {
                 build_seconds: built,
-                query_seconds: start.elapsed().as_secs_f64() - built,
+                query_seconds: start.seconds() - built,
                 collides: results[0].collides,
                 contacts: results[0].contacts.len(),
             }

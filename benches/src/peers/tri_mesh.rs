@@ -1,9 +1,9 @@
 //! parry's triangle meshes, where a mesh is at hand: surfaces that the other peers know as points.
 
 use super::{Found, Frame, Peer, touching_points, vector};
+use crate::stopwatch::Stopwatch;
 use rapier3d::math::Vector;
 use rapier3d::parry::shape::{TriMesh, TriMeshFlags};
-use std::time::Instant;
 use tldi::glamx::Vec3;
 
 /// A mesh of each body with rapier's contact manifolds.
@@ -68,7 +68,7 @@ impl Peer for TriMeshPeer {
                 .filter(fits)
                 .or_else(|| meshes(frame, TriMeshFlags::DEFORMABLE));
         }
-        let start = Instant::now();
+        let start = Stopwatch::of_thread();
         if self.is_kept {
             if let Some([a, b]) = &mut self.kept {
                 a.set_vertices(&vertices(frame.a));
@@ -77,14 +77,14 @@ impl Peer for TriMeshPeer {
         } else {
             self.kept = meshes(frame, TriMeshFlags::empty());
         }
-        let built = start.elapsed().as_secs_f64();
+        let built = start.seconds();
         let contacts = match &self.kept {
             Some([a, b]) => touching_points(a, b).unwrap_or(0),
             None => 0,
         };
         Found {
             build_seconds: built,
-            query_seconds: start.elapsed().as_secs_f64() - built,
+            query_seconds: start.seconds() - built,
             collides: contacts > 0,
             contacts,
         }

@@ -38,7 +38,8 @@ pub struct AccuracyRow {
     /// How far the copies of the worst false negative must be moved apart until the meshes are free of
     /// each other, in mean radii: the least of some directions, at least the true depth.
     pub worst_false_negative_mean_radii: f32,
-    /// From new points to the answer and its contacts: median over the cases.
+    /// From new points to the answer and its contacts, processor time of one thread: median over the
+    /// cases.
     pub median_ms: f64,
     /// A quarter of the cases took less.
     pub lower_quartile_ms: f64,
@@ -109,7 +110,7 @@ pub struct FrameRow {
     pub method: String,
     /// That it could use.
     pub threads: usize,
-    /// Median time until queries could begin.
+    /// Median time until queries could begin: processor time on one thread, by the clock on several.
     pub build_ms: f64,
     /// Median time of the queries.
     pub query_ms: f64,
