@@ -180,8 +180,10 @@ where
                 continue;
             };
             let (x, y) = plot.at(point.x, point.y);
-            let is_right = x > plot.high.0 - 9 * words.chars().count() as i32;
-            let (side, offset) = match is_right {
+            // On the outer side, where fewer curves are, if there is room.
+            let room = 9 + 8 * words.chars().count() as i32;
+            let is_left = 2 * x < plot.low.0 + plot.high.0 && x - room > plot.low.0;
+            let (side, offset) = match is_left || x + room > plot.high.0 {
                 true => (HPos::Right, -9),
                 false => (HPos::Left, 9),
             };

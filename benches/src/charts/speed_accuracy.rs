@@ -3,7 +3,7 @@
 use super::figure::{Axis, Curve, Entry, Figure, Line, Look, Mark, Panel, Point};
 use super::front::front;
 use super::{looks, origin};
-use crate::stored::{AccuracyRow, Stored};
+use crate::stored::{AccuracyRow, Provenance, Stored};
 
 /// Models in the main chart: those with the most points.
 const IN_MAIN: usize = 2;
@@ -20,30 +20,80 @@ const RADIUS_NOTE: &str = "r: the points' mean radius, 0.65 × the distance of t
 
 type Run = Stored<AccuracyRow>;
 
+/// What all runs say of one model without noise.
+struct Model<'a> {
+    rows: Vec<&'a AccuracyRow>,
+    provenances: Vec<&'a Provenance>,
+}
+
 /// The main chart, the same for smaller models, and what kinds of errors are made.
 pub(super) fn figures(runs: &[Run]) -> Vec<Figure> {
-    let mut runs: Vec<&Run> = runs.iter().filter(|run| has_peers(run)).collect();
-    runs.sort_by_key(|run| std::cmp::Reverse(run.rows[0].points));
-    let (main, rest) = runs.split_at(runs.len().min(IN_MAIN));
+    let models = models(runs);
+    let (main, rest) = models.split_at(models.len().min(IN_MAIN));
     let mut all = Vec::new();
-    for (runs, suffix) in [(main, ""), (rest, "_small")] {
-        if !runs.is_empty() {
-            all.push(figure(runs, format!("speed_accuracy{suffix}")));
-            all.push(kinds_figure(runs, format!("false_answers{suffix}")));
+    for (models, suffix) in [(main, ""), (rest, "_small")] {
+        if !models.is_empty() {
+            all.push(figure(models, format!("speed_accuracy{suffix}")));
+            all.push(kinds_figure(models, format!("false_answers{suffix}")));
         }
     }
     all
 }
 
-fn has_peers(run: &Run) -> bool {
-    let is_peer = |row: &AccuracyRow| !matches!(&*row.variant, "default" | "paper");
-    run.rows.iter().any(|row| is_peer(row) && row.noise == 0.0)
+/// Models of which peers were measured, those with the most points first. Where several runs have one
+/// method with the same settings, that with the most cases counts.
+fn models(runs: &[Run]) -> Vec<Model<'_>> {
+    let has_peers = |run: &&Run| run.rows.iter().any(|row| row.noise == 0.0 && is_peer(row));
+    let mut all: Vec<Model> = Vec::new();
+    for run in runs.iter().filter(has_peers) {
+        let name = &run.rows[0].model;
+        let index = match all.iter().position(|model| model.rows[0].model == *name) {
+            Some(index) => index,
+            None => {
+                all.push(Model {
+                    rows: Vec::new(),
+                    provenances: Vec::new(),
+                });
+                all.len() - 1
+            }
+        };
+        let model = &mut all[index];
+        model.provenances.push(&run.provenance);
+        for row in run.rows.iter().filter(|row| row.noise == 0.0) {
+            match model.rows.iter_mut().find(|other| is_same(other, row)) {
+                Some(other) if other.cases < row.cases => *other = row,
+                Some(_) => {}
+                None => model.rows.push(row),
+            }
+        }
+    }
+    all.sort_by_key(|model| std::cmp::Reverse(model.rows[0].points));
+    all
 }
 
-/// Rows of each method without noise, in the order of their settings.
-fn by_method(run: &Run) -> Vec<(&str, Vec<&AccuracyRow>)> {
+fn is_peer(row: &AccuracyRow) -> bool {
+    !matches!(&*row.variant, "default" | "paper")
+}
+
+/// Whether two rows are of one method with one setting.
+fn is_same(a: &AccuracyRow, b: &AccuracyRow) -> bool {
+    let settings = |row: &AccuracyRow| {
+        let AccuracyRow {
+            rho,
+            resolution,
+            pixel_scale,
+            radius_scale,
+            ..
+        } = *row;
+        (rho, resolution, pixel_scale, radius_scale)
+    };
+    a.variant == b.variant && settings(a) == settings(b)
+}
+
+/// Rows of each method, in the order of their settings.
+fn by_method<'a>(model: &Model<'a>) -> Vec<(&'a str, Vec<&'a AccuracyRow>)> {
     let mut all: Vec<(&str, Vec<&AccuracyRow>)> = Vec::new();
-    for row in run.rows.iter().filter(|row| row.noise == 0.0) {
+    for &row in &model.rows {
         match all.iter_mut().find(|(method, _)| *method == row.variant) {
             Some((_, rows)) => rows.push(row),
             None => all.push((&row.variant, vec![row])),
@@ -80,17 +130,17 @@ fn setting_label(row: &AccuracyRow) -> String {
     }
 }
 
-fn figure(runs: &[&Run], name: String) -> Figure {
+fn figure(models: &[Model], name: String) -> Figure {
     let mut methods: Vec<&str> = Vec::new();
     let mut panels = Vec::new();
-    for run in runs {
-        let grouped = by_method(run);
+    for model in models {
+        let grouped = by_method(model);
         for (method, _) in &grouped {
             if !methods.contains(method) {
                 methods.push(method);
             }
         }
-        panels.push(panel(run, &grouped));
+        panels.push(panel(&grouped));
     }
     methods.sort_by_key(|method| looks::look(method) != looks::OURS);
     let mut legend: Vec<Entry> = methods
@@ -121,25 +171,25 @@ fn figure(runs: &[&Run], name: String) -> Figure {
         panel_size: [640, 520],
         legend,
         notes: vec![
-            settings_note(runs),
+            settings_note(models),
             RADIUS_NOTE.to_owned(),
             "Thin bars, on the front: the middle half of the cases. \"culled\": points outside of the overlap of \
              both bounds are dropped first. Meshes are given their triangles, the others only \
              points."
                 .to_owned(),
-            origin(runs.iter().map(|run| &run.provenance)),
+            origin(provenances(models)),
         ],
     }
 }
 
 /// What is varied along the curves.
-fn settings_note(runs: &[&Run]) -> String {
+fn settings_note(models: &[Model]) -> String {
     let span = |values: Vec<f32>| {
         let low = values.iter().copied().fold(f32::MAX, f32::min);
         let high = values.iter().copied().fold(0.0, f32::max);
         format!("{low} to {high}")
     };
-    let rows = || runs.iter().flat_map(|run| &run.rows);
+    let rows = || models.iter().flat_map(|model| &model.rows).copied();
     let of = |value: fn(&AccuracyRow) -> Option<f32>| rows().filter_map(value).collect::<Vec<_>>();
     let mut parts = Vec::new();
     let balls = of(
@@ -168,7 +218,7 @@ fn settings_note(runs: &[&Run]) -> String {
     format!("Along a curve varies, of {}.", parts.join("; of "))
 }
 
-fn panel(run: &Run, grouped: &[(&str, Vec<&AccuracyRow>)]) -> Panel {
+fn panel(grouped: &[(&str, Vec<&AccuracyRow>)]) -> Panel {
     let rows: Vec<&AccuracyRow> = grouped.iter().flat_map(|(_, rows)| rows).copied().collect();
     let on_front: Vec<&AccuracyRow> = {
         let rows: Vec<&AccuracyRow> = rows.iter().copied().filter(|r| knows_points(r)).collect();
@@ -213,7 +263,7 @@ fn panel(run: &Run, grouped: &[(&str, Vec<&AccuracyRow>)]) -> Panel {
         .flat_map(|row| [row.lower_quartile_ms, row.upper_quartile_ms])
         .chain(rows.iter().map(|row| row.median_ms));
     Panel {
-        title: panel_title(run),
+        title: panel_title(&rows),
         x: Axis::log("time for one frame, ms (median of all cases)", spreads),
         y: Axis::log(
             "wrong answers, % of all cases",
@@ -224,26 +274,33 @@ fn panel(run: &Run, grouped: &[(&str, Vec<&AccuracyRow>)]) -> Panel {
     }
 }
 
-fn panel_title(run: &Run) -> String {
-    let row = &run.rows[0];
-    format!(
-        "{}: 2 × {} points, {} cases",
-        row.model, row.points, row.cases
-    )
+fn panel_title(rows: &[&AccuracyRow]) -> String {
+    let row = rows[0];
+    let fewest = rows.iter().map(|row| row.cases).min().unwrap_or(0);
+    let most = rows.iter().map(|row| row.cases).max().unwrap_or(0);
+    let cases = match fewest == most {
+        true => format!("{most} cases"),
+        false => format!("{fewest} to {most} cases"),
+    };
+    format!("{}: 2 × {} points, {cases}", row.model, row.points)
+}
+
+fn provenances<'a>(models: &[Model<'a>]) -> impl Iterator<Item = &'a Provenance> {
+    models.iter().flat_map(|model| model.provenances.clone())
 }
 
 /// Missed against invented contacts.
-fn kinds_figure(runs: &[&Run], name: String) -> Figure {
+fn kinds_figure(models: &[Model], name: String) -> Figure {
     let mut legend: Vec<Entry> = Vec::new();
     let mut panels = Vec::new();
-    for run in runs {
+    for model in models {
         let answers = |rows: &[&AccuracyRow]| -> Vec<[f64; 2]> {
             let of = |row: &&AccuracyRow| [row.false_positive_pct, row.false_negative_pct];
             rows.iter().map(of).collect()
         };
         // Methods that answer alike share a curve: all that test balls do.
         let mut alike: Vec<(Vec<&str>, &Vec<&AccuracyRow>)> = Vec::new();
-        let grouped = by_method(run);
+        let grouped = by_method(model);
         for (method, rows) in &grouped {
             match alike
                 .iter_mut()
@@ -280,7 +337,7 @@ fn kinds_figure(runs: &[&Run], name: String) -> Figure {
         }
         let all = || grouped.iter().flat_map(|(_, rows)| rows);
         panels.push(Panel {
-            title: panel_title(run),
+            title: panel_title(&model.rows),
             x: Axis::log(
                 "invented: said to touch, but do not, % of all cases",
                 all().map(|row| row.false_positive_pct),
@@ -307,9 +364,9 @@ fn kinds_figure(runs: &[&Run], name: String) -> Figure {
         panel_size: [640, 500],
         legend,
         notes: vec![
-            settings_note(runs),
+            settings_note(models),
             RADIUS_NOTE.to_owned(),
-            origin(runs.iter().map(|run| &run.provenance)),
+            origin(provenances(models)),
         ],
     }
 }
