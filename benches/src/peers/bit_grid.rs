@@ -48,8 +48,7 @@ impl Peer for BitGrid {
         let reach = 2.0 * frame.radius;
         let cells = Cells::new(frame.a, reach);
         self.mark(frame.a.iter().copied(), &cells);
-        let [mut near_a, mut near_b] =
-            [&mut self.near_a, &mut self.near_b].map(|kept| std::mem::take(kept));
+        let [mut near_a, mut near_b] = [&mut self.near_a, &mut self.near_b].map(std::mem::take);
         near_a.clear();
         near_b.clear();
         near_b.extend(frame.b.iter().filter(|p| self.is_marked(**p, &cells)));

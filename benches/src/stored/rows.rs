@@ -143,7 +143,7 @@ impl Measured for FrameRow {
         if !(times[0] > 0.0 && times.is_sorted()) {
             return Some(format!("times of {times:?} ms are not positive and rising"));
         }
-        if !(self.floor_ratio > 0.0) {
+        if self.floor_ratio.is_nan() || self.floor_ratio <= 0.0 {
             return Some(format!("floor_ratio {} is not positive", self.floor_ratio));
         }
         None
