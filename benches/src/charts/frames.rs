@@ -1,6 +1,6 @@
 //! What a frame of new points costs, by placement and number of points.
 
-use super::figure::{Axis, Curve, Entry, Figure, Line, Look, Mark, Panel, Point};
+use super::figure::{Axis, Curve, Entry, Figure, Panel, Point};
 use super::{looks, origin};
 use crate::stored::{FrameRow, Stored};
 
@@ -12,7 +12,7 @@ type Run = Stored<FrameRow>;
 /// A chart for each run.
 pub(super) fn figures(runs: &[Run]) -> Vec<Figure> {
     let mut all: Vec<Figure> = Vec::new();
-    for run in runs {
+    for run in runs.iter().filter(|run| rows(run).next().is_some()) {
         let figure = match sizes(run).len() {
             1 => by_placement(run),
             _ => by_points(run),
@@ -49,12 +49,16 @@ fn placements(run: &Run) -> Vec<&str> {
     all
 }
 
-/// A method in whichever form is faster, and its threads.
-type Method<'a> = (&'a str, usize);
+/// Rows of one thread. Those of several are measured by the clock, not in processor time, so that both
+/// do not belong on one axis.
+fn rows(run: &Run) -> impl Iterator<Item = &FrameRow> {
+    run.rows.iter().filter(|row| row.threads == 1)
+}
 
-fn methods(run: &Run) -> Vec<Method<'_>> {
-    let mut all: Vec<Method> = Vec::new();
-    for row in &run.rows {
+/// Names of methods, whichever form is faster.
+fn methods(run: &Run) -> Vec<&str> {
+    let mut all: Vec<&str> = Vec::new();
+    for row in rows(run) {
         let method = method(row);
         if !all.contains(&method) {
             all.push(method);
@@ -63,32 +67,16 @@ fn methods(run: &Run) -> Vec<Method<'_>> {
     all
 }
 
-fn method(row: &FrameRow) -> Method<'_> {
-    let name = row.method.strip_suffix(CULLED).unwrap_or(&row.method);
-    (name, row.threads)
-}
-
-/// Ours on several threads is dashed.
-fn look(&(name, threads): &Method) -> Look {
-    match looks::look(name) {
-        looks::OURS if threads > 1 => Look {
-            mark: Mark::Ring,
-            line: Line::Dashed,
-            ..looks::OURS
-        },
-        look => look,
-    }
+fn method(row: &FrameRow) -> &str {
+    row.method.strip_suffix(CULLED).unwrap_or(&row.method)
 }
 
 fn entries(run: &Run) -> Vec<Entry> {
     methods(run)
         .iter()
         .map(|method| Entry {
-            look: look(method),
-            label: match method.1 {
-                1 => looks::title(method.0),
-                threads => format!("{}, {threads} threads", looks::title(method.0)),
-            },
+            look: looks::look(method),
+            label: looks::title(method),
         })
         .collect()
 }
@@ -123,8 +111,8 @@ fn name(run: &Run) -> String {
 fn notes(run: &Run) -> Vec<String> {
     vec![
         format!(
-            "Medians of {} frames; bars from the fastest to the slowest. Peers on one thread, as they \
-             are or culled to the overlap of both bounds, whichever is faster.",
+            "Medians of {} frames; bars from the fastest to the slowest. Peers as they are, or culled \
+             to the overlap of both bounds, whichever is faster.",
             run.rows[0].frames
         ),
         "Peers pair balls or voxels, this project finds surfaces, gaps and contact patches: the chart \
@@ -135,7 +123,7 @@ fn notes(run: &Run) -> Vec<String> {
 }
 
 const ABOUT: &str = "From points to contacts, all points new: building what the method needs, and the query. \
-                     Processor time on one thread, by the clock on several.";
+                     Processor time of one thread.";
 
 fn by_points(run: &Run) -> Figure {
     let panels = placements(run)
@@ -145,11 +133,11 @@ fn by_points(run: &Run) -> Figure {
                 .iter()
                 .rev() // ours, which come first, above the others
                 .map(|wanted| Curve {
-                    look: look(wanted),
+                    look: looks::look(wanted),
                     points: sizes(run)
                         .into_iter()
                         .filter_map(|points| {
-                            let rows = run.rows.iter().filter(|row| {
+                            let rows = rows(run).filter(|row| {
                                 row.placement == placement
                                     && row.points == points
                                     && method(row) == *wanted
@@ -196,14 +184,12 @@ fn by_placement(run: &Run) -> Figure {
         .iter()
         .rev()
         .map(|wanted| Curve {
-            look: look(wanted),
+            look: looks::look(wanted),
             points: placements
                 .iter()
                 .enumerate()
                 .filter_map(|(k, placement)| {
-                    let rows = run
-                        .rows
-                        .iter()
+                    let rows = rows(run)
                         .filter(|row| row.placement == *placement && method(row) == *wanted);
                     fastest(rows).map(|row| point(k as f64, row))
                 })

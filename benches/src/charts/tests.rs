@@ -177,6 +177,11 @@ fn peers_are_drawn_in_their_best_form() {
             frame("bit grid, culled", "deep", 1_000, 3.0),
             frame("bit grid", "deep", 2_000, 5.0),
             frame("bit grid, culled", "deep", 2_000, 6.0),
+            // By the clock: not to be drawn beside processor time.
+            FrameRow {
+                threads: 2,
+                ..frame("bit grid", "deep", 2_000, 1.0)
+            },
         ],
     };
     let figures = frames::figures(&[run.clone(), run]);
