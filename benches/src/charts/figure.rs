@@ -14,6 +14,7 @@ pub(super) struct Figure {
     pub(super) panels: Vec<Panel>,
     /// Panels beside each other.
     pub(super) columns: usize,
+    /// Width, if words need no more, and height.
     pub(super) panel_size: [i32; 2],
     pub(super) legend: Vec<Entry>,
     /// Below the legend: what a reader must know, and where the numbers come from.

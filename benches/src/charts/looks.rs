@@ -68,3 +68,8 @@ pub(super) fn title(method: &str) -> String {
 pub(super) fn model_color(index: usize) -> Color {
     OF_MODELS[index % OF_MODELS.len()]
 }
+
+/// Of the `index`-th resolution of the paper's image, beside ours.
+pub(super) fn resolution_color(index: usize) -> Color {
+    [BLACK, BLUE, SKY, GREEN][index % 4]
+}

@@ -57,8 +57,19 @@ pub(super) fn save(figure: &Figure, folder: &Path) -> Result<[PathBuf; 2], Chart
     Ok([svg, png])
 }
 
+/// As wide as the panels, or as the longest line if that is wider.
 fn width(figure: &Figure) -> i32 {
-    2 * MARGIN + figure.columns as i32 * figure.panel_size[0]
+    let length = |line: &String, size: i32| line.chars().count() as i32 * size / 2;
+    let lines = figure.subtitle.iter().map(|line| length(line, 15));
+    let notes = figure.notes.iter().map(|line| length(line, 14));
+    let words = lines.chain(notes).chain([length(&figure.title, 23)]).max();
+    let panels = figure.columns as i32 * figure.panel_size[0];
+    2 * MARGIN + panels.max(words.unwrap_or(0))
+}
+
+fn panel_size(figure: &Figure) -> [i32; 2] {
+    let width = (width(figure) - 2 * MARGIN) / figure.columns as i32;
+    [width, figure.panel_size[1]]
 }
 
 fn legend_columns(figure: &Figure) -> i32 {
@@ -96,9 +107,9 @@ where
     let top = head(figure);
     for (k, panel) in figure.panels.iter().enumerate() {
         let (row, column) = ((k / figure.columns) as i32, (k % figure.columns) as i32);
-        let [w, h] = figure.panel_size;
+        let [w, h] = panel_size(figure);
         let corner = (MARGIN + column * w, top + row * h);
-        paint_panel(panel, &Plot::new(panel, corner, figure.panel_size), canvas)?;
+        paint_panel(panel, &Plot::new(panel, corner, [w, h]), canvas)?;
     }
     let rows = figure.panels.len().div_ceil(figure.columns) as i32;
     let mut y = top + rows * figure.panel_size[1];

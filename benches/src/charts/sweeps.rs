@@ -461,7 +461,7 @@ fn radius_scale(runs: &[Run]) -> Option<Figure> {
         let rows = || run.rows.iter().filter(|row| row.noise == 0.0);
         let mut curves = Vec::new();
         for (k, &pixels) in resolutions.iter().enumerate() {
-            let look = paper_look(looks::model_color(k));
+            let look = paper_look(looks::resolution_color(k));
             let of_paper = rows().filter(|row| is_paper(row) && row.resolution == Some(pixels));
             curves.push(curve(of_paper, look, |row| row.radius_scale));
             let label = format!("the paper's, image of {pixels} × {pixels} pixels");
