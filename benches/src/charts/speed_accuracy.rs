@@ -289,6 +289,15 @@ fn provenances<'a>(models: &[Model<'a>]) -> impl Iterator<Item = &'a Provenance>
     models.iter().flat_map(|model| model.provenances.clone())
 }
 
+/// What is said where the curve begins and ends, if it goes anywhere.
+fn end_label(rows: &[&AccuracyRow], index: usize) -> Option<String> {
+    let place = |row: &AccuracyRow| [row.false_positive_pct, row.false_negative_pct];
+    let (first, last) = (rows.first()?, rows.last()?);
+    let is_end = index == 0 || index + 1 == rows.len();
+    let goes_anywhere = place(first) != place(last);
+    (is_end && goes_anywhere).then(|| setting_label(rows[index]))
+}
+
 /// Missed against invented contacts.
 fn kinds_figure(models: &[Model], name: String) -> Figure {
     let mut legend: Vec<Entry> = Vec::new();
@@ -328,8 +337,7 @@ fn kinds_figure(models: &[Model], name: String) -> Figure {
                     .map(|(k, row)| Point {
                         x: row.false_positive_pct,
                         y: row.false_negative_pct,
-                        // Where the curve begins and ends.
-                        label: (k == 0 || k + 1 == rows.len()).then(|| setting_label(row)),
+                        label: end_label(rows, k),
                         ..Point::default()
                     })
                     .collect(),
