@@ -1,8 +1,15 @@
 //! What the benches share: clouds that a sensor could have handed over this very frame.
 
+pub mod accuracy;
+pub mod charts;
+pub mod floor;
 pub mod mesh_truth;
+pub mod model;
 pub mod peers;
+pub mod placements;
 pub mod protocol;
+pub mod stopwatch;
+pub mod stored;
 
 use std::collections::HashMap;
 use tldi::PointCloud;

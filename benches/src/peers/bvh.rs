@@ -1,10 +1,10 @@
 //! parry's bounding volume hierarchy, rebuilt in every frame.
 
 use super::{Found, Frame, Peer};
+use crate::stopwatch::Stopwatch;
 use rapier3d::math::Vector;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy};
-use std::time::Instant;
 use tldi::glamx::Vec3;
 
 /// A hierarchy of the balls of each body, both built anew, descended together.
@@ -36,7 +36,7 @@ impl Peer for BvhRebuild {
     }
 
     fn compare(&mut self, frame: &Frame) -> Found {
-        let start = Instant::now();
+        let start = Stopwatch::of_thread();
         let build = |points: &[Vec3]| {
             let leaves: Vec<Aabb> = points
                 .iter()
@@ -45,11 +45,11 @@ impl Peer for BvhRebuild {
             Bvh::from_leaves(self.strategy, &leaves)
         };
         let (a, b) = (build(frame.a), build(frame.b));
-        let built = start.elapsed().as_secs_f64();
+        let built = start.seconds();
         let contacts = overlapping(&a, &b, frame);
         Found {
             build_seconds: built,
-            query_seconds: start.elapsed().as_secs_f64() - built,
+            query_seconds: start.seconds() - built,
             collides: contacts > 0,
             contacts,
         }

@@ -1,24 +1,33 @@
 //! Any peer after the points outside of the overlap of the bounds have been dropped.
 
 use super::{Found, Frame, Peer};
-use std::time::Instant;
+use crate::stopwatch::Stopwatch;
 use tldi::Aabb;
 use tldi::glamx::Vec3;
 
 /// The peer's best form: what cannot touch is dropped before anything is built.
 pub struct Culled<P> {
     inner: P,
-    a: Vec<Vec3>,
-    b: Vec<Vec3>,
+    kept: [Kept; 2],
 }
+
+/// What is left of a body.
+#[derive(Default)]
+struct Kept {
+    points: Vec<Vec3>,
+    faces: Vec<[u32; 3]>,
+    /// New number of every vertex of a mesh, or [`DROPPED`].
+    numbers: Vec<u32>,
+}
+
+const DROPPED: u32 = u32::MAX;
 
 impl<P: Peer> Culled<P> {
     /// `inner` behind a cull.
     pub fn new(inner: P) -> Self {
         Self {
             inner,
-            a: Vec::new(),
-            b: Vec::new(),
+            kept: Default::default(),
         }
     }
 }
@@ -27,28 +36,70 @@ fn bounds(points: &[Vec3]) -> Aabb {
     points.iter().fold(Aabb::EMPTY, |all, p| all.including(*p))
 }
 
+impl Kept {
+    fn keep_points(&mut self, points: &[Vec3], overlap: &Aabb) {
+        self.points.clear();
+        self.points
+            .extend(points.iter().filter(|p| overlap.contains(**p)));
+    }
+
+    /// Faces whose bounds reach into the overlap, with their vertices.
+    fn keep_faces(&mut self, points: &[Vec3], faces: &[[u32; 3]], overlap: &Aabb) {
+        self.points.clear();
+        self.faces.clear();
+        self.numbers.clear();
+        self.numbers.resize(points.len(), DROPPED);
+        for face in faces {
+            let corners = face.map(|i| points[i as usize]);
+            if bounds(&corners).intersection(*overlap).is_empty() {
+                continue;
+            }
+            let numbered = face.map(|i| {
+                let number = &mut self.numbers[i as usize];
+                if *number == DROPPED {
+                    *number = self.points.len() as u32;
+                    self.points.push(points[i as usize]);
+                }
+                *number
+            });
+            self.faces.push(numbered);
+        }
+    }
+}
+
 impl<P: Peer> Peer for Culled<P> {
     fn name(&self) -> String {
         format!("{}, culled", self.inner.name())
     }
 
+    fn needs_faces(&self) -> bool {
+        self.inner.needs_faces()
+    }
+
+    fn refuses(&self, frame: &Frame) -> Option<&'static str> {
+        self.inner.refuses(frame)
+    }
+
     fn compare(&mut self, frame: &Frame) -> Found {
-        let start = Instant::now();
+        let start = Stopwatch::of_thread();
         let margin = 2.0 * frame.radius;
         let overlap = bounds(frame.a)
             .loosened(margin)
             .intersection(bounds(frame.b).loosened(margin));
-        for (kept, all) in [(&mut self.a, frame.a), (&mut self.b, frame.b)] {
-            kept.clear();
-            kept.extend(all.iter().filter(|p| overlap.contains(**p)));
+        let all_faces = frame.faces.filter(|_| self.needs_faces());
+        for (side, points) in [frame.a, frame.b].into_iter().enumerate() {
+            match all_faces {
+                Some(faces) => self.kept[side].keep_faces(points, faces[side], &overlap),
+                None => self.kept[side].keep_points(points, &overlap),
+            }
         }
-        let cull_seconds = start.elapsed().as_secs_f64();
+        let cull_seconds = start.seconds();
         let mut found = Found::default();
-        if !self.a.is_empty() && !self.b.is_empty() {
+        let [a, b] = &self.kept;
+        if !a.points.is_empty() && !b.points.is_empty() {
             found = self.inner.compare(&Frame {
-                a: &self.a,
-                b: &self.b,
-                radius: frame.radius,
+                faces: all_faces.map(|_| [&a.faces[..], &b.faces[..]]),
+                ..Frame::new(&a.points, &b.points, frame.radius)
             });
         }
         found.build_seconds += cull_seconds;

@@ -1,7 +1,7 @@
 //! A uniform grid by counting sort, rebuilt in every frame.
 
 use super::{Found, Frame, Peer};
-use std::time::Instant;
+use crate::stopwatch::Stopwatch;
 use tldi::Aabb;
 use tldi::glamx::{UVec3, Vec3};
 
@@ -13,6 +13,7 @@ const MAX_CELLS: f32 = (1 << 24) as f32;
 pub struct Grid {
     cells: Vec<u32>,
     starts: Vec<u32>,
+    cursors: Vec<u32>,
     sorted: Vec<Vec3>,
 }
 
@@ -81,9 +82,9 @@ impl Grid {
             self.starts[k] += self.starts[k - 1];
         }
         self.sorted.resize(points.len(), Vec3::ZERO);
-        let mut cursors = self.starts.clone();
+        self.cursors.clone_from(&self.starts);
         for (p, cell) in points.iter().zip(&self.cells) {
-            let cursor = &mut cursors[*cell as usize];
+            let cursor = &mut self.cursors[*cell as usize];
             self.sorted[*cursor as usize] = *p;
             *cursor += 1;
         }
@@ -111,15 +112,15 @@ impl Peer for Grid {
     }
 
     fn compare(&mut self, frame: &Frame) -> Found {
-        let start = Instant::now();
+        let start = Stopwatch::of_thread();
         let reach = 2.0 * frame.radius;
         let cells = Cells::new(frame.a, reach);
         self.sort(frame.a, &cells);
-        let built = start.elapsed().as_secs_f64();
+        let built = start.seconds();
         let contacts = frame.b.iter().map(|p| self.near(*p, &cells, reach)).sum();
         Found {
             build_seconds: built,
-            query_seconds: start.elapsed().as_secs_f64() - built,
+            query_seconds: start.seconds() - built,
             collides: contacts > 0,
             contacts,
         }

@@ -1,33 +1,64 @@
-//! What a user would pick instead, each in its own file behind one small trait.
+//! Ours, and what a user would pick instead, each in its own file behind one small trait.
 //!
-//! Peers answer whether balls of the points overlap, and how many pairs of them. All get points that
-//! are new in every frame, and build what they need anew.
+//! All get points that are new in every frame, and build what they need anew. Peers that take points
+//! for balls answer whether balls overlap, and how many pairs of them do.
 
+mod ball_compound;
 mod bit_grid;
 mod bvh;
 mod culled;
 mod grid;
+mod kd_tree;
 mod refit;
+mod tldi;
+mod tri_mesh;
 mod voxels;
 
+pub use ball_compound::BallCompound;
 pub use bit_grid::BitGrid;
 pub use bvh::BvhRebuild;
 pub use culled::Culled;
 pub use grid::Grid;
+pub use kd_tree::KdTreeRebuild;
 pub use refit::BvhRefit;
+pub use tldi::{Method, TldiPeer};
+pub use tri_mesh::TriMeshPeer;
 pub use voxels::VoxelsRebuild;
 
-use tldi::glamx::Vec3;
+use ::tldi::Backend;
+use ::tldi::glamx::Vec3;
+use rapier3d::geometry::ContactManifold;
+use rapier3d::math::{Pose, Vector};
+use rapier3d::parry::partitioning::BvhBuildStrategy;
+use rapier3d::parry::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, Unsupported};
+use rapier3d::parry::shape::Shape;
 
-/// Points of both bodies in one frame, metres.
+/// Points of both bodies in one frame, metres, in one frame of reference.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// Of the first body.
     pub a: &'a [Vec3],
     /// Of the second body.
     pub b: &'a [Vec3],
-    /// Radius of all balls.
+    /// Radius of all balls, metres.
     pub radius: f32,
+    /// Radii of the points of both, for methods that take one a point, metres.
+    pub radii: Option<[&'a [f32]; 2]>,
+    /// Faces over the points of both, as indices, where the points are those of meshes.
+    pub faces: Option<[&'a [[u32; 3]]; 2]>,
+}
+
+impl<'a> Frame<'a> {
+    /// Points alone, with one radius for all.
+    pub fn new(a: &'a [Vec3], b: &'a [Vec3], radius: f32) -> Self {
+        Self {
+            a,
+            b,
+            radius,
+            radii: None,
+            faces: None,
+        }
+    }
 }
 
 /// What a peer found, and how long it took.
@@ -48,6 +79,78 @@ pub trait Peer {
     /// Name in tables.
     fn name(&self) -> String;
 
-    /// One frame.
+    /// Whether it works on meshes, not on points.
+    fn needs_faces(&self) -> bool {
+        false
+    }
+
+    /// What compared the last frame, of methods that have a backend.
+    fn backend(&self) -> Option<&dyn Backend> {
+        None
+    }
+
+    /// Why the method is not measured with such a frame, if it is not.
+    fn refuses(&self, frame: &Frame) -> Option<&'static str> {
+        let lacks_faces = self.needs_faces() && frame.faces.is_none();
+        lacks_faces.then_some("a mesh is needed")
+    }
+
+    /// One frame, which the method does not [refuse](Self::refuses).
     fn compare(&mut self, frame: &Frame) -> Found;
+}
+
+/// All peers, each as it is and in its best form: after a cull to the overlap of the bounds, where
+/// that can be done.
+pub fn all_peers() -> Vec<Box<dyn Peer>> {
+    let bvh = |strategy| BvhRebuild { strategy };
+    let (binned, ploc) = (BvhBuildStrategy::Binned, BvhBuildStrategy::Ploc);
+    vec![
+        Box::new(bvh(binned)),
+        Box::new(Culled::new(bvh(binned))),
+        Box::new(bvh(ploc)),
+        Box::new(Culled::new(bvh(ploc))),
+        Box::new(BvhRefit::default()),
+        Box::new(VoxelsRebuild::default()),
+        Box::new(Culled::new(VoxelsRebuild::default())),
+        Box::new(KdTreeRebuild::default()),
+        Box::new(Culled::new(KdTreeRebuild::default())),
+        Box::new(Grid::default()),
+        Box::new(Culled::new(Grid::default())),
+        Box::new(BitGrid::default()),
+        Box::new(Culled::new(BitGrid::default())),
+        Box::new(BallCompound),
+        Box::new(Culled::new(BallCompound)),
+        Box::new(TriMeshPeer::rebuilt()),
+        Box::new(Culled::new(TriMeshPeer::rebuilt())),
+        Box::new(TriMeshPeer::updated()),
+    ]
+}
+
+/// Whether a name has one of the words `only`, if there are any, and none of those `without`.
+pub fn is_wanted(name: &str, only: &[String], without: &[String]) -> bool {
+    let has = |word: &String| name.contains(word.as_str());
+    (only.is_empty() || only.iter().any(has)) && !without.iter().any(has)
+}
+
+#[cfg(test)]
+mod tests;
+
+/// As parry has it.
+fn vector(p: &Vec3) -> Vector {
+    Vector::new(p.x, p.y, p.z)
+}
+
+/// Points of contact of two shapes in one frame of reference that touch, by rapier's manifolds.
+fn touching_points(a: &dyn Shape, b: &dyn Shape) -> Result<usize, Unsupported> {
+    let mut manifolds: Vec<ContactManifold> = Vec::new();
+    DefaultQueryDispatcher.contact_manifolds(
+        &Pose::IDENTITY,
+        a,
+        b,
+        0.0,
+        &mut manifolds,
+        &mut None,
+    )?;
+    let points = manifolds.iter().flat_map(|manifold| &manifold.points);
+    Ok(points.filter(|point| point.dist <= 0.0).count())
 }

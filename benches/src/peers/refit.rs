@@ -2,9 +2,9 @@
 
 use super::bvh::{ball_bounds, overlapping};
 use super::{Found, Frame, Peer};
+use crate::stopwatch::Stopwatch;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
-use std::time::Instant;
 use tldi::glamx::Vec3;
 
 /// The hierarchies of the first frame, refitted: for points that keep their numbers. Where a sensor
@@ -32,18 +32,18 @@ impl Peer for BvhRefit {
         let [a, b] = self
             .trees
             .get_or_insert_with(|| [build(frame.a), build(frame.b)]);
-        let start = Instant::now();
+        let start = Stopwatch::of_thread();
         for (tree, points) in [(&mut *a, frame.a), (&mut *b, frame.b)] {
             for (i, p) in points.iter().enumerate() {
                 tree.insert_or_update_partially(ball_bounds(p, frame.radius), i as u32, 0.0);
             }
             tree.refit(&mut self.workspace);
         }
-        let built = start.elapsed().as_secs_f64();
+        let built = start.seconds();
         let contacts = overlapping(a, b, frame);
         Found {
             build_seconds: built,
-            query_seconds: start.elapsed().as_secs_f64() - built,
+            query_seconds: start.seconds() - built,
             collides: contacts > 0,
             contacts,
         }

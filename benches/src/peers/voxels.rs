@@ -1,11 +1,9 @@
 //! parry's voxels, rebuilt in every frame, with rapier's contact manifolds.
 
-use super::{Found, Frame, Peer};
-use rapier3d::geometry::ContactManifold;
-use rapier3d::math::{Pose, Vector};
-use rapier3d::parry::query::{DefaultQueryDispatcher, PersistentQueryDispatcher};
+use super::{Found, Frame, Peer, touching_points, vector};
+use crate::stopwatch::Stopwatch;
+use rapier3d::math::Vector;
 use rapier3d::parry::shape::Voxels;
-use std::time::Instant;
 use tldi::glamx::Vec3;
 
 /// Voxels as large as the balls.
@@ -20,31 +18,19 @@ impl Peer for VoxelsRebuild {
     }
 
     fn compare(&mut self, frame: &Frame) -> Found {
-        let start = Instant::now();
+        let start = Stopwatch::of_thread();
         let mut build = |points: &[Vec3]| {
             self.points.clear();
-            self.points
-                .extend(points.iter().map(|p| Vector::new(p.x, p.y, p.z)));
+            self.points.extend(points.iter().map(vector));
             Voxels::from_points(Vector::splat(2.0 * frame.radius), &self.points)
         };
         let (a, b) = (build(frame.a), build(frame.b));
-        let built = start.elapsed().as_secs_f64();
-        let mut manifolds: Vec<ContactManifold> = Vec::new();
-        let mut workspace = None;
-        let outcome = DefaultQueryDispatcher.contact_manifolds(
-            &Pose::IDENTITY,
-            &a,
-            &b,
-            0.0,
-            &mut manifolds,
-            &mut workspace,
-        );
-        let points = manifolds.iter().flat_map(|manifold| &manifold.points);
-        let contacts = points.filter(|point| point.dist <= 0.0).count();
+        let built = start.seconds();
+        let contacts = touching_points(&a, &b).unwrap_or(0);
         Found {
             build_seconds: built,
-            query_seconds: start.elapsed().as_secs_f64() - built,
-            collides: outcome.is_ok() && contacts > 0,
+            query_seconds: start.seconds() - built,
+            collides: contacts > 0,
             contacts,
         }
     }

@@ -1,0 +1,30 @@
+//! The charts of the benches, from stored results alone.
+
+#![allow(
+    clippy::print_stdout,
+    reason = "a list of what was drawn is the output"
+)]
+
+use clap::Parser;
+use std::path::PathBuf;
+use tldi_benches::charts::draw_all;
+
+/// Draws charts of the results that `accuracy` and `bvh_vs_tldi` stored with --json, as SVG and PNG.
+/// Nothing is measured.
+#[derive(Parser)]
+struct Args {
+    /// Folder with the results (*.json)
+    #[arg(long, value_name = "DIR", default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/results"))]
+    results: PathBuf,
+    /// Folder for the charts (that of the results without)
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+fn main() -> anyhow::Result<()> {
+    let args = Args::parse();
+    for file in draw_all(&args.results, args.out.as_ref().unwrap_or(&args.results))? {
+        println!("{}", file.display());
+    }
+    Ok(())
+}

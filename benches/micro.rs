@@ -1,0 +1,180 @@
+//! Times of the CPU's stages, as far as they can be called apart: clouds, images, casts, whole
+//! comparisons, and a surface that pushes a body.
+
+use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use rapier3d::prelude::*;
+use rapier3d_tldi::prelude::{TldiConfig, TldiPipeline};
+use std::hint::black_box;
+use std::time::Duration;
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{
+    Backend, CpuBackend, ImpactQuery, PairQuery, PairResult, Params, PointCloud, Surface, View,
+    VirtualCamera, build,
+};
+use tldi_benches::placements::{Placement, Source};
+use tldi_benches::{SHEET_EDGE, bumpy_sheet};
+use tldi_tests::HalfSpace;
+
+/// Points of each cloud.
+const POINTS: [usize; 2] = [10_000, 100_000];
+
+fn body(points: usize) -> (Vec<Vec3>, f32) {
+    let source = Source::Generated(points);
+    let radius = source.radius().expect("a generated body has a radius");
+    (source.points(1), radius)
+}
+
+fn cloud_of(points: &[Vec3], radius: f32) -> PointCloud<'static> {
+    let cloud = PointCloud::builder(points.to_vec()).radius(radius).build();
+    cloud.expect("the points are finite")
+}
+
+/// From points to a cloud.
+fn clouds(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("cloud");
+    for count in POINTS {
+        group.throughput(Throughput::Elements(count as u64));
+        let (points, radius) = body(count);
+        let id = |name| BenchmarkId::new(name, count);
+        let mut warm = cloud_of(&points, radius);
+        group.bench_function(id("new points, one radius"), |b| {
+            b.iter(|| warm.set_points(black_box(&points), None));
+        });
+        group.bench_function(id("radii of 7 neighbours"), |b| {
+            b.iter(|| PointCloud::builder(&points).knn_radii(7, 0.65).build());
+        });
+        group.bench_function(id("normals of 16 neighbours"), |b| {
+            let builder = || PointCloud::builder(&points).radius(radius);
+            b.iter(|| builder().pca_normals(16).build());
+        });
+    }
+    group.finish();
+}
+
+/// From a whole cloud to an image of layers.
+fn images(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("image of a whole cloud");
+    for count in POINTS {
+        group.throughput(Throughput::Elements(count as u64));
+        let (points, radius) = body(count);
+        let cloud = cloud_of(&points, radius);
+        let camera = VirtualCamera::along(Vec3::X, radius);
+        for (name, params) in [
+            ("default", Params::for_radius(radius)),
+            ("paper", Params::paper(radius)),
+        ] {
+            group.bench_function(BenchmarkId::new(name, count), |b| {
+                b.iter(|| build(black_box(&cloud), &Pose3::IDENTITY, &camera, &params));
+            });
+        }
+    }
+    group.finish();
+}
+
+fn query<'a>(a: Surface<'a>, b: &'a PointCloud, pose: Pose3, radius: f32) -> PairQuery<'a> {
+    PairQuery {
+        a,
+        b: Surface::Cloud(b),
+        a_from_b: pose,
+        view: View::aimed(),
+        params: Params::for_radius(radius),
+    }
+}
+
+/// Whole comparisons with warm memory.
+fn comparisons(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("compare");
+    let (mut backend, mut results) = (CpuBackend::new(), Vec::<PairResult>::new());
+    let mut compare = |query: PairQuery| {
+        let outcome = backend.compare(&[query], &mut results);
+        outcome.expect("the pair is supported");
+    };
+    for count in POINTS {
+        let (points, radius) = body(count);
+        for placement in Placement::ALL {
+            let [a, b] = Source::Generated(count)
+                .bodies(placement, radius, 1)
+                .map(|points| cloud_of(&points, radius));
+            let query = query(Surface::Cloud(&a), &b, Pose3::IDENTITY, radius);
+            group.bench_function(BenchmarkId::new(placement.name(), count), |bench| {
+                bench.iter(|| compare(query));
+            });
+        }
+        // The bumpy ball, 2 radii deep in the ground: its image against cast rays.
+        let ball = cloud_of(&points, radius);
+        let up = Pose3::translation(0.0, -ball.bounds().min.y - 2.0 * radius, 0.0);
+        let query = query(Surface::Exact(&HalfSpace), &ball, up, radius);
+        group.bench_function(BenchmarkId::new("exact half-space", count), |bench| {
+            bench.iter(|| compare(query));
+        });
+    }
+    group.finish();
+}
+
+/// Straight casts of a cloud onto another.
+fn casts(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("cast");
+    let backend = CpuBackend::new();
+    for count in POINTS {
+        let (points, radius) = body(count);
+        let cloud = cloud_of(&points, radius);
+        let query = ImpactQuery {
+            a: Surface::Cloud(&cloud),
+            b: Surface::Cloud(&cloud),
+            a_from_b: Pose3::translation(3.0, 0.0, 0.0),
+            motion: -2.0 * Vec3::X,
+            touching: 0.0,
+            core_only: false,
+            params: Params::for_radius(radius),
+        };
+        group.bench_function(BenchmarkId::new("head on", count), |b| {
+            b.iter(|| backend.impact(black_box(&query)));
+        });
+    }
+    group.finish();
+}
+
+/// A step in which a sheet rises by as much as it was given, with a box on it.
+fn pushes(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("push of a surface");
+    for count in POINTS {
+        let sheet = bumpy_sheet(count, true, 1);
+        let low: Vec<Vec3> = sheet.points().collect();
+        let normals = sheet.normals().map(<[Vec3]>::to_vec);
+        let mut world = PhysicsWorld::default();
+        let mut tldi = TldiPipeline::new(TldiConfig::default()).expect("the defaults are valid");
+        tldi.attach(&mut world);
+        let (_, collider) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(sheet));
+        let edge = 0.1 * SHEET_EDGE;
+        let start = RigidBodyBuilder::dynamic().translation(edge * Vector::Y);
+        world.insert(start, ColliderBuilder::cuboid(edge, 0.5 * edge, edge));
+        let mut height = 0.0;
+        let mut next = || {
+            height += 1e-4;
+            let up = height * Vec3::Y;
+            low.iter().map(|p| *p + up).collect::<Vec<Vec3>>()
+        };
+        group.bench_function(BenchmarkId::new("deform and step", count), |b| {
+            b.iter_batched(
+                &mut next,
+                |points| {
+                    tldi.deform(&mut world, collider, &points, normals.as_deref())
+                        .expect("as many points as before");
+                    tldi.step(&mut world).expect("the step is possible")
+                },
+                BatchSize::PerIteration,
+            );
+        });
+    }
+    group.finish();
+}
+
+criterion_group! {
+    name = stages;
+    config = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2));
+    targets = clouds, images, comparisons, casts, pushes
+}
+criterion_main!(stages);

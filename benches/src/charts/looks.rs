@@ -1,0 +1,75 @@
+//! One look a method, the same in all charts.
+
+use super::figure::{Color, Line, Look, Mark};
+
+/// Colours that the colour-blind can tell apart (Okabe and Ito), darker where they are too light for
+/// lines.
+const BLUE: Color = [0, 114, 178];
+const SKY: Color = [66, 160, 213];
+const GREEN: Color = [0, 138, 105];
+const ORANGE: Color = [210, 140, 0];
+pub(super) const RED: Color = [213, 94, 0];
+const PURPLE: Color = [184, 91, 147];
+pub(super) const BLACK: Color = [0, 0, 0];
+const GRAY: Color = [120, 120, 120];
+
+/// Colours of models.
+const OF_MODELS: [Color; 6] = [BLUE, RED, GREEN, PURPLE, ORANGE, SKY];
+
+/// What a method's name begins with, and how it looks.
+const METHODS: [(&str, Color, Mark); 11] = [
+    ("bit grid", ORANGE, Mark::Disc),
+    ("grid", BLUE, Mark::Disc),
+    ("k-d tree", PURPLE, Mark::Triangle),
+    ("bvh rebuild (binned)", GREEN, Mark::Square),
+    ("bvh rebuild (ploc)", GREEN, Mark::Ring),
+    ("bvh refit", GREEN, Mark::Cross),
+    ("voxels", SKY, Mark::Diamond),
+    ("compound of balls", GRAY, Mark::Square),
+    ("mesh rebuild", GRAY, Mark::Triangle),
+    ("mesh set_vertices", GRAY, Mark::Cross),
+    ("paper", BLACK, Mark::Disc),
+];
+
+/// Of ours.
+pub(super) const OURS: Look = Look {
+    color: RED,
+    mark: Mark::Star,
+    line: Line::Thick,
+};
+
+/// Of a row's method, whatever its form.
+pub(super) fn look(method: &str) -> Look {
+    if method == "default" || method.starts_with("tldi") {
+        return OURS;
+    }
+    let known = METHODS.iter().find(|(name, ..)| method.starts_with(name));
+    let &(_, color, mark) = known.unwrap_or(&("", GRAY, Mark::Ring));
+    Look {
+        color,
+        mark,
+        line: Line::Thin,
+    }
+}
+
+/// Name for a reader who does not know the code.
+pub(super) fn title(method: &str) -> String {
+    match method {
+        "default" => "this project".to_owned(),
+        "paper" => "the paper's method, on the CPU".to_owned(),
+        _ => match method.strip_prefix("tldi ") {
+            Some(backend) => format!("this project {backend}"),
+            None => method.to_owned(),
+        },
+    }
+}
+
+/// Of the `index`-th model of a chart.
+pub(super) fn model_color(index: usize) -> Color {
+    OF_MODELS[index % OF_MODELS.len()]
+}
+
+/// Of the `index`-th resolution of the paper's image, beside ours.
+pub(super) fn resolution_color(index: usize) -> Color {
+    [BLACK, BLUE, SKY, GREEN][index % 4]
+}

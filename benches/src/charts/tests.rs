@@ -1,0 +1,240 @@
+use super::*;
+use crate::stored::DistanceTally;
+
+fn folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("tldi_charts_{name}_{}", std::process::id()));
+    // Of a run that was broken off.
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("the folder for temporary files can be written");
+    folder
+}
+
+fn provenance(commit: &str) -> Provenance {
+    Provenance {
+        date: "2026-01-31".to_owned(),
+        cpu: "a processor".to_owned(),
+        cores: 2,
+        commit: commit.to_owned(),
+        features: vec!["release".to_owned()],
+        adapter: Some("a device".to_owned()),
+    }
+}
+
+fn accuracy(variant: &str, wrong: usize, median_ms: f64) -> AccuracyRow {
+    let wrong_pct = 100.0 * wrong as f64 / 1000.0;
+    AccuracyRow {
+        model: "a ball".to_owned(),
+        points: 4321,
+        cases: 1000,
+        variant: variant.to_owned(),
+        backend: None,
+        rho: None,
+        resolution: None,
+        pixel_scale: None,
+        radius_scale: Some(1.0),
+        noise: 0.0,
+        false_negative_pct: wrong_pct,
+        false_positive_pct: 0.0,
+        error_pct: wrong_pct,
+        colliding_pct: 60.0,
+        worst_false_negative_mean_radii: 0.1,
+        median_ms,
+        lower_quartile_ms: 0.5 * median_ms,
+        upper_quartile_ms: 2.0 * median_ms,
+        by_distance: vec![DistanceTally {
+            distance: 1.5,
+            cases: 1000,
+            false_negatives: wrong,
+            false_positives: 0,
+        }],
+    }
+}
+
+fn ours(pixel_scale: f32, wrong: usize, median_ms: f64) -> AccuracyRow {
+    AccuracyRow {
+        pixel_scale: Some(pixel_scale),
+        ..accuracy("default", wrong, median_ms)
+    }
+}
+
+fn paper(rho: f32, noise: f32, wrong: usize) -> AccuracyRow {
+    AccuracyRow {
+        rho: Some(rho),
+        resolution: Some(1024),
+        noise,
+        ..accuracy("paper", wrong, 50.0)
+    }
+}
+
+fn frame(method: &str, placement: &str, points: usize, total_ms: f64) -> FrameRow {
+    FrameRow {
+        model: "a ball".to_owned(),
+        points,
+        points_b: points,
+        placement: placement.to_owned(),
+        method: method.to_owned(),
+        threads: 1,
+        build_ms: 0.5 * total_ms,
+        query_ms: 0.5 * total_ms,
+        total_ms,
+        least_ms: 0.9 * total_ms,
+        most_ms: 1.5 * total_ms,
+        frames: 3,
+        collides: true,
+        contacts: 12,
+        peak_mib: 1.0,
+        floor_ratio: 9.0,
+    }
+}
+
+fn names(files: &[PathBuf]) -> Vec<String> {
+    let name = |file: &PathBuf| {
+        file.file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
+    files.iter().map(name).collect()
+}
+
+/// Charts are drawn of what is stored, and say so: commits, machine, models, methods, settings.
+#[test]
+fn stored_results_become_charts() {
+    let results = folder("good");
+    let rows = vec![
+        ours(1.0, 0, 5.0),
+        ours(2.0, 2, 2.0),
+        paper(0.05, 0.0, 4),
+        accuracy("bit grid, culled", 30, 1.0),
+        accuracy("grid (counting sort), culled", 30, 1.5),
+        accuracy("k-d tree rebuild (kiddo), culled", 30, 2.0),
+    ];
+    stored::write(&results.join("methods.json"), provenance("aaa1111"), rows).expect("written");
+    // The same method in a larger run, with fewer errors: that counts.
+    let many = AccuracyRow {
+        cases: 9000,
+        false_negative_pct: 0.1,
+        error_pct: 0.1,
+        by_distance: vec![DistanceTally {
+            distance: 1.5,
+            cases: 9000,
+            false_negatives: 9,
+            false_positives: 0,
+        }],
+        ..accuracy("bit grid, culled", 0, 1.0)
+    };
+    stored::write(
+        &results.join("many.json"),
+        provenance("ddd4444"),
+        vec![many],
+    )
+    .expect("written");
+    let rows = vec![
+        paper(0.01, 0.0, 3),
+        paper(0.05, 0.0, 4),
+        paper(0.05, 1.0, 9),
+    ];
+    stored::write(&results.join("sweep.json"), provenance("bbb2222"), rows).expect("written");
+    let rows = vec![
+        frame("tldi (cpu)", "deep", 1_000, 2.0),
+        frame("bit grid", "deep", 1_000, 4.0),
+        frame("bit grid, culled", "deep", 1_000, 3.0),
+        frame("bit grid, culled", "deep", 2_000, 6.0),
+    ];
+    stored::write(&results.join("frames.json"), provenance("ccc3333"), rows).expect("written");
+    let out = results.join("charts");
+    let files = draw_all(&results, &out).expect("they can be drawn");
+    let expected = [
+        "speed_accuracy",
+        "false_answers",
+        "error_rho",
+        "error_distance",
+        "error_noise",
+        "frame_cost_a_ball",
+    ];
+    let expected: Vec<String> = expected
+        .iter()
+        .flat_map(|name| ["svg", "png"].map(|kind| format!("{name}.{kind}")))
+        .collect();
+    assert_eq!(names(&files), expected);
+    for file in &files {
+        let length = std::fs::metadata(file).expect("it was drawn").len();
+        assert!(length > 3_000, "{}: {length} bytes", file.display());
+    }
+    let text = |name: &str| std::fs::read_to_string(out.join(name)).expect("it was drawn");
+    let main = text("speed_accuracy.svg");
+    for words in [
+        "2 × 4321 points, 1000 to 9000 cases",
+        "ddd4444",
+        "this project",
+        "bit grid, culled",
+        "Pareto front",
+        "pixel 1 r",
+        "aaa1111",
+        "a processor",
+        "a device",
+    ] {
+        assert!(main.contains(words), "{words}");
+    }
+    // Not on the front, so without its setting; and not of another run.
+    assert!(!main.contains("1024²") && !main.contains("bbb2222"));
+    assert!(
+        text("false_answers.svg").contains("grid (counting sort), culled and 1 that answer alike")
+    );
+    assert!(text("error_rho.svg").contains("Bunny 36k: 0.39 %"));
+    assert!(text("error_noise.svg").contains("bbb2222"));
+    assert!(text("frame_cost_a_ball.svg").contains("ccc3333"));
+    std::fs::remove_dir_all(results).expect("it is there");
+}
+
+/// The faster form of a peer is drawn, at its time.
+#[test]
+fn peers_are_drawn_in_their_best_form() {
+    let run = Stored {
+        kind: FrameRow::KIND.to_owned(),
+        provenance: provenance("aaa1111"),
+        rows: vec![
+            frame("bit grid", "deep", 1_000, 4.0),
+            frame("bit grid, culled", "deep", 1_000, 3.0),
+            frame("bit grid", "deep", 2_000, 5.0),
+            frame("bit grid, culled", "deep", 2_000, 6.0),
+            // By the clock: not to be drawn beside processor time.
+            FrameRow {
+                threads: 2,
+                ..frame("bit grid", "deep", 2_000, 1.0)
+            },
+        ],
+    };
+    let figures = frames::figures(&[run.clone(), run]);
+    let [first, second] = &figures[..] else {
+        panic!("a figure a run");
+    };
+    assert_eq!(second.name, format!("{}_2", first.name));
+    let [panel] = &first.panels[..] else {
+        panic!("a panel a placement");
+    };
+    let points: Vec<(f64, f64)> = panel.curves[0].points.iter().map(|p| (p.x, p.y)).collect();
+    assert_eq!(points, [(1_000.0, 3.0), (2_000.0, 5.0)]);
+    assert_eq!(panel.curves.len(), 1);
+}
+
+#[test]
+fn what_cannot_be_drawn_is_said() {
+    let results = folder("bad");
+    let refusal = || {
+        draw_all(&results, &results)
+            .expect_err("it is bad")
+            .to_string()
+    };
+    assert!(refusal().contains("no results of benches"), "{}", refusal());
+    std::fs::write(
+        results.join("other.json"),
+        "{\"rows\": [], \"kind\": \"taste\"}",
+    )
+    .expect("it can be written");
+    assert!(refusal().contains("other.json") && refusal().contains("taste"));
+    std::fs::write(results.join("other.json"), "[1, 2").expect("it can be written");
+    assert!(refusal().contains("other.json") && refusal().contains("line 1"));
+    std::fs::remove_dir_all(&results).expect("it is there");
+    assert!(refusal().contains("tldi_charts_bad"), "{}", refusal());
+}

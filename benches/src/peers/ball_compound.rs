@@ -1,0 +1,45 @@
+//! A ball for each point, as rapier's own primitives.
+
+use super::{Found, Frame, Peer, touching_points, vector};
+use crate::stopwatch::Stopwatch;
+use rapier3d::math::Pose;
+use rapier3d::parry::shape::{Compound, SharedShape};
+use tldi::glamx::Vec3;
+
+/// A compound of balls for each body, both built anew, with rapier's contact manifolds.
+pub struct BallCompound;
+
+/// Most points of a body: rapier keeps a manifold for each pair of balls.
+const MOST_POINTS: usize = 50_000;
+
+impl Peer for BallCompound {
+    fn name(&self) -> String {
+        "compound of balls".to_owned()
+    }
+
+    fn refuses(&self, frame: &Frame) -> Option<&'static str> {
+        let too_many = frame.a.len().max(frame.b.len()) > MOST_POINTS;
+        too_many
+            .then_some("more than 50,000 balls: a manifold for each pair of them needs too much")
+    }
+
+    fn compare(&mut self, frame: &Frame) -> Found {
+        let start = Stopwatch::of_thread();
+        let ball = SharedShape::ball(frame.radius);
+        let build = |points: &[Vec3]| {
+            let placed = points
+                .iter()
+                .map(|p| (Pose::from_translation(vector(p)), ball.clone()));
+            Compound::new(placed.collect())
+        };
+        let (a, b) = (build(frame.a), build(frame.b));
+        let built = start.seconds();
+        let contacts = touching_points(&a, &b).unwrap_or(0);
+        Found {
+            build_seconds: built,
+            query_seconds: start.seconds() - built,
+            collides: contacts > 0,
+            contacts,
+        }
+    }
+}

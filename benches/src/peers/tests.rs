@@ -1,0 +1,138 @@
+//! Peers against brute force, so that none of them is beaten for a bug.
+
+use super::*;
+use crate::bumpy_ball;
+use crate::mesh_truth::ExactMesh;
+use ::tldi::CpuBackend;
+use ::tldi::glamx::{Pose3, Quat};
+
+/// Two boxes of random points that overlap by a part or not at all.
+fn boxes(seed: u64, count: usize) -> [Vec<Vec3>; 2] {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let shift = 0.8 + 0.4 * rng.f32();
+    [0.0, shift].map(|x| {
+        let at = |_| Vec3::new(x + rng.f32(), rng.f32(), rng.f32());
+        (0..count).map(at).collect()
+    })
+}
+
+/// Every peer that tests balls finds the pairs that brute force finds, also in memory of frames
+/// before.
+#[test]
+fn balls_meet_those_that_brute_force_finds() {
+    let mut peers = all_peers();
+    peers.retain(|peer| !peer.needs_faces() && !peer.name().starts_with("voxels"));
+    assert_eq!(peers.len(), 13);
+    for seed in 0..30 {
+        let [a, b] = boxes(seed, 300);
+        let frame = Frame::new(&a, &b, 0.03);
+        let near = |p: &Vec3| b.iter().filter(|q| p.distance(**q) <= 0.06).count();
+        let expected: usize = a.iter().map(near).sum();
+        for peer in &mut peers {
+            for _ in 0..2 {
+                let found = peer.compare(&frame);
+                assert_eq!(found.contacts, expected, "seed {seed}: {}", peer.name());
+                assert_eq!(found.collides, expected > 0, "seed {seed}: {}", peer.name());
+            }
+        }
+    }
+}
+
+/// Voxels of one grid meet where they are the same or neighbours, and do not where a whole voxel is
+/// between them.
+#[test]
+fn voxels_meet_where_cells_do() {
+    let radius = 0.005;
+    let mut answers = [0; 2];
+    for seed in 0..60 {
+        let [a, b] = boxes(seed, 40);
+        let cell = |p: &Vec3| (*p / (2.0 * radius)).floor();
+        let apart = |p: &Vec3, q: &Vec3| (cell(p) - cell(q)).abs().max_element();
+        let least = a
+            .iter()
+            .flat_map(|p| b.iter().map(move |q| apart(p, q)))
+            .fold(f32::MAX, f32::min);
+        let plain: [Box<dyn Peer>; 2] = [
+            Box::new(VoxelsRebuild::default()),
+            Box::new(Culled::new(VoxelsRebuild::default())),
+        ];
+        for mut peer in plain {
+            let collides = peer.compare(&Frame::new(&a, &b, radius)).collides;
+            if least == 0.0 {
+                assert!(collides, "seed {seed}: {}", peer.name());
+            }
+            if least > 1.0 {
+                assert!(!collides, "seed {seed}: {}", peer.name());
+            }
+        }
+        answers[usize::from(least > 1.0)] += usize::from(least != 1.0);
+    }
+    assert!(answers[1] > 5, "{answers:?}");
+}
+
+/// Meshes, and ours on the points of meshes, answer as exact tests of all triangles do.
+#[test]
+fn surfaces_meet_where_triangles_do() {
+    let (points, faces) = bumpy_ball(2_000);
+    let exact = ExactMesh::new(&points, &faces);
+    let radius = crate::covering_radius(points.len(), 4.0 * std::f32::consts::PI);
+    let method = Method::Default { pixel_scale: 1.0 };
+    let mut peers = all_peers();
+    peers.retain(|peer| peer.needs_faces());
+    assert_eq!(peers.len(), 3);
+    peers.push(Box::new(
+        TldiPeer::new(Box::new(CpuBackend::new()), method, 1).expect("a thread can be started"),
+    ));
+    let mut answers = [0; 2];
+    let mut rng = fastrand::Rng::with_seed(7);
+    for _ in 0..20 {
+        // Well away from where they barely touch: 1.9 apart they are in each other by bumps or not.
+        let apart = if rng.bool() { 1.5 } else { 2.2 };
+        let turn = Quat::from_rotation_y(6.0 * rng.f32()) * Quat::from_rotation_z(6.0 * rng.f32());
+        let pose = Pose3::from_parts(apart * Vec3::X, turn);
+        let moved: Vec<Vec3> = points.iter().map(|p| pose * *p).collect();
+        let meets = exact.intersects(&exact, &pose);
+        answers[usize::from(meets)] += 1;
+        let frame = Frame {
+            faces: Some([&faces, &faces]),
+            ..Frame::new(&points, &moved, radius)
+        };
+        for peer in &mut peers {
+            assert_eq!(peer.refuses(&frame), None);
+            let found = peer.compare(&frame);
+            assert_eq!(found.collides, meets, "{apart}: {}", peer.name());
+            // Ours also tells of contacts that are not there yet.
+            let has_contacts = found.contacts > 0;
+            assert!(has_contacts || !meets, "{apart}: {}", peer.name());
+            assert!(
+                !has_contacts || meets || peer.backend().is_some(),
+                "{apart}: {}",
+                peer.name()
+            );
+        }
+    }
+    assert!(answers[0] > 3 && answers[1] > 3, "{answers:?}");
+}
+
+/// What a method cannot be measured with is said.
+#[test]
+fn frames_are_refused_with_a_reason() {
+    let points = vec![Vec3::ZERO; 60_000];
+    let frame = Frame::new(&points, &points[..100], 0.01);
+    let mut refusing: Vec<String> = all_peers()
+        .iter()
+        .filter(|peer| peer.refuses(&frame).is_some())
+        .map(|peer| peer.name())
+        .collect();
+    refusing.sort();
+    assert_eq!(
+        refusing,
+        [
+            "compound of balls",
+            "compound of balls, culled",
+            "mesh rebuild (TriMesh)",
+            "mesh rebuild (TriMesh), culled",
+            "mesh set_vertices (TriMesh)",
+        ]
+    );
+}

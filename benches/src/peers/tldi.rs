@@ -1,0 +1,153 @@
+//! Ours, and the paper's, as a peer: clouds get new points, then are compared.
+
+use super::{Found, Frame, Peer};
+use crate::stopwatch::Stopwatch;
+use ::tldi::glamx::{Pose3, Vec3};
+use ::tldi::{
+    Backend, PairQuery, PairResult, Params, PointCloud, Radii, Surface, View, VirtualCamera,
+};
+
+/// How clouds are compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// The default, with pixels of an edge of so many mean radii.
+    Default {
+        /// Edge of a pixel in mean radii.
+        pixel_scale: f32,
+    },
+    /// The paper's, with the camera of its protocol.
+    Paper {
+        /// Compression of depth ranges.
+        rho: f32,
+        /// Edge of the image in pixels.
+        resolution: u32,
+    },
+}
+
+impl Method {
+    fn view(self) -> View {
+        match self {
+            Self::Default { .. } => View::aimed(),
+            Self::Paper { resolution, .. } => View::Fixed(VirtualCamera::perspective(
+                4.0 * Vec3::Z,
+                Vec3::ZERO,
+                Vec3::Y,
+                std::f32::consts::FRAC_PI_2,
+                [resolution; 2],
+                1.0,
+                6.0,
+            )),
+        }
+    }
+
+    fn params(self, radius: f32) -> Params {
+        match self {
+            Self::Default { pixel_scale } => {
+                Params::for_radius(radius).with_pixel_size(pixel_scale * radius)
+            }
+            Self::Paper { rho, .. } => Params {
+                rho,
+                ..Params::paper(radius)
+            },
+        }
+    }
+}
+
+/// A backend, with clouds whose memory is reused.
+pub struct TldiPeer {
+    backend: Box<dyn Backend>,
+    threads: rayon::ThreadPool,
+    method: Method,
+    clouds: Option<[PointCloud<'static>; 2]>,
+    results: Vec<PairResult>,
+}
+
+impl TldiPeer {
+    /// `backend` on so many threads.
+    pub fn new(
+        backend: Box<dyn Backend>,
+        method: Method,
+        threads: usize,
+    ) -> Result<Self, rayon::ThreadPoolBuildError> {
+        Ok(Self {
+            backend,
+            threads: rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()?,
+            method,
+            clouds: None,
+            results: Vec::new(),
+        })
+    }
+
+    /// What was found in the last frame.
+    pub fn result(&self) -> Option<&PairResult> {
+        self.results.first()
+    }
+}
+
+/// Points and radii of this frame.
+fn fill(cloud: &mut PointCloud<'static>, frame: &Frame, side: usize) {
+    let points = [frame.a, frame.b][side];
+    let outcome = cloud
+        .set_radii(Radii::Global(frame.radius))
+        .and_then(|()| cloud.set_points(points, None))
+        .and_then(|()| match frame.radii {
+            Some(radii) => cloud.set_radii(Radii::PerPoint(radii[side].to_vec().into())),
+            None => Ok(()),
+        });
+    outcome.expect("the points and radii of a bench are finite");
+}
+
+impl Peer for TldiPeer {
+    fn name(&self) -> String {
+        match self.method {
+            Method::Default { .. } => format!("tldi ({})", self.backend.name()),
+            Method::Paper { .. } => format!("paper ({})", self.backend.name()),
+        }
+    }
+
+    fn backend(&self) -> Option<&dyn Backend> {
+        Some(&*self.backend)
+    }
+
+    fn compare(&mut self, frame: &Frame) -> Found {
+        let Self {
+            backend,
+            threads,
+            method,
+            clouds,
+            results,
+        } = self;
+        threads.install(|| {
+            let start = Stopwatch::of_threads(threads.current_num_threads());
+            let clouds = clouds.get_or_insert_with(|| {
+                [frame.a, frame.b].map(|points| {
+                    let builder = PointCloud::builder(points.to_vec()).radius(frame.radius);
+                    builder.build().expect("the points of a bench are finite")
+                })
+            });
+            for (side, cloud) in clouds.iter_mut().enumerate() {
+                fill(cloud, frame, side);
+            }
+            let built = start.seconds();
+            let [a, b] = &*clouds;
+            let query = PairQuery {
+                a: Surface::Cloud(a),
+                b: Surface::Cloud(b),
+                a_from_b: Pose3::IDENTITY,
+                view: method.view(),
+                params: method.params(a.mean_radius()),
+            };
+            backend
+                .compare(&[query], results)
+                .expect("two clouds are supported");
+            Found {
+                build_seconds: built,
+                query_seconds: start.seconds() - built,
+                collides: results[0].collides,
+                contacts: results[0].contacts.len(),
+            }
+        })
+    }
+}

@@ -1,0 +1,151 @@
+//! Rows of results.
+
+use super::Measured;
+use serde::{Deserialize, Serialize};
+
+/// Answers of one method, with its settings, to the cases of the accuracy protocol.
+#[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
+pub struct AccuracyRow {
+    /// Whose copies are compared.
+    pub model: String,
+    /// Of each copy.
+    pub points: usize,
+    /// How many of the protocol's 27,900.
+    pub cases: usize,
+    /// `default`, `paper` or the name of a peer.
+    pub variant: String,
+    /// What compared, of methods that have a backend.
+    pub backend: Option<String>,
+    /// ρ of the paper.
+    pub rho: Option<f32>,
+    /// Edge of the paper's image in pixels.
+    pub resolution: Option<u32>,
+    /// Edge of the default's pixels in mean radii.
+    pub pixel_scale: Option<f32>,
+    /// Radii of the points, of balls, half the edges of voxels: in units of 0.65 × the distance of the
+    /// 7th neighbour, the mean of all where a method has one radius. `None` for methods without any.
+    pub radius_scale: Option<f32>,
+    /// Standard deviation of the noise on the points in mean radii.
+    pub noise: f32,
+    /// Share of the cases in which the meshes meet and the method says that they do not.
+    pub false_negative_pct: f64,
+    /// Share of the cases in which the meshes do not meet and the method says that they do.
+    pub false_positive_pct: f64,
+    /// Sum of both.
+    pub error_pct: f64,
+    /// Of the cases that the mesh says to be collisions.
+    pub colliding_pct: f64,
+    /// How far the copies of the worst false negative must be moved apart until the meshes are free of
+    /// each other, in mean radii: the least of some directions, at least the true depth.
+    pub worst_false_negative_mean_radii: f32,
+    /// From new points to the answer and its contacts, processor time of one thread: median over the
+    /// cases.
+    pub median_ms: f64,
+    /// A quarter of the cases took less.
+    pub lower_quartile_ms: f64,
+    /// A quarter of the cases took more.
+    pub upper_quartile_ms: f64,
+    /// The same answers, by distance of the copies.
+    pub by_distance: Vec<DistanceTally>,
+}
+
+/// Answers at one of the distances of the protocol.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize, PartialEq)]
+pub struct DistanceTally {
+    /// Of the middles of the copies, which are 2 large.
+    pub distance: f32,
+    /// Cases at this distance.
+    pub cases: usize,
+    /// The meshes meet, and the method denies it.
+    pub false_negatives: usize,
+    /// The meshes do not meet, and the method says so.
+    pub false_positives: usize,
+}
+
+impl Measured for AccuracyRow {
+    const KIND: &'static str = "accuracy";
+
+    fn fault(&self) -> Option<String> {
+        let times = [
+            self.lower_quartile_ms,
+            self.median_ms,
+            self.upper_quartile_ms,
+        ];
+        if self.cases == 0 || self.points == 0 {
+            return Some("cases and points must be at least 1".to_owned());
+        }
+        if !(times[0] > 0.0 && times.is_sorted()) {
+            return Some(format!("times of {times:?} ms are not positive and rising"));
+        }
+        let parts = self.false_negative_pct + self.false_positive_pct;
+        if !(0.0..=100.0).contains(&self.error_pct) || (parts - self.error_pct).abs() > 1e-6 {
+            return Some(format!(
+                "error_pct {} is not the sum of its parts, {parts}, within 0 and 100",
+                self.error_pct
+            ));
+        }
+        let tallied: usize = self.by_distance.iter().map(|tally| tally.cases).sum();
+        if tallied != self.cases {
+            return Some(format!(
+                "by_distance has {tallied} cases, not {}",
+                self.cases
+            ));
+        }
+        None
+    }
+}
+
+/// What a frame of new points costs with one method.
+#[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
+pub struct FrameRow {
+    /// What the points are of.
+    pub model: String,
+    /// Of the first body.
+    pub points: usize,
+    /// Of the second body.
+    pub points_b: usize,
+    /// How the bodies lie.
+    pub placement: String,
+    /// Name of the method.
+    pub method: String,
+    /// That it could use.
+    pub threads: usize,
+    /// Median time until queries could begin: processor time on one thread, by the clock on several.
+    pub build_ms: f64,
+    /// Median time of the queries.
+    pub query_ms: f64,
+    /// Median time of both.
+    pub total_ms: f64,
+    /// Fastest frame.
+    pub least_ms: f64,
+    /// Slowest frame.
+    pub most_ms: f64,
+    /// Frames that were measured.
+    pub frames: usize,
+    /// Whether anything was found to touch, in the last frame.
+    pub collides: bool,
+    /// Pairs of balls or contact points, in the last frame.
+    pub contacts: usize,
+    /// Most memory that the method held beside the points, MiB.
+    pub peak_mib: f64,
+    /// Median total over the floor: one pass that transforms and culls both clouds.
+    pub floor_ratio: f64,
+}
+
+impl Measured for FrameRow {
+    const KIND: &'static str = "frames";
+
+    fn fault(&self) -> Option<String> {
+        if self.points == 0 || self.points_b == 0 || self.threads == 0 || self.frames == 0 {
+            return Some("points, threads and frames must be at least 1".to_owned());
+        }
+        let times = [self.least_ms, self.total_ms, self.most_ms];
+        if !(times[0] > 0.0 && times.is_sorted()) {
+            return Some(format!("times of {times:?} ms are not positive and rising"));
+        }
+        if self.floor_ratio.is_nan() || self.floor_ratio <= 0.0 {
+            return Some(format!("floor_ratio {} is not positive", self.floor_ratio));
+        }
+        None
+    }
+}

@@ -1,0 +1,110 @@
+use super::*;
+
+/// A possible row.
+pub(crate) fn accuracy_row() -> AccuracyRow {
+    let tally = |distance, false_negatives, false_positives| DistanceTally {
+        distance,
+        cases: 10,
+        false_negatives,
+        false_positives,
+    };
+    AccuracyRow {
+        model: "ball".to_owned(),
+        points: 1000,
+        cases: 20,
+        variant: "default".to_owned(),
+        backend: Some("cpu".to_owned()),
+        rho: None,
+        resolution: None,
+        pixel_scale: Some(1.0),
+        radius_scale: Some(1.0),
+        noise: 0.0,
+        false_negative_pct: 5.0,
+        false_positive_pct: 10.0,
+        error_pct: 15.0,
+        colliding_pct: 50.0,
+        worst_false_negative_mean_radii: 0.25,
+        median_ms: 2.0,
+        lower_quartile_ms: 1.0,
+        upper_quartile_ms: 3.0,
+        by_distance: vec![tally(0.0, 1, 0), tally(3.0, 0, 2)],
+    }
+}
+
+fn provenance() -> Provenance {
+    Provenance {
+        date: "2026-01-31".to_owned(),
+        cpu: "a processor".to_owned(),
+        cores: 2,
+        commit: "0123abc".to_owned(),
+        features: vec!["release".to_owned()],
+        adapter: None,
+    }
+}
+
+/// A file in the build's own folder.
+fn file(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../target/stored_tests");
+    std::fs::create_dir_all(&folder).expect("the build's folder can be written");
+    folder.join(name)
+}
+
+#[test]
+fn what_is_written_is_read() {
+    let path = file("good.json");
+    let row = accuracy_row();
+    write(&path, provenance(), vec![row.clone()]).expect("it can be written");
+    assert_eq!(kind(&path).expect("it has a kind"), "accuracy");
+    let stored = read::<AccuracyRow>(&path).expect("it can be read");
+    assert_eq!(stored.provenance, provenance());
+    assert_eq!(stored.rows, [row]);
+}
+
+#[test]
+fn bad_results_are_refused_by_name_with_a_way_out() {
+    let path = file("bad.json");
+    let refusal = |path: &Path| {
+        let error = read::<AccuracyRow>(path).expect_err("it is bad");
+        let said = error.to_string();
+        assert!(said.contains("bad"), "{said}");
+        (error, said)
+    };
+    let absent = file("bad_absent.json");
+    assert!(matches!(refusal(&absent).0, StoredError::File { .. }));
+
+    std::fs::write(&path, "{\"kind\": \"accuracy\",\n \"rows\": [}").expect("it can be written");
+    let (error, said) = refusal(&path);
+    assert!(matches!(error, StoredError::Format { .. }));
+    assert!(said.contains("line 2") && said.contains("--json"), "{said}");
+
+    write::<AccuracyRow>(&path, provenance(), vec![]).expect("it can be written");
+    assert!(matches!(refusal(&path).0, StoredError::Empty { .. }));
+
+    let faults: [fn(&mut AccuracyRow); 5] = [
+        |row| row.median_ms = 0.5,
+        |row| row.lower_quartile_ms = 0.0,
+        |row| row.error_pct = 14.0,
+        |row| row.cases = 21,
+        |row| {
+            row.false_positive_pct = -10.0;
+            row.error_pct = -5.0;
+        },
+    ];
+    for (k, fault) in faults.into_iter().enumerate() {
+        let mut row = accuracy_row();
+        fault(&mut row);
+        write(&path, provenance(), vec![accuracy_row(), row]).expect("it can be written");
+        let (error, said) = refusal(&path);
+        assert!(
+            matches!(error, StoredError::Row { row: 1, .. }),
+            "{k}: {said}"
+        );
+    }
+
+    let good = file("bad_kind.json");
+    write(&good, provenance(), vec![accuracy_row()]).expect("it can be written");
+    let text = std::fs::read_to_string(&good).expect("it was written");
+    let other = text.replace("\"kind\": \"accuracy\"", "\"kind\": \"taste\"");
+    std::fs::write(&good, other).expect("it can be written");
+    assert!(matches!(refusal(&good).0, StoredError::Kind { .. }));
+}
