@@ -147,7 +147,7 @@ fn layer_of(start: u32, end: u32, oriented: bool, view: u32) -> Layer {
         normal_low &= vec3i(0xfff);
     }
     let sum = vec3f(normal_high) * 4096.0 + vec3f(normal_low);
-    if length(sum) < CREASED * NORMAL_STEPS * f32(depths.weight) {
+    if oriented && length(sum) < CREASED * NORMAL_STEPS * f32(depths.weight) {
         depths = depths_of_face(start, end);
     }
     let class_of_run = fragments[start].x >> DEPTH_BITS;

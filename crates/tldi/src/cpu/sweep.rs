@@ -2,8 +2,9 @@
 //!
 //! Within a pixel the fragments are sorted by class (entry, exit, edge-on) and depth; a run whose
 //! depths follow each other within the merge gap is one layer. Its depth is the mean of its
-//! fragments; at an edge of the surface, of those on one face, as tangent planes do not hold beyond
-//! it. Sums are integers: a layer does not depend on the order of the points.
+//! fragments; at an edge of a surface with given normals, of those on one face, as tangent planes do
+//! not hold beyond it (estimated normals are means of both faces there). Sums are integers: a layer
+//! does not depend on the order of the points.
 
 use super::splat::{DepthScale, EDGE_ON, Fragment, Fragments, Imaging, NORMAL_STEPS, Splat};
 use crate::{Facing, Layer, Tldi};
@@ -45,7 +46,7 @@ pub(crate) fn sweep(
                 }
             }
             let normal = |f: &Fragment| splats[f.splat as usize].normal;
-            let depth = match sum.is_creased() {
+            let depth = match oriented && sum.is_creased() {
                 true => depth_of_face(run, normal),
                 false => sum.depth as f64 / sum.weight as f64,
             };
