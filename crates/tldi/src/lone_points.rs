@@ -21,145 +21,105 @@ const SAME_POINT: f32 = 1e-3;
 /// Contact pixels of one component that are looked at.
 const SAMPLES: usize = 9;
 
-/// How far neighbours are looked for at least, in mean radii of the cloud. What has none within that
-/// is not known to stand alone.
+/// How far neighbours are looked for, in mean radii of the cloud. What has none within that is not
+/// known to stand alone.
 const REACH: f32 = 32.0;
 
-/// Most cells around the places that are asked about.
-const MAX_CELLS: f32 = 4096.0;
+/// Distances that are compared side by side.
+const LANES: usize = 16;
 
 /// The points nearest to a place: squares of their distances in metres, and where they are.
 type Nearest = [(f32, Vec3); NEIGHBORS];
 
-/// The points of a cloud around some places, sorted into cells; kept from call to call.
+/// The blocks of a cloud around some places; kept from call to call.
 #[derive(Debug, Default)]
 struct Surroundings {
-    min: Vec3,
-    inv_cell: f32,
-    dims: [usize; 3],
-    /// First point of each cell; one entry more than cells.
-    starts: Vec<u32>,
-    points: Vec<Vec3>,
-    same: f32,
-    is_asked: Vec<bool>,
-    found: Vec<(usize, Vec3)>,
+    blocks: Vec<usize>,
+    /// Of one question: squares of the distances of blocks, and which.
+    near: Vec<(f32, usize)>,
 }
 
 impl Surroundings {
-    /// Finds those around `places`. Cost: a pass over the points of the blocks there.
-    fn find(&mut self, cloud: &PointCloud, places: impl Iterator<Item = Vec3> + Clone) {
-        let bounds = places.clone().fold(Aabb::EMPTY, |all, p| all.including(p));
-        let mut cell = REACH * cloud.mean_radius();
-        let dims = |cell: f32| (bounds.extents() / cell).floor() + Vec3::splat(3.0);
-        while dims(cell).element_product() > MAX_CELLS {
-            cell *= 1.26; // a third of an octave: twice fewer cells
+    /// Finds those around `places`. Cost: a pass over the blocks.
+    fn find(&mut self, cloud: &PointCloud, places: impl Iterator<Item = Vec3>) {
+        let bounds = places.fold(Aabb::EMPTY, |all, p| all.including(p));
+        // From a place to its point, to a neighbour, and to one of that.
+        let region = bounds.loosened(3.0 * REACH * cloud.mean_radius());
+        let blocks = cloud.blocks().iter().enumerate();
+        self.blocks.clear();
+        self.blocks
+            .extend(blocks.filter_map(|(k, block)| block.intersects(&region).then_some(k)));
+    }
+
+    /// The points of `cloud` nearest to `place`, from `beyond` to `reach` metres away, in ascending
+    /// order. Cost: linear in the blocks around, and the points of the nearest few.
+    fn nearest(&mut self, cloud: &PointCloud, place: Vec3, beyond: f32, reach: f32) -> Nearest {
+        let mut best: Nearest = [(f32::INFINITY, place); NEIGHBORS];
+        let [x, y, z] = cloud.coordinates();
+        self.near.clear();
+        self.near.extend(self.blocks.iter().filter_map(|&block| {
+            let bounds = &cloud.blocks()[block];
+            let squared = place.clamp(bounds.min, bounds.max).distance_squared(place);
+            (squared <= reach * reach).then_some((squared, block))
+        }));
+        // The nearest block first: it leaves little to look for in the others.
+        let nearest = self.near.iter().enumerate();
+        if let Some((first, _)) = nearest.min_by(|(_, p), (_, q)| p.0.total_cmp(&q.0)) {
+            self.near.swap(0, first);
         }
-        self.min = bounds.min - Vec3::splat(cell);
-        self.inv_cell = 1.0 / cell;
-        self.dims = dims(cell).to_array().map(|n| n as usize);
-        self.same = SAME_POINT * cloud.mean_radius();
-        let count = self.dims.iter().product();
-        let mut is_asked = std::mem::take(&mut self.is_asked);
-        is_asked.clear();
-        is_asked.resize(count, false);
-        for place in places {
-            for cell in self.cell(place).into_iter().flat_map(|c| self.around(c)) {
-                is_asked[cell] = true;
-            }
-        }
-        self.is_asked = is_asked;
-        let region = bounds.loosened(cell);
-        self.found.clear();
-        for (block, block_bounds) in cloud.blocks().iter().enumerate() {
-            if !block_bounds.intersects(&region) {
+        for &(squared, block) in &self.near {
+            if squared >= best[NEIGHBORS - 1].0 {
                 continue;
             }
-            for i in block * BLOCK..((block + 1) * BLOCK).min(cloud.len()) {
-                let point = cloud.point(i);
-                let cell = self.cell(point).map(|c| self.index(c));
-                if let Some(cell) = cell.filter(|&c| self.is_asked[c]) {
-                    self.found.push((cell, point));
-                }
+            let members = block * BLOCK..((block + 1) * BLOCK).min(cloud.len());
+            let [x, y, z] = [x, y, z].map(|c| &c[members.clone()]);
+            // All distances side by side; few of them are among the least.
+            let mut distances = [f32::INFINITY; BLOCK];
+            for (squared, ((x, y), z)) in distances.iter_mut().zip(x.iter().zip(y).zip(z)) {
+                let found = (x - place.x).powi(2) + (y - place.y).powi(2) + (z - place.z).powi(2);
+                let is_asked = (found >= beyond * beyond) & (found <= reach * reach);
+                *squared = if is_asked { found } else { f32::INFINITY };
             }
-        }
-        // Counts go one further, so that after the sums an entry is its cell's cursor, and after the
-        // sort its end: the next cell's first point.
-        self.starts.clear();
-        self.starts.resize(count + 2, 0);
-        for (cell, _) in &self.found {
-            self.starts[cell + 2] += 1;
-        }
-        for k in 2..count + 2 {
-            self.starts[k] += self.starts[k - 1];
-        }
-        self.points.resize(self.found.len(), Vec3::ZERO);
-        for &(cell, point) in &self.found {
-            self.points[self.starts[cell + 1] as usize] = point;
-            self.starts[cell + 1] += 1;
-        }
-    }
-
-    /// The cell of a place, if it is one.
-    fn cell(&self, place: Vec3) -> Option<[usize; 3]> {
-        let at = ((place - self.min) * self.inv_cell).to_array();
-        let is_inside = (0..3).all(|k| at[k] >= 0.0 && at[k] < self.dims[k] as f32);
-        is_inside.then(|| at.map(|c| c as usize))
-    }
-
-    fn index(&self, [x, y, z]: [usize; 3]) -> usize {
-        (z * self.dims[1] + y) * self.dims[0] + x
-    }
-
-    /// Indices of a cell and of those around it.
-    fn around(&self, cell: [usize; 3]) -> impl Iterator<Item = usize> {
-        let [xs, ys, zs] =
-            [0, 1, 2].map(|k| cell[k].saturating_sub(1)..(cell[k] + 2).min(self.dims[k]));
-        zs.flat_map(move |z| {
-            let xs = xs.clone();
-            ys.clone()
-                .flat_map(move |y| xs.clone().map(move |x| self.index([x, y, z])))
-        })
-    }
-
-    /// The points nearest to `place` and at least `beyond` metres away, in ascending order.
-    fn nearest(&self, place: Vec3, beyond: f32) -> Nearest {
-        let mut best: Nearest = [(f32::INFINITY, place); NEIGHBORS];
-        let cells = self.cell(place).into_iter().flat_map(|c| self.around(c));
-        for cell in cells {
-            for &point in &self.points[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
-                let squared = point.distance_squared(place);
-                if squared >= beyond * beyond && squared < best[NEIGHBORS - 1].0 {
-                    let at = best.partition_point(|near| near.0 <= squared);
-                    best.copy_within(at..NEIGHBORS - 1, at + 1);
-                    best[at] = (squared, point);
+            for (first, some) in members.step_by(LANES).zip(distances.as_chunks::<LANES>().0) {
+                let least = |least: f32, d: &f32| if *d < least { *d } else { least };
+                if some.iter().fold(f32::INFINITY, least) >= best[NEIGHBORS - 1].0 {
+                    continue;
+                }
+                for (i, &squared) in (first..).zip(some) {
+                    if squared < best[NEIGHBORS - 1].0 {
+                        let at = best.partition_point(|near| near.0 <= squared);
+                        best.copy_within(at..NEIGHBORS - 1, at + 1);
+                        best[at] = (squared, cloud.point(i));
+                    }
                 }
             }
         }
         best
     }
 
-    /// Whether the point nearest to `place` stands alone.
-    fn is_alone(&self, place: Vec3) -> bool {
-        let [(_, point), ..] = self.nearest(place, 0.0);
-        let neighbors = self.nearest(point, self.same);
+    /// Whether the point of `cloud` nearest to `place` stands alone.
+    fn is_alone(&mut self, cloud: &PointCloud, place: Vec3) -> bool {
+        let [same, reach] = [SAME_POINT, REACH].map(|radii| radii * cloud.mean_radius());
+        let [(_, point), ..] = self.nearest(cloud, place, 0.0, reach);
+        let neighbors = self.nearest(cloud, point, same, reach);
         let (apart, _) = neighbors[NEIGHBORS - 1];
         if !apart.is_finite() {
             return false;
         }
         // The nearest ones may stand alone as well.
+        let usual = apart.sqrt() / ALONE;
         neighbors.iter().any(|&(_, neighbor)| {
-            let [.., (usual, _)] = self.nearest(neighbor, self.same);
-            apart > ALONE * ALONE * usual
+            let [.., (fourth, _)] = self.nearest(cloud, neighbor, same, usual);
+            fourth.is_finite()
         })
     }
 }
 
-/// Whether the point of `cloud` nearest to `place` stands alone. Cost: a pass over the points of the
-/// blocks around it.
+/// Whether the point of `cloud` nearest to `place` stands alone. Cost: a pass over its blocks.
 pub(crate) fn is_alone(cloud: &PointCloud, place: Vec3) -> bool {
     let mut around = Surroundings::default();
     around.find(cloud, std::iter::once(place));
-    around.is_alone(place)
+    around.is_alone(cloud, place)
 }
 
 /// Removes the components of linked contact pixels that points standing alone make.
@@ -202,7 +162,7 @@ impl LonePoints {
             let middles = components().map(|component| middle(component, contacts, at));
             self.around.find(cloud, middles);
             for component in components() {
-                if made_by_lone_point(&self.around, component, contacts, at) {
+                if made_by_lone_point(&mut self.around, cloud, component, contacts, at) {
                     for &m in component {
                         self.is_dropped[m as usize] = true;
                     }
@@ -233,18 +193,21 @@ fn middle(
 /// pixels. At the rim of a large splat, or where fine points border on coarse ones, some do not, or
 /// do.
 fn made_by_lone_point(
-    around: &Surroundings,
+    around: &mut Surroundings,
+    cloud: &PointCloud,
     component: &[u32],
     contacts: &[ContactPixel],
     at: impl Fn(&ContactPixel) -> Vec3 + Copy,
 ) -> bool {
-    if !around.is_alone(middle(component, contacts, at)) {
+    if !around.is_alone(cloud, middle(component, contacts, at)) {
         return false;
     }
     let step = component.len().div_ceil(SAMPLES);
     let places = component.iter().map(|&m| at(&contacts[m as usize]));
     let sampled = || places.clone().step_by(step);
-    let alone = sampled().filter(|&place| around.is_alone(place)).count();
+    let alone = sampled()
+        .filter(|&place| around.is_alone(cloud, place))
+        .count();
     2 * alone > sampled().count()
 }
 

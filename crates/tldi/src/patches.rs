@@ -155,8 +155,9 @@ impl PatchScratch {
 
     /// [`reduce`](Self::reduce) without the contact pixels of points that stand alone: flying pixels
     /// of a depth camera, dust. A point stands alone if its fourth nearest neighbour is 2.5 times as
-    /// far away as that of one of these four is from it. Cost beside that of `reduce`: a pass over the points
-    /// of the blocks of both clouds around contact pixels.
+    /// far away as that of one of these four is from it. Cost beside that of `reduce`: for each
+    /// component of contact pixels a pass over the bounds of the blocks around, and the points of a
+    /// few.
     pub fn reduce_pair(&mut self, result: &mut PairResult, query: &PairQuery) {
         order(&mut result.contacts);
         self.lone_points.drop(result, query);
