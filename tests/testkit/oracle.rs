@@ -1,7 +1,7 @@
 //! Brute-force counterparts of the stages, written from their descriptions and sharing no code
 //! with them.
 
-use tldi::glamx::Vec3;
+use tldi::glamx::{DVec3, Vec3};
 use tldi::{Params, PointCloud};
 
 /// One splat in one pixel, as the description of the oriented variant has it.
@@ -13,6 +13,8 @@ pub struct OracleFragment {
     pub weight: f64,
     /// 0 entry, 1 exit or unoriented, 2 edge-on.
     pub class: u8,
+    /// Unit normal.
+    pub normal: DVec3,
 }
 
 /// The layers `(near, far, depth)` of pixel `(i, j)` of an orthographic camera that looks along
@@ -69,13 +71,40 @@ pub fn oracle_layers(
                 .iter()
                 .map(|f| f.depth)
                 .fold(f64::NEG_INFINITY, f64::max);
-            let weight: f64 = run.iter().map(|f| f.weight).sum();
-            let depth = run.iter().map(|f| f.weight * f.depth).sum::<f64>() / weight;
+            let depth = depth(run);
             (near, far, depth)
         })
         .collect();
-    layers.sort_by(|a, b| a.2.total_cmp(&b.2));
+    layers.sort_by(|a, b| a.0.total_cmp(&b.0));
     Some(layers)
+}
+
+/// Mean depth; where the normals differ, of those on the heaviest one's face. Not a number where the
+/// rounding of weights and normals decides.
+fn depth(run: &[OracleFragment]) -> f64 {
+    let weight = |f: &OracleFragment| f.weight;
+    let mean = |run: &[&OracleFragment]| {
+        let sum: f64 = run.iter().map(|f| f.weight * f.depth).sum();
+        sum / run.iter().map(|f| f.weight).sum::<f64>()
+    };
+    let all: Vec<_> = run.iter().collect();
+    let normal: DVec3 = run.iter().map(|f| f.weight * f.normal).sum();
+    let length = normal.length() / run.iter().map(weight).sum::<f64>();
+    if (length - 0.97).abs() < 0.005 {
+        return f64::NAN;
+    }
+    if length > 0.97 {
+        return mean(&all);
+    }
+    let most = run.iter().map(weight).fold(0.0, f64::max);
+    let heaviest: Vec<_> = run.iter().filter(|f| f.weight > most - 1.01).collect();
+    let face = heaviest[0].normal;
+    let is_unclear = |f: &OracleFragment| (f.normal.dot(face) - 0.82).abs() < 0.001;
+    if heaviest.len() > 1 || run.iter().any(is_unclear) {
+        return f64::NAN;
+    }
+    let of_face: Vec<_> = run.iter().filter(|f| f.normal.dot(face) > 0.82).collect();
+    mean(&of_face)
 }
 
 /// The outer `None` is "too close to tell".
@@ -119,5 +148,6 @@ fn fragment(
         depth: p.z + f64::from(params.slope_damping) * rise,
         weight: (1.0 + 254.0 * share.max(0.0) * n.z.abs()).floor(),
         class,
+        normal: n,
     }))
 }
