@@ -73,3 +73,21 @@ pub(super) fn model_color(index: usize) -> Color {
 pub(super) fn resolution_color(index: usize) -> Color {
     [BLACK, BLUE, SKY, GREEN][index % 4]
 }
+
+/// Of the paper's method where both methods have the colour of a model.
+pub(super) fn paper_look(color: Color) -> Look {
+    Look {
+        color,
+        mark: Mark::Ring,
+        line: Line::Dashed,
+    }
+}
+
+/// Of ours there.
+pub(super) fn default_look(color: Color) -> Look {
+    Look {
+        color,
+        mark: Mark::Star,
+        line: Line::Thin,
+    }
+}

@@ -1,6 +1,6 @@
 //! The figures of the paper that vary one thing: ρ, distance, resolution, noise, size of splats.
 
-use super::figure::{Axis, Color, Curve, Entry, Figure, Level, Line, Look, Mark, Panel, Point};
+use super::figure::{Axis, Curve, Entry, Figure, Level, Line, Look, Mark, Panel, Point};
 use super::{looks, origin};
 use crate::stored::{AccuracyRow, Provenance, Stored};
 
@@ -89,22 +89,6 @@ fn is_plain_default(row: &AccuracyRow) -> bool {
 
 fn is_clean(row: &AccuracyRow) -> bool {
     row.noise == 0.0 && row.radius_scale == Some(1.0)
-}
-
-fn paper_look(color: Color) -> Look {
-    Look {
-        color,
-        mark: Mark::Ring,
-        line: Line::Dashed,
-    }
-}
-
-fn default_look(color: Color) -> Look {
-    Look {
-        color,
-        mark: Mark::Star,
-        line: Line::Thin,
-    }
 }
 
 /// A curve of rows, by rising `x`.
@@ -200,7 +184,7 @@ fn rho(runs: &[Run]) -> Option<Figure> {
     let mut curves = Vec::new();
     let mut legend = Vec::new();
     for (k, run) in runs.iter().enumerate() {
-        let look = paper_look(looks::model_color(k));
+        let look = looks::paper_look(looks::model_color(k));
         let rows = run.rows.iter().filter(|row| {
             is_paper(row) && is_clean(row) && row.resolution == Some(PAPER_RESOLUTION)
         });
@@ -258,12 +242,12 @@ fn both(
         let rows = || run.rows.iter().filter(|row| is_shown(row));
         for (look, rows, who) in [
             (
-                paper_look(color),
+                looks::paper_look(color),
                 rows().filter(|r| is_plain_paper(r)).collect(),
                 "the paper's",
             ),
             (
-                default_look(color),
+                looks::default_look(color),
                 rows().filter(|r| is_plain_default(r)).collect::<Vec<_>>(),
                 "this project",
             ),
@@ -333,8 +317,8 @@ fn distance(runs: &[Run]) -> Option<Figure> {
         let index = models.iter().position(|model| *model == row.model);
         let color = looks::model_color(index.unwrap_or(0));
         let (look, who) = match is_paper(row) {
-            true => (paper_look(color), "the paper's"),
-            false => (default_look(color), "this project"),
+            true => (looks::paper_look(color), "the paper's"),
+            false => (looks::default_look(color), "this project"),
         };
         curves.push(Curve {
             look,
@@ -391,17 +375,17 @@ fn resolution(runs: &[Run]) -> Option<Figure> {
         let color = looks::model_color(k);
         let rows = || run.rows.iter().filter(|row| is_clean(row));
         let of_paper = rows().filter(|row| is_paper(row) && row.rho == Some(PAPER_RHO));
-        paper.push(curve(of_paper, paper_look(color), |row| {
+        paper.push(curve(of_paper, looks::paper_look(color), |row| {
             row.resolution.map(|pixels| pixels as f32)
         }));
         ours.push(curve(
             rows().filter(|row| is_default(row)),
-            default_look(color),
+            looks::default_look(color),
             |row| row.pixel_scale,
         ));
         for (look, who) in [
-            (paper_look(color), "the paper's"),
-            (default_look(color), "this project"),
+            (looks::paper_look(color), "the paper's"),
+            (looks::default_look(color), "this project"),
         ] {
             legend.push(Entry {
                 look,
@@ -461,7 +445,7 @@ fn radius_scale(runs: &[Run]) -> Option<Figure> {
         let rows = || run.rows.iter().filter(|row| row.noise == 0.0);
         let mut curves = Vec::new();
         for (k, &pixels) in resolutions.iter().enumerate() {
-            let look = paper_look(looks::resolution_color(k));
+            let look = looks::paper_look(looks::resolution_color(k));
             let of_paper = rows().filter(|row| is_paper(row) && row.resolution == Some(pixels));
             curves.push(curve(of_paper, look, |row| row.radius_scale));
             let label = format!("the paper's, image of {pixels} × {pixels} pixels");

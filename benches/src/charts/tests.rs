@@ -3,8 +3,10 @@ use crate::stored::DistanceTally;
 
 fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("tldi_charts_{name}_{}", std::process::id()));
-    // Of a run that was broken off.
-    let _ = std::fs::remove_dir_all(&folder);
+    if folder.exists() {
+        // Of a run that was broken off.
+        std::fs::remove_dir_all(&folder).expect("the folder can be removed");
+    }
     std::fs::create_dir_all(&folder).expect("the folder for temporary files can be written");
     folder
 }

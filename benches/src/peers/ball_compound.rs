@@ -1,10 +1,8 @@
 //! A ball for each point, as rapier's own primitives.
 
-use super::{Found, Frame, Peer, touching_points, vector};
-use crate::stopwatch::Stopwatch;
+use super::{Found, Frame, Peer, compare_shapes, vector};
 use rapier3d::math::Pose;
 use rapier3d::parry::shape::{Compound, SharedShape};
-use tldi::glamx::Vec3;
 
 /// A compound of balls for each body, both built anew, with rapier's contact manifolds.
 pub struct BallCompound;
@@ -24,22 +22,12 @@ impl Peer for BallCompound {
     }
 
     fn compare(&mut self, frame: &Frame) -> Found {
-        let start = Stopwatch::of_thread();
         let ball = SharedShape::ball(frame.radius);
-        let build = |points: &[Vec3]| {
+        compare_shapes(frame, |points| {
             let placed = points
                 .iter()
                 .map(|p| (Pose::from_translation(vector(p)), ball.clone()));
             Compound::new(placed.collect())
-        };
-        let (a, b) = (build(frame.a), build(frame.b));
-        let built = start.seconds();
-        let contacts = touching_points(&a, &b).unwrap_or(0);
-        Found {
-            build_seconds: built,
-            query_seconds: start.seconds() - built,
-            collides: contacts > 0,
-            contacts,
-        }
+        })
     }
 }

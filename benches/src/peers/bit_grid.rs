@@ -65,11 +65,6 @@ impl Peer for BitGrid {
             let near = |p: &Vec3| self.grid.near(*p, &cells, reach);
             contacts = self.near_b.iter().map(near).sum();
         }
-        Found {
-            build_seconds: built,
-            query_seconds: start.seconds() - built,
-            collides: contacts > 0,
-            contacts,
-        }
+        Found::new(&start, built, contacts)
     }
 }

@@ -47,11 +47,6 @@ impl Peer for BvhRebuild {
         let (a, b) = (build(frame.a), build(frame.b));
         let built = start.seconds();
         let contacts = overlapping(&a, &b, frame);
-        Found {
-            build_seconds: built,
-            query_seconds: start.seconds() - built,
-            collides: contacts > 0,
-            contacts,
-        }
+        Found::new(&start, built, contacts)
     }
 }

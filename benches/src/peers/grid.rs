@@ -118,11 +118,6 @@ impl Peer for Grid {
         self.sort(frame.a, &cells);
         let built = start.seconds();
         let contacts = frame.b.iter().map(|p| self.near(*p, &cells, reach)).sum();
-        Found {
-            build_seconds: built,
-            query_seconds: start.seconds() - built,
-            collides: contacts > 0,
-            contacts,
-        }
+        Found::new(&start, built, contacts)
     }
 }

@@ -30,11 +30,6 @@ impl Peer for KdTreeRebuild {
             .query_tree(&b)
             .within::<SquaredEuclidean<f32>>(reach * reach);
         let contacts: usize = join.count();
-        Found {
-            build_seconds: built,
-            query_seconds: start.seconds() - built,
-            collides: contacts > 0,
-            contacts,
-        }
+        Found::new(&start, built, contacts)
     }
 }

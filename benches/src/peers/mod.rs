@@ -25,12 +25,13 @@ pub use tldi::{Method, TldiPeer};
 pub use tri_mesh::TriMeshPeer;
 pub use voxels::VoxelsRebuild;
 
+use crate::stopwatch::Stopwatch;
 use ::tldi::Backend;
 use ::tldi::glamx::Vec3;
 use rapier3d::geometry::ContactManifold;
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::partitioning::BvhBuildStrategy;
-use rapier3d::parry::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, Unsupported};
+use rapier3d::parry::query::{DefaultQueryDispatcher, PersistentQueryDispatcher};
 use rapier3d::parry::shape::Shape;
 
 /// Points of both bodies in one frame, metres, in one frame of reference.
@@ -72,6 +73,19 @@ pub struct Found {
     pub collides: bool,
     /// Pairs of balls, or contact points, that were found.
     pub contacts: usize,
+}
+
+impl Found {
+    /// Of a peer that touches where it has contacts; `start` began with the frame, and after `built`
+    /// seconds of it the queries began.
+    fn new(start: &Stopwatch, built: f64, contacts: usize) -> Self {
+        Self {
+            build_seconds: built,
+            query_seconds: start.seconds() - built,
+            collides: contacts > 0,
+            contacts,
+        }
+    }
 }
 
 /// A method that a user would pick.
@@ -140,17 +154,21 @@ fn vector(p: &Vec3) -> Vector {
     Vector::new(p.x, p.y, p.z)
 }
 
-/// Points of contact of two shapes in one frame of reference that touch, by rapier's manifolds.
-fn touching_points(a: &dyn Shape, b: &dyn Shape) -> Result<usize, Unsupported> {
+/// One frame of a peer that builds a shape of each body anew.
+fn compare_shapes<S: Shape>(frame: &Frame, mut build: impl FnMut(&[Vec3]) -> S) -> Found {
+    let start = Stopwatch::of_thread();
+    let (a, b) = (build(frame.a), build(frame.b));
+    let built = start.seconds();
+    Found::new(&start, built, touching_points(&a, &b))
+}
+
+/// Points of contact of two shapes in one frame of reference that touch, by rapier's manifolds, which
+/// must know the shapes.
+fn touching_points(a: &dyn Shape, b: &dyn Shape) -> usize {
     let mut manifolds: Vec<ContactManifold> = Vec::new();
-    DefaultQueryDispatcher.contact_manifolds(
-        &Pose::IDENTITY,
-        a,
-        b,
-        0.0,
-        &mut manifolds,
-        &mut None,
-    )?;
+    DefaultQueryDispatcher
+        .contact_manifolds(&Pose::IDENTITY, a, b, 0.0, &mut manifolds, &mut None)
+        .expect("rapier has manifolds of these shapes");
     let points = manifolds.iter().flat_map(|manifold| &manifold.points);
-    Ok(points.filter(|point| point.dist <= 0.0).count())
+    points.filter(|point| point.dist <= 0.0).count()
 }

@@ -41,11 +41,6 @@ impl Peer for BvhRefit {
         }
         let built = start.seconds();
         let contacts = overlapping(a, b, frame);
-        Found {
-            build_seconds: built,
-            query_seconds: start.seconds() - built,
-            collides: contacts > 0,
-            contacts,
-        }
+        Found::new(&start, built, contacts)
     }
 }

@@ -79,14 +79,9 @@ impl Peer for TriMeshPeer {
         }
         let built = start.seconds();
         let contacts = match &self.kept {
-            Some([a, b]) => touching_points(a, b).unwrap_or(0),
+            Some([a, b]) => touching_points(a, b),
             None => 0,
         };
-        Found {
-            build_seconds: built,
-            query_seconds: start.seconds() - built,
-            collides: contacts > 0,
-            contacts,
-        }
+        Found::new(&start, built, contacts)
     }
 }

@@ -4,6 +4,7 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
+use crate::cpu::sweep::SAME_FACE;
 use crate::gap_fit::fitted_gap;
 use crate::links::{Links, join, root};
 use crate::lone_points::LonePoints;
@@ -19,9 +20,6 @@ pub const MAX_PATCHES: usize = 32;
 
 /// Linked pixels belong to one group if their smoothed normals are within 30°.
 const SAME_GROUP: f32 = 0.866;
-
-/// Cosine of the angle (35°) within which two faces face each other.
-const FACE_TO_FACE: f32 = 0.82;
 
 /// A patch whose unit normals have a mean shorter than this (a spread of about 14°) is split.
 const FLAT: f32 = 0.97;
@@ -245,7 +243,7 @@ fn drop_between_faces(result: &mut PairResult) {
             let here = normal.dot(axes[contact.view as usize]).abs();
             axes.iter().any(|axis| normal.dot(*axis).abs() > here)
         };
-        contact.normal_a.dot(contact.normal_b) > -FACE_TO_FACE
+        contact.normal_a.dot(contact.normal_b) > -SAME_FACE
             && (seen_better(contact.normal_a) || seen_better(contact.normal_b))
     };
     if axes.len() > 1 && 2 * contacts.iter().filter(|c| is_between(c)).count() < contacts.len() {

@@ -13,8 +13,8 @@ use glamx::Vec3;
 /// Mean length of a layer's unit normals below which it has an edge: two faces that meet at 30°.
 const CREASED: f32 = 0.97;
 
-/// Cosine of the largest angle (35°) between normals of one face.
-const SAME_FACE: f32 = 0.82;
+/// Cosine of the largest angle (35°) between normals of one face, or of two that face each other.
+pub(crate) const SAME_FACE: f32 = 0.82;
 
 /// For [`stage_constants`](crate::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 2] =

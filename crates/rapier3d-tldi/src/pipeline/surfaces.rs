@@ -1,0 +1,206 @@
+//! What changes the surface of a cloud that is in a world.
+
+use super::TldiPipeline;
+use crate::{PointCloudShape, TldiError};
+use rapier3d::geometry::{ColliderHandle, ColliderSet};
+use rapier3d::math::Vector;
+use rapier3d::pipeline::{ActiveHooks, PhysicsWorld};
+use tldi::{CloudError, PointCloud};
+
+impl TldiPipeline {
+    /// Replaces the points and, where given, the normals (one for each point) of a cloud's
+    /// collider, and tells rapier, which wakes the body and what it touches; see
+    /// [`PointCloud::set_points`] for the radii. The mass of a body whose collider has a density is
+    /// computed anew.
+    ///
+    /// Called with other points in every step, it keeps what touches the collider awake for ever;
+    /// with the points that the cloud has it does nothing. Bodies that share the points keep the
+    /// old ones.
+    ///
+    /// # Errors
+    /// [`TldiError::NoSuchCollider`], [`TldiError::NotACloud`], and [`TldiError::Cloud`] where the
+    /// points are refused: the collider then keeps the old ones.
+    pub fn set_points(
+        &mut self,
+        world: &mut PhysicsWorld,
+        collider: ColliderHandle,
+        points: &[Vector],
+        normals: Option<&[Vector]>,
+    ) -> Result<(), TldiError> {
+        self.set_collider_points(&mut world.colliders, collider, points, normals)
+    }
+
+    /// [`set_points`](Self::set_points) for split sets.
+    ///
+    /// # Errors
+    /// Those of [`set_points`](Self::set_points).
+    pub fn set_collider_points(
+        &mut self,
+        colliders: &mut ColliderSet,
+        collider: ColliderHandle,
+        points: &[Vector],
+        normals: Option<&[Vector]>,
+    ) -> Result<(), TldiError> {
+        let shape = cloud_of(colliders, collider)?;
+        if shape.cloud().consists_of(points, normals) {
+            self.motions.forget(collider);
+            return Ok(());
+        }
+        let before = self.motions.snapshot(shape.cloud());
+        self.change_shape(colliders, collider, |shape| {
+            shape.set_points(points, normals)
+        })?;
+        self.motions.record_sampled(collider, before);
+        Ok(())
+    }
+
+    /// Replaces the cloud of a collider as a whole, where [`set_points`](Self::set_points) does not
+    /// do: a depth camera's frame brings other points with other radii. Rapier is told, which wakes
+    /// the body and what it touches.
+    ///
+    /// # Errors
+    /// [`TldiError::NoSuchCollider`], [`TldiError::NotACloud`].
+    pub fn set_cloud(
+        &mut self,
+        world: &mut PhysicsWorld,
+        collider: ColliderHandle,
+        cloud: PointCloud<'static>,
+    ) -> Result<(), TldiError> {
+        self.set_collider_cloud(&mut world.colliders, collider, cloud)
+    }
+
+    /// [`set_cloud`](Self::set_cloud) for split sets.
+    ///
+    /// # Errors
+    /// Those of [`set_cloud`](Self::set_cloud).
+    pub fn set_collider_cloud(
+        &mut self,
+        colliders: &mut ColliderSet,
+        collider: ColliderHandle,
+        cloud: PointCloud<'static>,
+    ) -> Result<(), TldiError> {
+        let shape = cloud_of(colliders, collider)?;
+        let before = self.motions.snapshot(shape.cloud());
+        self.change_shape(colliders, collider, |shape| {
+            shape.set_cloud(cloud);
+            Ok(())
+        })?;
+        self.motions.record_sampled(collider, before);
+        Ok(())
+    }
+
+    /// Changes the shape of a cloud's collider, and remembers that it was.
+    fn change_shape(
+        &mut self,
+        colliders: &mut ColliderSet,
+        collider: ColliderHandle,
+        change: impl FnOnce(&mut PointCloudShape) -> Result<(), CloudError>,
+    ) -> Result<(), TldiError> {
+        // The batch of a step that was not finished shares the shape: without it the change is
+        // made in place.
+        self.shared.batch_mut().clear();
+        let shape = colliders
+            .get_mut(collider)
+            .and_then(|collider| collider.shape_mut().as_shape_mut::<PointCloudShape>())
+            .ok_or(TldiError::NotACloud(collider))?;
+        change(shape).map_err(|source| TldiError::Cloud { collider, source })?;
+        if !self.changed.contains(&collider) {
+            self.changed.push(collider);
+        }
+        Ok(())
+    }
+
+    /// [`set_points`](Self::set_points) for a surface that deforms: the same points, where they are
+    /// a step later. In the step to come they are taken to go on with the velocity that brought
+    /// them there, which reaches the contacts: what stands on a floor that slides or rises is
+    /// carried along.
+    ///
+    /// Sets [`ActiveHooks::MODIFY_SOLVER_CONTACTS`] on the collider; the hooks of
+    /// [`step_with_events`](Self::step_with_events) see its contacts then, too. Cost beside that of
+    /// `set_points`: for each contact, a pass over the points in the blocks around it.
+    ///
+    /// # Errors
+    /// Those of `set_points`, and [`TldiError::OtherPoints`] if there are not as many points as the
+    /// cloud has.
+    ///
+    /// ```
+    /// use rapier3d::prelude::*;
+    /// use rapier3d_tldi::prelude::*;
+    /// let mut world = PhysicsWorld::default();
+    /// let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// tldi.attach(&mut world);
+    /// let mut points: Vec<Vector> = (0..441)
+    ///     .map(|i| Vector::new((i % 21) as f32, 0.0, (i / 21) as f32) * 0.05)
+    ///     .collect();
+    /// let belt = PointCloud::builder(&points).radius(0.05).build()?.into_owned();
+    /// let (_, belt) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(belt));
+    /// let start = Vector::new(0.2, 0.1, 0.5);
+    /// let parcel = RigidBodyBuilder::dynamic().translation(start);
+    /// let (parcel, _) = world.insert(parcel, ColliderBuilder::cuboid(0.1, 0.1, 0.1));
+    /// for _ in 0..30 {
+    ///     for point in &mut points {
+    ///         point.x += 0.6 * world.integration_parameters.dt; // 0.6 m/s
+    ///     }
+    ///     tldi.deform(&mut world, belt, &points, None)?;
+    ///     tldi.step(&mut world)?;
+    /// }
+    /// assert!(world.bodies[parcel].linvel().x > 0.5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn deform(
+        &mut self,
+        world: &mut PhysicsWorld,
+        collider: ColliderHandle,
+        points: &[Vector],
+        normals: Option<&[Vector]>,
+    ) -> Result<(), TldiError> {
+        let dt = world.integration_parameters.dt;
+        self.deform_collider(&mut world.colliders, collider, points, normals, dt)
+    }
+
+    /// [`deform`](Self::deform) for split sets, for a step of `dt` seconds. Give the step
+    /// [`hooks`](Self::hooks).
+    ///
+    /// # Errors
+    /// Those of [`deform`](Self::deform).
+    pub fn deform_collider(
+        &mut self,
+        colliders: &mut ColliderSet,
+        collider: ColliderHandle,
+        points: &[Vector],
+        normals: Option<&[Vector]>,
+        dt: f32,
+    ) -> Result<(), TldiError> {
+        let before = self.motions.before(cloud_of(colliders, collider)?.cloud());
+        if before.len() != points.len() {
+            return Err(TldiError::OtherPoints {
+                collider,
+                expected: before.len(),
+                found: points.len(),
+            });
+        }
+        self.set_collider_points(colliders, collider, points, normals)?;
+        let after = cloud_of(colliders, collider)?.clone();
+        // Without a time there is no velocity, and dropped points leave none to compare with.
+        if dt > 0.0 && after.cloud().len() == before.len() {
+            self.motions.record(collider, before, after.cloud(), dt);
+            if let Some(collider) = colliders.get_mut(collider) {
+                let hooks = collider.active_hooks() | ActiveHooks::MODIFY_SOLVER_CONTACTS;
+                collider.set_active_hooks(hooks);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The shape of a cloud's collider.
+fn cloud_of(
+    colliders: &ColliderSet,
+    collider: ColliderHandle,
+) -> Result<&PointCloudShape, TldiError> {
+    let found = colliders
+        .get(collider)
+        .ok_or(TldiError::NoSuchCollider(collider))?;
+    let shape = found.shape().as_shape();
+    shape.ok_or(TldiError::NotACloud(collider))
+}
