@@ -421,7 +421,7 @@ fn gather(positions: Positions<'_>) -> ([Cow<'_, [f32]>; 3], Vec<Aabb>, Vec<u32>
     match positions {
         Positions::Vectors(points) => {
             let mut gathered = Gathered::default();
-            gathered.refill(points.iter().copied());
+            gathered.refill(&points, None);
             let Gathered {
                 x,
                 y,

@@ -238,13 +238,13 @@ impl<'a> PointCloud<'a> {
         } = &mut self.spare;
         let mut order = self.order.as_ref().filter(|o| o.len() == points.len());
         if let Some(curve) = order {
-            gathered.refill(curve.iter().map(|&i| points[i as usize]));
+            gathered.refill(points, Some(curve));
             if !gathered.dropped.is_empty() {
                 order = None;
             }
         }
         if order.is_none() {
-            gathered.refill(points.iter().copied());
+            gathered.refill(points, None);
         }
         check_dropped(self.non_finite, points.len(), &gathered.dropped)?;
         let same_points = points.len() == self.x.len() && gathered.dropped.is_empty();

@@ -5,7 +5,7 @@
 //! 5 × 5 pixels it averages noise as well as that mean.
 
 use crate::ContactPixel;
-use crate::links::Links;
+use crate::links::{Links, NONE};
 use arrayvec::ArrayVec;
 use glamx::{Mat4, Vec4};
 
@@ -19,11 +19,22 @@ const LEAST_BEND_WEIGHT: f32 = 2.0;
 
 /// The gap at contact pixel `k`, in metres, by a fit to it and its neighbours up to two links away.
 pub(crate) fn fitted_gap(k: u32, contacts: &[ContactPixel], links: &Links) -> f32 {
+    let at = contacts[k as usize].pixel;
     let mut ring = ArrayVec::<u32, MOST_NEIGHBORS>::new();
+    // The first of the ring in each of the 5 × 5 pixels: others in the same pixel are rare.
+    let mut first = [NONE; 25];
     ring.push(k);
-    let push_neighbors = |ring: &mut ArrayVec<u32, MOST_NEIGHBORS>, of: u32| {
+    first[12] = k;
+    let mut push_neighbors = |ring: &mut ArrayVec<u32, MOST_NEIGHBORS>, of: u32| {
         for &l in links.neighbors(of) {
-            if !ring.is_full() && !ring.contains(&l) {
+            let [u, v] = [0, 1].map(|axis| contacts[l as usize].pixel[axis] - at[axis] + 2);
+            let first = &mut first[(5 * v + u) as usize];
+            if *first == NONE {
+                *first = l;
+            } else if *first == l || ring.contains(&l) {
+                continue;
+            }
+            if !ring.is_full() {
                 ring.push(l);
             }
         }
@@ -33,7 +44,6 @@ pub(crate) fn fitted_gap(k: u32, contacts: &[ContactPixel], links: &Links) -> f3
         let of = ring[near];
         push_neighbors(&mut ring, of);
     }
-    let at = contacts[k as usize].pixel;
     let mut normal_matrix = Mat4::from_diagonal(Vec4::new(
         0.0,
         LEAST_SLOPE_WEIGHT,

@@ -18,78 +18,64 @@ pub(crate) struct Gathered {
 }
 
 impl Gathered {
-    /// Replaces the content by `points`, leaving out the non-finite ones.
-    pub(crate) fn refill(&mut self, mut points: impl ExactSizeIterator<Item = Vec3>) {
-        let count = points.len();
+    /// Replaces the content by `points`, in the order of their indices `order` where that is given,
+    /// leaving out the non-finite ones.
+    pub(crate) fn refill(&mut self, points: &[Vec3], order: Option<&[u32]>) {
+        let count = order.map_or(points.len(), <[u32]>::len);
         for axis in [&mut self.x, &mut self.y, &mut self.z] {
-            axis.clear();
-            axis.reserve(count);
+            axis.resize(count, 0.0);
         }
-        self.blocks.clear();
-        self.blocks.reserve(count.div_ceil(BLOCK));
-        self.dropped.clear();
-
-        let mut block = [[0.0f32; BLOCK]; 3];
-        let mut read = 0;
-        while read < count {
-            let mut filled = 0;
-            while filled < BLOCK && read < count {
-                let [x, y, z] = &mut block;
-                let slots = x[filled..]
-                    .iter_mut()
-                    .zip(&mut y[filled..])
-                    .zip(&mut z[filled..]);
-                let mut fresh = 0;
-                // The slots come first: once they are used up, no point is taken.
-                for (((x, y), z), point) in slots.zip(points.by_ref()) {
+        match order {
+            Some(order) => {
+                let ordered = order.iter().map(|&i| points[i as usize]);
+                let slots = self.x.iter_mut().zip(&mut self.y).zip(&mut self.z);
+                for (((x, y), z), point) in slots.zip(ordered) {
                     (*x, *y, *z) = (point.x, point.y, point.z);
-                    fresh += 1;
                 }
-                let end = filled + fresh;
-                if block.iter().all(|axis| all_finite(&axis[filled..end])) {
-                    filled = end;
-                } else {
-                    filled = self.keep_finite(&mut block, filled, end, read);
-                }
-                read += fresh;
             }
-            if filled > 0 {
-                let [x, y, z] = [0, 1, 2].map(|axis: usize| &block[axis][..filled]);
-                self.x.extend_from_slice(x);
-                self.y.extend_from_slice(y);
-                self.z.extend_from_slice(z);
-                self.blocks.push(bounds_of([x, y, z]));
+            None => transpose(points, [&mut self.x, &mut self.y, &mut self.z]),
+        }
+        self.dropped.clear();
+        self.bound();
+        let is_finite = |block: &Aabb| block.min.is_finite() && block.max.is_finite();
+        if !self.blocks.iter().all(is_finite) {
+            extend_non_finite([&self.x, &self.y, &self.z], &mut self.dropped);
+            for axis in [&mut self.x, &mut self.y, &mut self.z] {
+                remove(axis, &self.dropped);
             }
+            self.bound();
         }
     }
 
-    /// Closes the gaps of non-finite points in `block[start..end]`, whose first point is the
-    /// `read`-th given; returns the new end.
-    fn keep_finite(
-        &mut self,
-        block: &mut [[f32; BLOCK]; 3],
-        start: usize,
-        end: usize,
-        read: usize,
-    ) -> usize {
-        let mut kept = start;
-        for i in start..end {
-            let point = Vec3::new(block[0][i], block[1][i], block[2][i]);
-            if point.is_finite() {
-                [block[0][kept], block[1][kept], block[2][kept]] = point.to_array();
-                kept += 1;
-            } else {
-                self.dropped.push((read + i - start) as u32);
-            }
-        }
-        kept
+    fn bound(&mut self) {
+        let Self {
+            x, y, z, blocks, ..
+        } = self;
+        blocks.clear();
+        blocks.extend(bounds_of_blocks([x, y, z]));
+    }
+}
+
+#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
+fn transpose(points: &[Vec3], [x, y, z]: [&mut [f32]; 3]) {
+    let n = points.len();
+    let (x, y, z) = (&mut x[..n], &mut y[..n], &mut z[..n]);
+    for (i, point) in points.iter().enumerate() {
+        x[i] = point.x;
+        y[i] = point.y;
+        z[i] = point.z;
     }
 }
 
 /// Indices of the points with a non-finite coordinate, ascending.
 pub(crate) fn non_finite_indices(coordinates: [&[f32]; 3]) -> Vec<u32> {
-    let [x, y, z] = coordinates;
     let mut found = Vec::new();
+    extend_non_finite(coordinates, &mut found);
+    found
+}
+
+fn extend_non_finite(coordinates: [&[f32]; 3], found: &mut Vec<u32>) {
+    let [x, y, z] = coordinates;
     for start in (0..x.len()).step_by(BLOCK) {
         let end = x.len().min(start + BLOCK);
         if coordinates.iter().all(|axis| all_finite(&axis[start..end])) {
@@ -98,19 +84,19 @@ pub(crate) fn non_finite_indices(coordinates: [&[f32]; 3]) -> Vec<u32> {
         let bad = |&i: &usize| !(x[i].is_finite() && y[i].is_finite() && z[i].is_finite());
         found.extend((start..end).filter(bad).map(|i| i as u32));
     }
-    found
 }
 
 /// Bounds of each run of [`BLOCK`] points.
 pub(crate) fn block_bounds(coordinates: [&[f32]; 3]) -> Vec<Aabb> {
-    let [x, y, z] = coordinates.map(|axis| axis.chunks(BLOCK));
-    x.zip(y)
-        .zip(z)
-        .map(|((x, y), z)| bounds_of([x, y, z]))
-        .collect()
+    bounds_of_blocks(coordinates).collect()
 }
 
-/// Bounds of finite points.
+fn bounds_of_blocks<'a>(coordinates: [&'a [f32]; 3]) -> impl Iterator<Item = Aabb> + 'a {
+    let [x, y, z] = coordinates.map(|axis| axis.chunks(BLOCK));
+    x.zip(y).zip(z).map(|((x, y), z)| bounds_of([x, y, z]))
+}
+
+/// Bounds of points; not finite where one of them is not.
 fn bounds_of(coordinates: [&[f32]; 3]) -> Aabb {
     let [x, y, z] = coordinates.map(total_min_max);
     Aabb {
@@ -139,6 +125,16 @@ fn total_min_max(values: &[f32]) -> (f32, f32) {
 fn all_finite(values: &[f32]) -> bool {
     let (least, greatest) = total_min_max(values);
     values.is_empty() || (least.is_finite() && greatest.is_finite())
+}
+
+/// Removes the entries at the ascending indices `dropped`.
+fn remove(values: &mut Vec<f32>, dropped: &[u32]) {
+    let mut dropped = dropped.iter().copied().peekable();
+    let mut i = 0;
+    values.retain(|_| {
+        i += 1;
+        dropped.next_if_eq(&(i - 1)).is_none()
+    });
 }
 
 /// `values` without the entries at the ascending indices `dropped`.

@@ -12,7 +12,8 @@ const SAME_SURFACE_PX: f32 = 3.0;
 /// overlap over more.
 const CONFIRMING: u32 = 5;
 
-const NONE: u32 = u32::MAX;
+/// In place of an index.
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Pairs of neighbouring contact pixels that continue each other on both surfaces.
 #[derive(Debug, Default)]
@@ -158,6 +159,44 @@ impl Links {
                 self.neighbors[*slot as usize] = neighbor;
             }
         }
+    }
+}
+
+/// Items sorted by the sets they are in; kept from call to call.
+#[derive(Debug, Default)]
+pub(crate) struct Groups {
+    /// Items, set by set by the root's index; ascending within a set.
+    pub(crate) members: Vec<u32>,
+    starts: Vec<u32>,
+}
+
+impl Groups {
+    /// Sorts as many items as `roots` has, each by its root. Cost: linear.
+    pub(crate) fn sort(&mut self, roots: &[u32]) {
+        self.starts.clear();
+        self.starts.resize(roots.len(), 0);
+        for &root in roots {
+            self.starts[root as usize] += 1;
+        }
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
+        }
+        // Filled from the end, so that each start ends up where it belongs.
+        self.members.clear();
+        self.members.resize(roots.len(), 0);
+        for (item, &root) in roots.iter().enumerate().rev() {
+            let slot = &mut self.starts[root as usize];
+            *slot -= 1;
+            self.members[*slot as usize] = item as u32;
+        }
+    }
+
+    /// The sets of those roots.
+    pub(crate) fn iter<'a>(&'a self, roots: &'a [u32]) -> impl Iterator<Item = &'a [u32]> {
+        let same = |k: &u32, l: &u32| roots[*k as usize] == roots[*l as usize];
+        self.members.chunk_by(same)
     }
 }
 

@@ -6,7 +6,7 @@
 
 use crate::cpu::sweep::SAME_FACE;
 use crate::gap_fit::fitted_gap;
-use crate::links::{Links, join, root};
+use crate::links::{Groups, Links, join, root};
 use crate::lone_points::LonePoints;
 use crate::supports::{longest_axis, supports};
 use crate::{
@@ -80,7 +80,7 @@ pub struct PatchScratch {
     links: Links,
     lone_points: LonePoints,
     smooth: Vec<Smooth>,
-    members: Vec<u32>,
+    groups: Groups,
     stack: Vec<(usize, usize, u32)>,
     parts: Vec<Part>,
     /// Members of the parts of one patch, and those that can be support points.
@@ -104,9 +104,29 @@ impl PatchScratch {
     /// gap, as the stage `compare` finds them. Cost: linear in them but for sorting the groups, and
     /// them if need be.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
+        self.link(result, params);
+        self.reduce_linked(result, params);
+    }
+
+    /// [`reduce`](Self::reduce) without the contact pixels of points that stand alone: flying pixels
+    /// of a depth camera, dust. A point stands alone if its fourth nearest neighbour is 2.5 times as
+    /// far away as that of one of these four is from it. Cost beside that of `reduce`: where there
+    /// are components of few contact pixels, a pass over the points of the blocks around them.
+    pub fn reduce_pair(&mut self, result: &mut PairResult, query: &PairQuery) {
+        self.link(result, &query.params);
+        if self.lone_points.drop(result, &self.links, query) {
+            self.links.find(&result.contacts, &query.params);
+        }
+        self.reduce_linked(result, &query.params);
+    }
+
+    fn link(&mut self, result: &mut PairResult, params: &Params) {
         order(&mut result.contacts);
         drop_between_faces(result);
         self.links.find(&result.contacts, params);
+    }
+
+    fn reduce_linked(&mut self, result: &mut PairResult, params: &Params) {
         self.links.confirm(result, params);
         let (contacts, out) = (&result.contacts, &mut result.patches);
         out.clear();
@@ -115,23 +135,16 @@ impl PatchScratch {
         }
         self.smooth(contacts);
         self.group();
-        self.members.clear();
-        self.members.extend(0..contacts.len() as u32);
-        let group = &self.group;
-        self.members
-            .sort_unstable_by_key(|&m| (group[m as usize], m));
+        self.groups.sort(&self.group);
         self.stack.clear();
         let mut start = 0;
-        for part in self
-            .members
-            .chunk_by(|&a, &b| group[a as usize] == group[b as usize])
-        {
+        for part in self.groups.iter(&self.group) {
             self.stack.push((start, start + part.len(), 0));
             start += part.len();
         }
         self.parts.clear();
         while let Some((start, end, splits)) = self.stack.pop() {
-            let members = &mut self.members[start..end];
+            let members = &mut self.groups.members[start..end];
             let shape = Shape::of(members, contacts, &self.smooth, params);
             if splits < MAX_SPLITS && members.len() >= LEAST_SPLIT && shape.normal_length < FLAT {
                 let middle = shape.split(members, contacts);
@@ -148,21 +161,9 @@ impl PatchScratch {
             });
         }
         self.emit_planes(contacts, params, out);
-        out.truncate(MAX_PATCHES);
     }
 
-    /// [`reduce`](Self::reduce) without the contact pixels of points that stand alone: flying pixels
-    /// of a depth camera, dust. A point stands alone if its fourth nearest neighbour is 2.5 times as
-    /// far away as that of one of these four is from it. Cost beside that of `reduce`: for each
-    /// component of contact pixels a pass over the bounds of the blocks around, and the points of a
-    /// few.
-    pub fn reduce_pair(&mut self, result: &mut PairResult, query: &PairQuery) {
-        order(&mut result.contacts);
-        self.lone_points.drop(result, query);
-        self.reduce(result, &query.params);
-    }
-
-    /// Pushes a patch for the parts of each plane, starting with the deepest.
+    /// Pushes a patch for the parts of each plane, starting with the deepest, up to [`MAX_PATCHES`].
     fn emit_planes(
         &mut self,
         contacts: &[ContactPixel],
@@ -172,13 +173,15 @@ impl PatchScratch {
         self.parts.sort_unstable_by(|p, q| {
             (p.least_gap.total_cmp(&q.least_gap)).then(p.members.start.cmp(&q.members.start))
         });
-        while let Some(deepest) = self.parts.first() {
+        while let Some(deepest) = self.parts.first()
+            && out.len() < MAX_PATCHES
+        {
             let plane = deepest.normal;
             self.patch.clear();
             self.parts.retain(|part| {
                 let in_plane = part.normal.dot(plane) >= SAME_PLANE;
                 if in_plane {
-                    let members = &self.members[part.members.clone()];
+                    let members = &self.groups.members[part.members.clone()];
                     self.patch.extend_from_slice(members);
                 }
                 !in_plane

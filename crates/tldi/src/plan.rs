@@ -87,6 +87,10 @@ impl PairPlan {
     /// # Ok::<(), tldi::CloudError>(())
     /// ```
     pub fn new(query: &PairQuery) -> Option<Self> {
+        let zone_reach = query.params.prediction + query.a.mean_radius() + query.b.mean_radius();
+        if !within_reach(query, zone_reach) {
+            return None;
+        }
         let ring = |surface| ring(surface, &query.params);
         let margin = query.params.prediction + ring(&query.a).max(ring(&query.b));
         let [bounds_a, bounds_b] = bounds_with_inside(query);
@@ -113,7 +117,7 @@ impl PairPlan {
                 side(Pose3::IDENTITY, b_from_a, bounds_b, middle_a),
                 side(query.a_from_b, Pose3::IDENTITY, bounds_a, middle_b),
             ],
-            zone_reach: query.params.prediction + query.a.mean_radius() + query.b.mean_radius(),
+            zone_reach,
             column_reach: REACH * query.params.merge_gap.max(query.params.prediction),
             approach: {
                 let (motion, last_axis) = match query.view {
@@ -136,6 +140,13 @@ impl PairPlan {
 pub fn stride(mean_radius: f32, pixel_size: f32) -> usize {
     let per_pixel = 0.94 * (pixel_size / mean_radius).powi(2);
     ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
+}
+
+/// Whether the bounds are within `reach` metres of each other in the frames of both surfaces.
+fn within_reach(query: &PairQuery, reach: f32) -> bool {
+    let (a, b) = (query.a.bounds().loosened(reach), query.b.bounds());
+    a.intersects(&b.transformed(&query.a_from_b))
+        && a.transformed(&query.a_from_b.inverse()).intersects(&b)
 }
 
 /// By how much more than what can touch is culled, metres: splats reach a radius beyond their

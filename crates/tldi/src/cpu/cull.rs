@@ -11,7 +11,7 @@ use glamx::{Mat3, Pose3, Vec3};
 use rayon::prelude::*;
 
 /// Points that passed the cull, as structure of arrays, in the frame of the query.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Survivors {
     pub(crate) x: Vec<f32>,
     pub(crate) y: Vec<f32>,
@@ -137,7 +137,7 @@ impl<'a> PointRadii<'a> {
 const TASK_BLOCKS: usize = 128;
 
 /// Memory of [`cull`], kept from call to call.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(crate) struct CullScratch {
     tasks: Vec<Survivors>,
 }
