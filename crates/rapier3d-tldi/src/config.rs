@@ -1,7 +1,7 @@
 //! The settings of a pipeline.
 
-use crate::TldiError;
 use crate::parts::cloud_of;
+use crate::{Resolution, TldiError};
 use rapier3d::parry::shape::Shape;
 use tldi::{CameraPolicy, Params, Variant};
 
@@ -14,7 +14,8 @@ const LEAST_PIXELS: f32 = 8.0;
 ///
 /// ```
 /// use rapier3d_tldi::prelude::*;
-/// let config = TldiConfig { pixel_scale: 2.0, ..TldiConfig::default() }; // a noisy sensor
+/// let resolution = Resolution::Radii(2.0); // a noisy sensor
+/// let config = TldiConfig { resolution, ..TldiConfig::default() };
 /// let pipeline = TldiPipeline::new(config)?;
 /// # Ok::<(), TldiError>(())
 /// ```
@@ -24,10 +25,8 @@ pub struct TldiConfig {
     pub variant: Variant,
     /// From where pairs are looked at.
     pub camera_policy: CameraPolicy,
-    /// Edge of a pixel in mean radii of the pair's coarser cloud, greater than 0. 1 resolves the
-    /// most that the points tell; 2 averages noise as large as the radii. Bodies that are only a
-    /// few pixels in size get finer ones.
-    pub pixel_scale: f32,
+    /// How large pixels are: a number of radii, or what an error or time budget allows.
+    pub resolution: Resolution,
     /// By how much measured gaps scatter from one comparison to the next, in mean radii of the
     /// pair's coarser cloud. A solver that was fed this noise would keep bodies from coming to
     /// rest. So contacts are kept, riding on their bodies, until the pair has moved by as much
@@ -42,7 +41,7 @@ impl Default for TldiConfig {
         Self {
             variant: Variant::default(),
             camera_policy: CameraPolicy::default(),
-            pixel_scale: 1.0,
+            resolution: Resolution::default(),
             scatter: 0.1,
         }
     }
@@ -62,11 +61,12 @@ impl TldiConfig {
                 })
             }
         };
+        let (resolution, is_valid) = self.resolution.check();
         check(
-            "pixel_scale",
-            self.pixel_scale,
-            self.pixel_scale > 0.0,
-            "it must be finite and greater than 0",
+            "resolution",
+            resolution,
+            is_valid,
+            "its radii, metres or seconds must be finite and greater than 0",
         )?;
         check(
             "scatter",
@@ -75,6 +75,16 @@ impl TldiConfig {
             "it must be finite and not negative",
         )?;
         Ok(self)
+    }
+
+    /// These settings with pixels of a fixed number of radii where a time budget decides:
+    /// `coarsening`.
+    pub(crate) fn settled(self, coarsening: f32) -> Self {
+        let resolution = match self.resolution {
+            Resolution::Time(_) => Resolution::Radii(coarsening),
+            fixed => fixed,
+        };
+        Self { resolution, ..self }
     }
 
     /// Parameters of a pair of parts for contacts up to a gap of `prediction` metres; none where no
@@ -95,7 +105,7 @@ impl TldiConfig {
             Variant::Paper => Params::paper(coarsest),
             Variant::Oriented => Params::for_radius(coarsest),
         };
-        let pixel_size = (self.pixel_scale * coarsest).min(to_resolve);
+        let pixel_size = self.resolution.pixel_size(coarsest).min(to_resolve);
         Some(
             params
                 .with_pixel_size(pixel_size)

@@ -209,7 +209,7 @@ impl Comparison {
         }
         let mut sides: Vec<[ExactShape<'_>; 2]> = Vec::new();
         let config = pipeline.config();
-        append_part_pairs(*shapes, config, &mut self.parts, &mut sides, |_, _, _| {
+        append_part_pairs(*shapes, &config, &mut self.parts, &mut sides, |_, _, _| {
             Hint::default()
         });
         let mut queries: Vec<PairQuery<'_>> = Vec::new();

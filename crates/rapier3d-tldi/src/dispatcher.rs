@@ -138,7 +138,7 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for TldiDispatc
             return Ok(());
         }
         drop(batch);
-        let measured = Measured::new(&pair, &self.shared.config);
+        let measured = Measured::new(&pair, &self.shared.config());
         let filled = self.shared.compare_on_the_spot(pair, |parts, results| {
             let measured = measured.filter(|_| !rolls(parts, results));
             manifolds::fill(&pair, measured, parts, results, manifolds, workspace);

@@ -139,12 +139,13 @@ impl TldiPipeline {
         let candidates = self
             .search
             .find(bodies, colliders, integration, &self.changed);
+        let config = shared.config();
         let frame = Frame {
             gravity,
             integration,
             bodies,
             colliders,
-            config: &shared.config,
+            config: &config,
             memory: &self.memory,
             changed: &self.changed,
         };
@@ -168,6 +169,7 @@ impl TldiPipeline {
         }
         *shared.batch_mut() = batch;
         self.prepare_seconds = start.elapsed().as_secs_f64();
+        shared.took(self.prepare_seconds);
         error.map_or(Ok(()), Err)
     }
 
@@ -292,8 +294,8 @@ impl TldiPipeline {
     }
 
     /// The settings.
-    pub(crate) fn config(&self) -> &TldiConfig {
-        &self.shared.config
+    pub(crate) fn config(&self) -> TldiConfig {
+        self.shared.config()
     }
 
     /// Whether the narrow phase asks this pipeline.

@@ -9,7 +9,7 @@ use rapier3d::math::{Pose, Rotation};
 use rapier3d::parry::shape::{Ball, Shape};
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 use tldi::{Backend, BackendError, CpuBackend, Impact, ImpactQuery, PairResult};
 
@@ -161,7 +161,9 @@ pub(crate) struct SpotCounts {
 
 /// State shared by a pipeline and its dispatchers.
 pub(crate) struct Shared {
-    pub(crate) config: TldiConfig,
+    config: TldiConfig,
+    /// Mean radii of a pixel where a time budget decides, as bits of an `f32`.
+    coarsening: AtomicU32,
     /// A shape that only this pipeline's dispatchers know, by its address: its distance to itself
     /// is [`PROBE_ANSWER`].
     pub(crate) probe: Ball,
@@ -177,6 +179,7 @@ impl Shared {
     pub(crate) fn new(config: TldiConfig) -> Self {
         Self {
             config,
+            coarsening: AtomicU32::new(1.0f32.to_bits()),
             probe: Ball::new(1.0),
             batch: RwLock::default(),
             spots: Mutex::default(),
@@ -184,6 +187,21 @@ impl Shared {
             spot_pixels: AtomicUsize::new(0),
             failed: Mutex::default(),
         }
+    }
+
+    /// The settings for the pairs of this step.
+    pub(crate) fn config(&self) -> TldiConfig {
+        self.config.settled(self.coarsening())
+    }
+
+    fn coarsening(&self) -> f32 {
+        f32::from_bits(self.coarsening.load(Ordering::Relaxed))
+    }
+
+    /// Lets the time that a batch took decide the pixels of the next one.
+    pub(crate) fn took(&self, seconds: f64) {
+        let next = self.config.resolution.coarsened(self.coarsening(), seconds);
+        self.coarsening.store(next.to_bits(), Ordering::Relaxed);
     }
 
     pub(crate) fn batch(&self) -> std::sync::RwLockReadGuard<'_, Batch> {
@@ -207,7 +225,7 @@ impl Shared {
         }
         self.spot_pairs.fetch_add(1, Ordering::Relaxed);
         self.on_the_spot(|spot| {
-            spot.compare(pair, &self.config)?;
+            spot.compare(pair, &self.config())?;
             let pixels = count_pixels(&spot.parts, &spot.results);
             self.spot_pixels.fetch_add(pixels, Ordering::Relaxed);
             Ok(read(&spot.parts, &spot.results))

@@ -207,7 +207,7 @@ fn straight_impact(
     options: ShapeCastOptions,
 ) -> Option<ShapeCastHit> {
     let speed = velocity.length();
-    let params = moving.params(&shared.config)?;
+    let params = moving.params(&shared.config())?;
     // No farther than the bounds reach, if they are bounded.
     let [sphere_a, sphere_b] = moving
         .parts
@@ -247,7 +247,7 @@ fn turning_impact(
     start: f32,
     end: f32,
 ) -> Option<ShapeCastHit> {
-    let params = moving.params(&shared.config)?;
+    let params = moving.params(&shared.config())?;
     let bounds = moving.parts[1].compute_local_aabb();
     let middle = bounds.center();
     // In the frame of the first part, as if the second had the rotation of another time.

@@ -6,6 +6,7 @@ use common::worlds::{HALF, TestResult, attached_with, dynamic_at, insert_floor};
 use common::{cloud, cube};
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
+use std::time::Duration;
 
 /// The paper's variant cannot compare a cloud with a ball: the step says so, names the colliders
 /// and leaves the world as it was.
@@ -80,8 +81,8 @@ fn bad_settings_are_refused() {
         scatter,
         ..TldiConfig::default()
     };
-    let with_scale = |pixel_scale| TldiConfig {
-        pixel_scale,
+    let with_resolution = |resolution| TldiConfig {
+        resolution,
         ..TldiConfig::default()
     };
     let refused = |config| match TldiPipeline::new(config).err() {
@@ -90,8 +91,12 @@ fn bad_settings_are_refused() {
     };
     for bad in [-1.0, f32::NAN, f32::INFINITY] {
         assert_eq!(refused(with_drift(bad)), Some("scatter"), "{bad}");
-        assert_eq!(refused(with_scale(bad)), Some("pixel_scale"), "{bad}");
+        for resolution in [Resolution::Radii(bad), Resolution::Error(bad)] {
+            assert_eq!(refused(with_resolution(resolution)), Some("resolution"));
+        }
     }
     assert_eq!(refused(with_drift(0.0)), None);
-    assert_eq!(refused(with_scale(0.0)), Some("pixel_scale"));
+    for resolution in [Resolution::Radii(0.0), Resolution::Time(Duration::ZERO)] {
+        assert_eq!(refused(with_resolution(resolution)), Some("resolution"));
+    }
 }

@@ -1,0 +1,144 @@
+//! How large the pixels are in which pairs are compared: a setting, or what a budget allows.
+
+use std::time::Duration;
+
+/// Error of a gap, in pixels, where pixels are larger than the points' mean radius: the median at the
+/// corner of a box, the shape that they blunt most. Faces and balls err by less than 0.1.
+const ERROR_PER_PIXEL: f32 = 0.6;
+
+/// By how much pixels grow at once under [`Resolution::Time`]: half as many pixels.
+const COARSER: f32 = std::f32::consts::SQRT_2;
+
+/// Greatest pixel under [`Resolution::Time`], in mean radii.
+const COARSEST: f32 = 8.0;
+
+/// Pixels shrink again where a step takes less than this share of the time: finer pixels, of which
+/// there are twice as many, then take less than all of it.
+const LEFT: f32 = 0.4;
+
+/// What decides the edge of the pixels of a [`TldiPipeline`](crate::TldiPipeline).
+///
+/// Cost follows the number of pixels and points in the contact zone; of clouds much finer than
+/// pixels only as many points are looked at as pixels show. Bodies that are only a few pixels in
+/// size get finer ones, whatever is chosen here.
+///
+/// ```
+/// use rapier3d_tldi::prelude::*;
+/// // A scan of millimetres, for bodies whose contacts may err by a centimetre.
+/// let resolution = Resolution::Error(0.01);
+/// let config = TldiConfig { resolution, ..TldiConfig::default() };
+/// let pipeline = TldiPipeline::new(config)?;
+/// # Ok::<(), TldiError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Resolution {
+    /// An edge of so many mean radii of the pair's coarser cloud, greater than 0. 1 resolves the
+    /// most that the points tell; 2 averages noise as large as the radii.
+    Radii(f32),
+    /// An error budget: pixels as large as gaps may err by this many metres, greater than 0, at the
+    /// corners of what touches, where they err most; never smaller than a mean radius.
+    Error(f32),
+    /// A time budget for the comparisons of a step, longer than zero: a mean radius, but coarser by
+    /// and by, up to 8, while they take longer. What a step costs beside its pixels, a pass over the
+    /// points that are near, stays. Results then depend on the machine and its load: not for
+    /// simulations that are to be repeated.
+    Time(Duration),
+}
+
+impl Default for Resolution {
+    /// `Radii(1.0)`.
+    fn default() -> Self {
+        Self::Radii(1.0)
+    }
+}
+
+impl Resolution {
+    /// The setting's number, and whether comparisons can use it.
+    pub(crate) fn check(self) -> (f32, bool) {
+        let value = match self {
+            Self::Radii(value) | Self::Error(value) => value,
+            Self::Time(budget) => budget.as_secs_f32(),
+        };
+        (value, value.is_finite() && value > 0.0)
+    }
+
+    /// Edge of a pixel in metres, for a cloud of this mean radius, metres; with a time budget, as
+    /// long as nothing was measured.
+    pub(crate) fn pixel_size(self, mean_radius: f32) -> f32 {
+        match self {
+            Self::Radii(radii) => radii * mean_radius,
+            Self::Error(error) => mean_radius.max(error / ERROR_PER_PIXEL),
+            Self::Time(_) => mean_radius,
+        }
+    }
+
+    /// Mean radii of a pixel for the next step, after a step whose comparisons with pixels of
+    /// `coarsening` mean radii took `seconds`.
+    pub(crate) fn coarsened(self, coarsening: f32, seconds: f64) -> f32 {
+        let Self::Time(budget) = self else {
+            return 1.0;
+        };
+        let share = (seconds / budget.as_secs_f64()) as f32;
+        if share > 1.0 {
+            (coarsening * COARSER).min(COARSEST)
+        } else if share < LEFT {
+            (coarsening / COARSER).max(1.0)
+        } else {
+            coarsening
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn budgets_decide_the_pixels() {
+        let radius = 0.01;
+        assert_eq!(Resolution::Radii(2.0).pixel_size(radius), 0.02);
+        // No finer than the points, else by the error at corners.
+        assert_eq!(Resolution::Error(0.001).pixel_size(radius), radius);
+        assert!((Resolution::Error(0.03).pixel_size(radius) - 0.05).abs() < 1e-6);
+    }
+
+    /// A step that takes time in proportion to the number of pixels settles at the finest ones that
+    /// the budget allows, and becomes fine again where the load is gone.
+    #[test]
+    fn time_settles_within_the_budget() {
+        let time = Resolution::Time(Duration::from_millis(10));
+        let mut coarsening = 1.0;
+        let mut run = |seconds_at_one: f64| {
+            let mut last = [0.0; 2];
+            for _ in 0..20 {
+                let seconds = seconds_at_one / f64::from(coarsening).powi(2);
+                last = [last[1], seconds];
+                coarsening = time.coarsened(coarsening, seconds);
+            }
+            (last, coarsening)
+        };
+        let (last, coarsening) = run(0.05);
+        assert!(
+            last[0] == last[1] && (0.005..=0.01).contains(&last[1]),
+            "{last:?}"
+        );
+        assert!((coarsening - 8.0f32.sqrt()).abs() < 1e-5, "{coarsening}");
+        assert_eq!(run(10.0).1, COARSEST);
+        assert_eq!(run(0.003).1, 1.0);
+        assert_eq!(Resolution::Radii(2.0).coarsened(1.0, 9.0), 1.0);
+    }
+
+    #[test]
+    fn what_no_comparison_can_use() {
+        for (resolution, is_valid) in [
+            (Resolution::Radii(0.5), true),
+            (Resolution::Radii(0.0), false),
+            (Resolution::Error(f32::NAN), false),
+            (Resolution::Error(f32::INFINITY), false),
+            (Resolution::Time(Duration::from_micros(1)), true),
+            (Resolution::Time(Duration::ZERO), false),
+        ] {
+            assert_eq!(resolution.check().1, is_valid, "{resolution:?}");
+        }
+    }
+}
