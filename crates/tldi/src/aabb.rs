@@ -11,6 +11,13 @@ pub struct Aabb {
     pub max: Vec3,
 }
 
+impl Default for Aabb {
+    /// [`EMPTY`](Self::EMPTY).
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl Aabb {
     /// The box that holds nothing.
     pub const EMPTY: Self = Self {

@@ -6,7 +6,7 @@
 
 use crate::links::Links;
 use crate::{Aabb, BLOCK, ContactPixel, PairQuery, PairResult, PointCloud, Surface};
-use glamx::Vec3;
+use glamx::{IVec3, UVec3, Vec3};
 
 /// Neighbours that tell how dense points are. Clouds of fewer have no lone points.
 const NEIGHBORS: usize = 4;
@@ -25,71 +25,125 @@ const SAMPLES: usize = 9;
 /// known to stand alone.
 const REACH: f32 = 32.0;
 
-/// Distances that are compared side by side.
-const LANES: usize = 16;
+/// Edge of a cell of [`Surroundings`] in mean radii: of points with the paper's radii (0.65 of the
+/// distance to the seventh neighbour), it reaches beyond the fourth.
+const CELL: f32 = 2.0;
+
+/// Cells by which the grid reaches beyond the places: to their point, to its neighbour, to one of
+/// that, and one to spare.
+const RIM: f32 = 4.0;
 
 /// The points nearest to a place: squares of their distances in metres, and where they are.
 type Nearest = [(f32, Vec3); NEIGHBORS];
 
-/// The blocks of a cloud around some places; kept from call to call.
+/// Keeps the nearest of what it is offered.
+fn offer(best: &mut Nearest, squared: f32, point: Vec3) {
+    if squared < best[NEIGHBORS - 1].0 {
+        let at = best.partition_point(|near| near.0 <= squared);
+        best.copy_within(at..NEIGHBORS - 1, at + 1);
+        best[at] = (squared, point);
+    }
+}
+
+/// The points of a cloud around some places, in a hashed grid; kept from call to call.
 #[derive(Debug, Default)]
 struct Surroundings {
-    blocks: Vec<usize>,
-    /// Of one question: squares of the distances of blocks, and which.
-    near: Vec<(f32, usize)>,
+    /// What the grid covers, metres.
+    region: Aabb,
+    /// Edge of a cell, metres.
+    cell: f32,
+    /// Points by bucket, and where each bucket starts, with an end. Cells may share a bucket.
+    points: Vec<Vec3>,
+    starts: Vec<u32>,
+    unsorted: Vec<Vec3>,
 }
 
 impl Surroundings {
-    /// Finds those around `places`. Cost: a pass over the blocks.
+    /// Finds those around `places`. Cost: a pass over the points of the blocks around, and a
+    /// counting sort of those that are.
     fn find(&mut self, cloud: &PointCloud, places: impl Iterator<Item = Vec3>) {
+        self.cell = CELL * cloud.mean_radius();
         let bounds = places.fold(Aabb::EMPTY, |all, p| all.including(p));
-        // From a place to its point, to a neighbour, and to one of that.
-        let region = bounds.loosened(3.0 * REACH * cloud.mean_radius());
-        let blocks = cloud.blocks().iter().enumerate();
-        self.blocks.clear();
-        self.blocks
-            .extend(blocks.filter_map(|(k, block)| block.intersects(&region).then_some(k)));
+        self.region = bounds.loosened(RIM * self.cell);
+        self.unsorted.clear();
+        for (block, bounds) in cloud.blocks().iter().enumerate() {
+            if bounds.intersects(&self.region) {
+                let members = block * BLOCK..((block + 1) * BLOCK).min(cloud.len());
+                let points = members.map(|i| cloud.point(i));
+                self.unsorted
+                    .extend(points.filter(|p| self.region.contains(*p)));
+            }
+        }
+        self.sort();
+    }
+
+    /// Sorts `unsorted` into buckets, about as many as points.
+    fn sort(&mut self) {
+        let buckets = self.unsorted.len().next_power_of_two();
+        self.starts.clear();
+        self.starts.resize(buckets + 1, 0);
+        for k in 0..self.unsorted.len() {
+            let bucket = self.bucket(self.cell_of(self.unsorted[k]));
+            self.starts[bucket] += 1;
+        }
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
+        }
+        // Filled from the end, so that each start ends up where it belongs.
+        self.points.clear();
+        self.points.resize(self.unsorted.len(), Vec3::ZERO);
+        for k in (0..self.unsorted.len()).rev() {
+            let bucket = self.bucket(self.cell_of(self.unsorted[k]));
+            self.starts[bucket] -= 1;
+            self.points[self.starts[bucket] as usize] = self.unsorted[k];
+        }
+    }
+
+    fn cell_of(&self, point: Vec3) -> IVec3 {
+        ((point - self.region.min) / self.cell).floor().as_ivec3()
+    }
+
+    /// By the primes of Teschner et al. 2003, "Optimized Spatial Hashing".
+    fn bucket(&self, cell: IVec3) -> usize {
+        let hashed = cell.as_uvec3() * UVec3::new(73_856_093, 19_349_663, 83_492_791);
+        (hashed.x ^ hashed.y ^ hashed.z) as usize & (self.starts.len() - 2)
     }
 
     /// The points of `cloud` nearest to `place`, from `beyond` to `reach` metres away, in ascending
-    /// order. Cost: linear in the blocks around, and the points of the nearest few.
-    fn nearest(&mut self, cloud: &PointCloud, place: Vec3, beyond: f32, reach: f32) -> Nearest {
+    /// order. Cost: the points of 27 cells; of all blocks in reach, where these have too few.
+    fn nearest(&self, cloud: &PointCloud, place: Vec3, beyond: f32, reach: f32) -> Nearest {
         let mut best: Nearest = [(f32::INFINITY, place); NEIGHBORS];
-        let [x, y, z] = cloud.coordinates();
-        self.near.clear();
-        self.near.extend(self.blocks.iter().filter_map(|&block| {
-            let bounds = &cloud.blocks()[block];
-            let squared = place.clamp(bounds.min, bounds.max).distance_squared(place);
-            (squared <= reach * reach).then_some((squared, block))
-        }));
-        // The nearest block first: it leaves little to look for in the others.
-        let nearest = self.near.iter().enumerate();
-        if let Some((first, _)) = nearest.min_by(|(_, p), (_, q)| p.0.total_cmp(&q.0)) {
-            self.near.swap(0, first);
-        }
-        for &(squared, block) in &self.near {
-            if squared >= best[NEIGHBORS - 1].0 {
-                continue;
-            }
-            let members = block * BLOCK..((block + 1) * BLOCK).min(cloud.len());
-            let [x, y, z] = [x, y, z].map(|c| &c[members.clone()]);
-            // All distances side by side; few of them are among the least.
-            let mut distances = [f32::INFINITY; BLOCK];
-            for (squared, ((x, y), z)) in distances.iter_mut().zip(x.iter().zip(y).zip(z)) {
-                let found = (x - place.x).powi(2) + (y - place.y).powi(2) + (z - place.z).powi(2);
-                let is_asked = (found >= beyond * beyond) & (found <= reach * reach);
-                *squared = if is_asked { found } else { f32::INFINITY };
-            }
-            for (first, some) in members.step_by(LANES).zip(distances.as_chunks::<LANES>().0) {
-                let least = |least: f32, d: &f32| if *d < least { *d } else { least };
-                if some.iter().fold(f32::INFINITY, least) >= best[NEIGHBORS - 1].0 {
-                    continue;
+        let limits = beyond * beyond..=reach * reach;
+        let known = self.region.loosened(-self.cell);
+        if known.contains(place) && !self.points.is_empty() {
+            let middle = self.cell_of(place);
+            for k in 0..27 {
+                let cell = middle + IVec3::new(k % 3, k / 3 % 3, k / 9) - IVec3::ONE;
+                let bucket = self.bucket(cell);
+                let range = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
+                for &point in &self.points[range] {
+                    let squared = point.distance_squared(place);
+                    if limits.contains(&squared) && self.cell_of(point) == cell {
+                        offer(&mut best, squared, point);
+                    }
                 }
-                for (i, &squared) in (first..).zip(some) {
-                    if squared < best[NEIGHBORS - 1].0 {
-                        let at = best.partition_point(|near| near.0 <= squared);
-                        best.copy_within(at..NEIGHBORS - 1, at + 1);
-                        best[at] = (squared, cloud.point(i));
+            }
+            // What is not in these cells is farther than the edge of one.
+            if reach.min(best[NEIGHBORS - 1].0.sqrt()) <= self.cell {
+                return best;
+            }
+            best = [(f32::INFINITY, place); NEIGHBORS];
+        }
+        for (block, bounds) in cloud.blocks().iter().enumerate() {
+            let least = place.clamp(bounds.min, bounds.max).distance_squared(place);
+            if least <= *limits.end() && least < best[NEIGHBORS - 1].0 {
+                for i in block * BLOCK..((block + 1) * BLOCK).min(cloud.len()) {
+                    let point = cloud.point(i);
+                    let squared = point.distance_squared(place);
+                    if limits.contains(&squared) {
+                        offer(&mut best, squared, point);
                     }
                 }
             }
@@ -98,7 +152,7 @@ impl Surroundings {
     }
 
     /// Whether the point of `cloud` nearest to `place` stands alone.
-    fn is_alone(&mut self, cloud: &PointCloud, place: Vec3) -> bool {
+    fn is_alone(&self, cloud: &PointCloud, place: Vec3) -> bool {
         let [same, reach] = [SAME_POINT, REACH].map(|radii| radii * cloud.mean_radius());
         let [(_, point), ..] = self.nearest(cloud, place, 0.0, reach);
         let neighbors = self.nearest(cloud, point, same, reach);
@@ -144,10 +198,6 @@ impl LonePoints {
         self.members
             .sort_unstable_by_key(|&m| (group[m as usize], m));
         self.is_dropped.clear();
-        self.is_dropped.resize(contacts.len(), false);
-        if contacts.is_empty() {
-            return;
-        }
         let b_from_a = query.a_from_b.inverse();
         for side in [0, 1] {
             let Surface::Cloud(cloud) = [query.a, query.b][side] else {
@@ -157,23 +207,41 @@ impl LonePoints {
                 0 => c.point_a,
                 _ => b_from_a * c.point_b,
             };
+            let most = most_pixels(cloud, query.params.pixel_size);
             let same_group = |k: &u32, l: &u32| group[*k as usize] == group[*l as usize];
-            let components = || self.members.chunk_by(same_group);
-            let middles = components().map(|component| middle(component, contacts, at));
+            let small = || {
+                let components = self.members.chunk_by(same_group);
+                components.filter(|component| component.len() <= most)
+            };
+            if small().next().is_none() {
+                continue;
+            }
+            let middles = small().map(|component| middle(component, contacts, at));
             self.around.find(cloud, middles);
-            for component in components() {
-                if made_by_lone_point(&mut self.around, cloud, component, contacts, at) {
+            for component in small() {
+                if made_by_lone_point(&self.around, cloud, component, contacts, at) {
+                    self.is_dropped.resize(contacts.len(), false);
                     for &m in component {
                         self.is_dropped[m as usize] = true;
                     }
                 }
             }
         }
-        let mut is_dropped = self.is_dropped.iter();
-        result
-            .contacts
-            .retain(|_| is_dropped.next().is_some_and(|dropped| !dropped));
+        if !self.is_dropped.is_empty() {
+            let mut is_dropped = self.is_dropped.iter();
+            result
+                .contacts
+                .retain(|_| is_dropped.next().is_some_and(|dropped| !dropped));
+        }
     }
+}
+
+/// Most contact pixels that points of `cloud` make which stand alone: the splats of as many as can do
+/// so together. A larger component is a surface.
+fn most_pixels(cloud: &PointCloud, pixel_size: f32) -> usize {
+    // Where points are finer than pixels, splats are as large as these.
+    let radius = cloud.max_radius().max(pixel_size) / pixel_size;
+    NEIGHBORS * (2.0 * radius + 1.0).powi(2) as usize
 }
 
 /// The place of a component that is nearest to the mean of all its places.
@@ -193,7 +261,7 @@ fn middle(
 /// pixels. At the rim of a large splat, or where fine points border on coarse ones, some do not, or
 /// do.
 fn made_by_lone_point(
-    around: &mut Surroundings,
+    around: &Surroundings,
     cloud: &PointCloud,
     component: &[u32],
     contacts: &[ContactPixel],
