@@ -17,6 +17,7 @@ pub mod robot;
 pub mod scan;
 pub mod scene;
 mod shading;
+mod sheet;
 pub mod simulation;
 pub mod spots;
 pub mod step_totals;

@@ -72,7 +72,13 @@ fn spheres_answer_as_geometry_says() {
         let contacts = answer["contacts"].as_array().unwrap().len();
         assert_eq!(contacts > 0, depth > -0.01, "{answer}");
     }
-    let names = ["scene.png", "layers.png", "zone.png", "pixels.png"];
+    let names = [
+        "scene.png",
+        "zone.png",
+        "layers.png",
+        "section.png",
+        "pixels.png",
+    ];
     assert_pictures(&folder.join("pictures"), &names);
 }
 
