@@ -11,6 +11,7 @@ use tldi_examples::cli::{Common, UpChoice};
 use tldi_examples::depth::{
     DepthScene, DepthSimulation, DepthSnapshot, FrameSource, GeneratedCamera, camera_up,
 };
+use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::render::{BODY_COLORS, Item, Paint, Picture, Scene};
 use tldi_examples::scan::positive;
 use tldi_examples::scene::BodyShape;
@@ -63,6 +64,8 @@ struct Args {
     /// Also write motion.png, an animated PNG
     #[arg(long)]
     animate: bool,
+    #[command(flatten)]
+    recording: RecordingOption,
     #[command(flatten)]
     common: Common,
 }
@@ -141,7 +144,8 @@ fn run(args: &Args) -> anyhow::Result<()> {
         seed: args.common.seed,
     };
     let mut simulation = DepthSimulation::new(scene, &first, args.common.backend.open()?)?;
-    let snapshots = simulate(&mut simulation, &source, args)?;
+    let recording = args.recording.start("depth_camera", up)?;
+    let snapshots = simulate(&mut simulation, &source, recording, args)?;
     let report = simulation.report(missing);
     draw(&simulation, up, &snapshots, args)?;
     if let Some(path) = &args.common.json {
@@ -244,6 +248,7 @@ fn spots_in_view(
 fn simulate(
     simulation: &mut DepthSimulation,
     source: &FrameSource,
+    mut recording: Option<Recording>,
     args: &Args,
 ) -> anyhow::Result<Vec<DepthSnapshot>> {
     let held = (args.hold / FRAME_SECONDS).round() as usize;
@@ -255,6 +260,19 @@ fn simulate(
     for (k, index) in order.enumerate() {
         let frame = source.frame(index)?;
         (simulation.take_frame(&frame)).with_context(|| format!("{} failed", frame.name))?;
+        if let Some(recording) = &mut recording {
+            let snapshot = simulation.snapshot(ANIMATION_POINT_STEP)?;
+            let clouds: Vec<&PointCloud<'static>> = simulation.clouds().collect();
+            let entities = entities(&clouds, &snapshot);
+            recording.show(k as f32 * FRAME_SECONDS, &entities, &snapshot.contacts)?;
+            let intrinsics = source.intrinsics();
+            recording.camera(&RecordedCamera {
+                size: intrinsics.size.map(|n| n as f32),
+                focal: intrinsics.focal,
+                center: intrinsics.center.map(|c| c + 0.5),
+                scene_from_camera: frame.world_from_camera,
+            })?;
+        }
         if k == all * 3 / 5 || k + 1 == all {
             snapshots.push(simulation.snapshot(1)?);
         } else if args.animate && k % ANIMATION_FRAMES == 0 {
@@ -317,28 +335,40 @@ fn draw(
     Ok(())
 }
 
-fn scene_of<'a>(
+/// All that is there, by name.
+fn entities<'a>(
     clouds: &[&'a PointCloud<'static>],
-    up: Vec3,
     snapshot: &'a DepthSnapshot,
-) -> Scene<'a> {
+) -> Vec<(String, Item<'a>)> {
     let frame = Item {
         cloud: &snapshot.frame,
         scene_from_cloud: Pose3::IDENTITY,
         paint: Paint::Scan,
     };
-    let bodies = (clouds
-        .iter()
-        .zip(&snapshot.world_from_body)
-        .zip(BODY_COLORS.iter().cycle()))
-    .map(|((cloud, pose), color)| Item {
-        cloud,
-        scene_from_cloud: *pose,
-        paint: Paint::Body(*color),
+    let colors = BODY_COLORS.iter().cycle();
+    let bodies = clouds.iter().zip(&snapshot.world_from_body).zip(colors);
+    let bodies = bodies.enumerate().map(|(k, ((cloud, pose), color))| {
+        let body = Item {
+            cloud,
+            scene_from_cloud: *pose,
+            paint: Paint::Body(*color),
+        };
+        (format!("bodies/{}", k + 1), body)
     });
+    std::iter::once(("frame".to_owned(), frame))
+        .chain(bodies)
+        .collect()
+}
+
+fn scene_of<'a>(
+    clouds: &[&'a PointCloud<'static>],
+    up: Vec3,
+    snapshot: &'a DepthSnapshot,
+) -> Scene<'a> {
+    let items = entities(clouds, snapshot).into_iter();
     let sizes = clouds.iter().map(|cloud| cloud.bounds().extents().length());
     Scene {
-        items: std::iter::once(frame).chain(bodies).collect(),
+        items: items.map(|(_, item)| item).collect(),
         up,
         detail: sizes.fold(0.1, f32::max),
     }

@@ -9,8 +9,9 @@ use tldi::glamx::{Pose3, Vec3};
 use tldi::{KdTree, PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, UpChoice};
 use tldi_examples::gallop::{
-    GallopScene, GallopSimulation, GallopSnapshot, Ground, Runner, creature,
+    DT, GallopScene, GallopSimulation, GallopSnapshot, Ground, Runner, creature,
 };
+use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::render::{BODY_COLORS, Item, Paint, Picture, Scene};
 use tldi_examples::scan::positive;
 use tldi_examples::{animation, load, output};
@@ -60,6 +61,8 @@ struct Args {
     /// Also write motion.png, an animated PNG
     #[arg(long)]
     animate: bool,
+    #[command(flatten)]
+    recording: RecordingOption,
     #[command(flatten)]
     common: Common,
 }
@@ -134,7 +137,8 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let steps = args
         .steps
         .unwrap_or_else(|| simulation.steps_of_run().min(MOST_STEPS));
-    let snapshots = simulate(&mut simulation, steps, args.animate)?;
+    let recording = args.recording.start("gallop", Vec3::Y)?;
+    let snapshots = simulate(&mut simulation, steps, args.animate, recording)?;
     draw(&simulation, &snapshots, args)?;
     let report = simulation.report();
     if let Some(path) = &args.common.json {
@@ -169,12 +173,23 @@ fn simulate(
     simulation: &mut GallopSimulation,
     steps: usize,
     animate: bool,
+    mut recording: Option<Recording>,
 ) -> anyhow::Result<Vec<GallopSnapshot>> {
     let bar = output::progress_bar(steps, "steps");
     let mut snapshots = vec![simulation.snapshot()];
     let mut middle: Option<GallopSnapshot> = None;
     for step in 1..=steps {
         (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
+        if let Some(recording) = &mut recording {
+            let snapshot = simulation.snapshot();
+            let bodies: Vec<&PointCloud<'static>> = simulation.body_clouds().collect();
+            let entities = entities(&snapshot.runner, &bodies, &snapshot);
+            recording.show(step as f32 * DT, &entities, &snapshot.contacts)?;
+            let camera = beside(&snapshot, simulation.size(), PICTURE_SIZE);
+            if let Some(camera) = RecordedCamera::of_picture(&camera) {
+                recording.camera(&camera)?;
+            }
+        }
         if animate && step % ANIMATION_STEPS == 0 {
             snapshots.push(simulation.snapshot());
         }
@@ -231,7 +246,7 @@ fn draw(
             bar.inc(1);
         }
         bar.finish_and_clear();
-        let bytes = animation::to_apng(&pictures, ANIMATION_STEPS as f32 / 60.0)?;
+        let bytes = animation::to_apng(&pictures, ANIMATION_STEPS as f32 * DT)?;
         output::write_file(&args.out.join("motion.png"), &bytes)?;
     }
     eprintln!("pictures are in {}", args.out.display());
@@ -278,27 +293,51 @@ fn tinted(snapshot: &GallopSnapshot, reach: f32) -> anyhow::Result<PointCloud<'s
     })?)
 }
 
+/// All that is there, by name; `runner` is what runs, in its colours.
+fn entities<'a>(
+    runner: &'a PointCloud<'a>,
+    bodies: &[&'a PointCloud<'static>],
+    snapshot: &'a GallopSnapshot,
+) -> Vec<(String, Item<'a>)> {
+    let entity = |name: String, cloud, scene_from_cloud, paint| {
+        let item = Item {
+            cloud,
+            scene_from_cloud,
+            paint,
+        };
+        (name, item)
+    };
+    let colors = BODY_COLORS[1..].iter().cycle();
+    let loose = (bodies.iter().zip(&snapshot.world_from_body).zip(colors)).enumerate();
+    let loose = loose.map(|(k, ((cloud, pose), color))| {
+        let name = format!("bodies/{}", k + 1);
+        entity(name, *cloud, *pose, Paint::Body(*color))
+    });
+    let ground = entity(
+        "ground".to_owned(),
+        &snapshot.ground,
+        Pose3::IDENTITY,
+        Paint::Scan,
+    );
+    let skin = Paint::Body(SKIN.map(|c| c / 255.0));
+    let runner = entity(
+        "runner".to_owned(),
+        runner,
+        snapshot.world_from_runner,
+        skin,
+    );
+    [ground, runner].into_iter().chain(loose).collect()
+}
+
 fn scene_of<'a>(
     runner: &'a PointCloud<'a>,
     bodies: &[&'a PointCloud<'static>],
     snapshot: &'a GallopSnapshot,
     size: f32,
 ) -> Scene<'a> {
-    let item = |cloud, scene_from_cloud, paint| Item {
-        cloud,
-        scene_from_cloud,
-        paint,
-    };
-    let colors = BODY_COLORS[1..].iter().cycle();
-    let loose = (bodies.iter().zip(&snapshot.world_from_body).zip(colors))
-        .map(|((cloud, pose), color)| item(*cloud, *pose, Paint::Body(*color)));
-    let mut items = vec![
-        item(&snapshot.ground, Pose3::IDENTITY, Paint::Scan),
-        item(runner, snapshot.world_from_runner, Paint::Body([0.7; 3])),
-    ];
-    items.extend(loose);
+    let items = entities(runner, bodies, snapshot).into_iter();
     Scene {
-        items,
+        items: items.map(|(_, item)| item).collect(),
         up: Vec3::Y,
         detail: 0.25 * size,
     }

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, Triple};
+use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::render::{BODY_COLORS, Item, Paint, Picture, Scene};
 use tldi_examples::robot::{
     BUILT_IN, Base, DT, Description, RobotScene, RobotSimulation, RobotSnapshot,
@@ -55,6 +56,8 @@ struct Args {
     /// Also write motion.png, an animated PNG
     #[arg(long)]
     animate: bool,
+    #[command(flatten)]
+    recording: RecordingOption,
     #[command(flatten)]
     common: Common,
 }
@@ -106,7 +109,11 @@ fn run(args: &Args) -> anyhow::Result<()> {
     if simulation.tip().is_none() && simulation.report().driven_joints == 0 {
         eprintln!("the robot has no joint that moves: it just stands there");
     }
-    let snapshots = simulate(&mut simulation, args.steps)?;
+    let mut recording = args.recording.start("robot_in_scan", up)?;
+    if let Some(recording) = &mut recording {
+        record_start(recording, &simulation, up)?;
+    }
+    let snapshots = simulate(&mut simulation, args.steps, recording)?;
     let report = simulation.report();
     draw(&simulation, up, &snapshots, args)?;
     if let Some(path) = &args.common.json {
@@ -138,6 +145,7 @@ fn load_robot(path: Option<&Path>) -> anyhow::Result<Description> {
 fn simulate(
     simulation: &mut RobotSimulation,
     steps: Option<usize>,
+    mut recording: Option<Recording>,
 ) -> anyhow::Result<Vec<RobotSnapshot>> {
     let seconds = match simulation.motion_seconds() {
         seconds if seconds.is_finite() => (seconds + 0.5).min(LONGEST_SECONDS),
@@ -148,6 +156,11 @@ fn simulate(
     let mut snapshots = vec![simulation.snapshot()];
     for step in 1..=steps {
         (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
+        if let Some(recording) = &mut recording {
+            let snapshot = simulation.snapshot();
+            let entities = entities(simulation, simulation.scan(), &snapshot);
+            recording.show(step as f32 * DT, &entities, &snapshot.contacts)?;
+        }
         if step % ANIMATION_STEPS == 0 || step == steps {
             snapshots.push(simulation.snapshot());
         }
@@ -155,6 +168,23 @@ fn simulate(
     }
     bar.finish_and_clear();
     Ok(snapshots)
+}
+
+/// The start, and a camera that sees the robot well.
+fn record_start(
+    recording: &mut Recording,
+    simulation: &RobotSimulation,
+    up: Vec3,
+) -> anyhow::Result<()> {
+    let (scan, snapshot) = (simulation.scan(), simulation.snapshot());
+    let entities = entities(simulation, scan, &snapshot);
+    recording.show(0.0, &entities, &snapshot.contacts)?;
+    let scene = scene_of(simulation, scan, up, &snapshot);
+    let camera = viewpoint::choose(&scene, &[], PICTURE_SIZE);
+    if let Some(camera) = RecordedCamera::of_picture(&camera) {
+        recording.camera(&camera)?;
+    }
+    Ok(())
 }
 
 fn draw(
@@ -206,42 +236,55 @@ fn draw(
     Ok(())
 }
 
+/// All that is there, by name.
+fn entities<'a>(
+    simulation: &'a RobotSimulation,
+    scan: &'a PointCloud<'a>,
+    snapshot: &RobotSnapshot,
+) -> Vec<(String, Item<'a>)> {
+    let item = |cloud, scene_from_cloud, paint| Item {
+        cloud,
+        scene_from_cloud,
+        paint,
+    };
+    let scan = item(scan, Pose3::IDENTITY, Paint::Scan);
+    let links = simulation.links().iter().enumerate().map(|(k, link)| {
+        let paint = Paint::Body(if snapshot.link_touches[k] {
+            TOUCHING_COLOR
+        } else {
+            LINK_COLORS[k % 2]
+        });
+        let name = format!("robot/{}", link.name);
+        (name, item(&link.cloud, snapshot.scan_from_link[k], paint))
+    });
+    let colors = BODY_COLORS[1..].iter().cycle();
+    let bodies = (simulation.loose_clouds())
+        .zip(&snapshot.scan_from_body)
+        .zip(colors)
+        .enumerate()
+        .map(|(k, ((cloud, pose), color))| {
+            let name = format!("bodies/{}", k + 1);
+            (name, item(cloud, *pose, Paint::Body(*color)))
+        });
+    std::iter::once(("scan".to_owned(), scan))
+        .chain(links)
+        .chain(bodies)
+        .collect()
+}
+
 fn scene_of<'a>(
     simulation: &'a RobotSimulation,
     drawn_scan: &'a PointCloud<'a>,
     up: Vec3,
     snapshot: &RobotSnapshot,
 ) -> Scene<'a> {
-    let scan = Item {
-        cloud: drawn_scan,
-        scene_from_cloud: Pose3::IDENTITY,
-        paint: Paint::Scan,
-    };
-    let links = simulation.links().iter().enumerate().map(|(k, link)| Item {
-        cloud: &link.cloud,
-        scene_from_cloud: snapshot.scan_from_link[k],
-        paint: Paint::Body(if snapshot.link_touches[k] {
-            TOUCHING_COLOR
-        } else {
-            LINK_COLORS[k % 2]
-        }),
-    });
-    let colors = BODY_COLORS[1..].iter().cycle();
-    let bodies = (simulation
-        .loose_clouds()
-        .zip(&snapshot.scan_from_body)
-        .zip(colors))
-    .map(|((cloud, pose), color)| Item {
-        cloud,
-        scene_from_cloud: *pose,
-        paint: Paint::Body(*color),
-    });
+    let items = entities(simulation, drawn_scan, snapshot).into_iter();
     let sizes = simulation
         .links()
         .iter()
         .map(|link| link.cloud.bounds().extents().length());
     Scene {
-        items: std::iter::once(scan).chain(links).chain(bodies).collect(),
+        items: items.map(|(_, item)| item).collect(),
         up,
         detail: 0.3 * sizes.fold(0.0, f32::max),
     }

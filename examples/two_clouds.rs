@@ -36,7 +36,7 @@ struct Args {
         allow_hyphen_values = true
     )]
     velocity: Triple,
-    /// Folder for scene.png, layers.png, zone.png and pixels.png
+    /// Folder for scene.png, zone.png, layers.png, section.png and pixels.png
     #[arg(long, value_name = "DIR", default_value = "out/two_clouds")]
     out: PathBuf,
     /// Also write motion.png, an animated PNG of B on its way along the velocity
@@ -128,6 +128,7 @@ fn draw(query: &CloudQuery, answer: &Answer, folder: &Path) -> anyhow::Result<()
     for (name, picture) in [
         ("scene.png", query_pictures::scene(query, answer, &camera)),
         ("layers.png", query_pictures::layers(query, answer)),
+        ("section.png", query_pictures::section(query, answer)),
         ("zone.png", query_pictures::zone(query, answer, &camera)?),
         ("pixels.png", query_pictures::contact_pixels(query, answer)),
     ] {

@@ -1,8 +1,10 @@
-//! Pictures of one query: the layers of both images, the contact zone, the contact pixels.
+//! Pictures of one query: the layers of both images, a cut through them, the contact zone, the contact
+//! pixels.
 
 use crate::load;
 use crate::query::{Answer, CloudQuery};
 use crate::render::{BODY_COLORS, Item, Paint, Picture, Scene};
+use crate::sheet::{Key, Panel, sheet};
 use crate::viewpoint;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
@@ -11,18 +13,32 @@ use tldi::{
 
 /// Most pixels along an edge of a layer's panel before it is enlarged.
 const PANEL_PIXELS: u32 = 320;
-/// Width or height in picture pixels that panels are enlarged to, at most.
-const PANEL_EDGE: u32 = 320;
+/// Width or height in picture pixels that panels are enlarged to, at most: a layer, contact pixels, and
+/// the width of a section.
+const LAYER_EDGE: u32 = 320;
+const CONTACTS_EDGE: u32 = 560;
+const SECTION_WIDTH: u32 = 960;
 /// Layers of an image that are shown.
 const SHOWN_LAYERS: usize = 4;
 /// Views of a pair whose contact pixels are shown.
 const SHOWN_VIEWS: usize = 3;
 /// Distance in mean radii up to which points are near the other cloud.
 const ZONE_REACH: f32 = 6.0;
-/// Space between panels in picture pixels.
-const PANEL_SPACE: u32 = 8;
-const PAPER: [u8; 3] = [250, 250, 250];
 const NOTHING: [u8; 3] = [228, 231, 236];
+/// Where a ray enters a body, leaves it, and where the cloud does not tell.
+const ENTRY: [u8; 3] = [240, 140, 60];
+const EXIT: [u8; 3] = [80, 140, 230];
+const UNKNOWN: [u8; 3] = [190, 190, 190];
+/// Behind contact pixels: both clouds are there, only one, only the other.
+const BOTH: [u8; 3] = [196, 200, 206];
+const ONLY: [[u8; 3]; 2] = [[226, 214, 204], [206, 216, 228]];
+/// A and B in a section, and half the width of the line of a surface there, in picture pixels.
+const SIDES: [[u8; 3]; 2] = [[214, 92, 30], [40, 116, 200]];
+const SURFACE_LINE: f32 = 1.6;
+/// Full penetration, a full gap, and points of the solver.
+const DEEP: [u8; 3] = [235, 30, 20];
+const WIDE: [u8; 3] = [30, 90, 235];
+const SOLVER_POINT: [u8; 3] = [255, 230, 40];
 
 /// A camera that sees both clouds, for pictures of `size`.
 pub fn camera(query: &CloudQuery, size: [u32; 2]) -> VirtualCamera {
@@ -95,12 +111,20 @@ pub fn layers(query: &CloudQuery, answer: &Answer) -> Picture {
     let images = views.images(query);
     let shown = images.each_ref().map(|image| image.max_layers());
     let columns = shown[0].max(shown[1]).clamp(1, SHOWN_LAYERS);
-    let rows = images.each_ref().map(|image| {
-        (0..columns)
-            .map(|k| views.panel(|x, y| layer_color(image, &views, [x, y], k)))
-            .collect::<Vec<_>>()
+    let rows = ["A", "B"].into_iter().zip(&images).map(|(name, image)| {
+        let panel = |k: usize| {
+            let picture = views.panel(LAYER_EDGE, |x, y| layer_color(image, &views, [x, y], k));
+            let caption = format!("{name}, layer {}", k + 1);
+            Panel { picture, caption }
+        };
+        (0..columns).map(panel).collect::<Vec<_>>()
     });
-    mosaic(&rows)
+    let legend = [
+        Key::new(ENTRY, "the ray enters the body; the nearer, the brighter"),
+        Key::new(EXIT, "the ray leaves it"),
+        Key::new(UNKNOWN, "the cloud does not tell, or the ray grazes it"),
+    ];
+    sheet(&rows.collect::<Vec<_>>(), &legend)
 }
 
 /// The pixels in which the surfaces are close, for each view: red where they penetrate, the deeper
@@ -114,37 +138,136 @@ pub fn contact_pixels(query: &CloudQuery, answer: &Answer) -> Picture {
             .collect();
         let views = Views::of_contacts(query, answer, view, &contacts);
         let images = views.images(query);
-        let mut picture = views.panel(|x, y| {
+        let mut picture = views.panel(CONTACTS_EDGE, |x, y| {
             let covered = images
                 .each_ref()
                 .map(|image| !views.layers_at(image, [x, y]).is_empty());
             let Some(contact) = contacts.iter().find(|c| c.pixel == [x, y]) else {
                 return match covered {
-                    [true, true] => [196, 200, 206],
-                    [true, false] => [226, 214, 204],
-                    [false, true] => [206, 216, 228],
+                    [true, true] => BOTH,
+                    [true, false] => ONLY[0],
+                    [false, true] => ONLY[1],
                     _ => NOTHING,
                 };
             };
             let strength = (contact.gap.abs() / scale).min(1.0);
-            let faded =
-                |full: u8| (f32::from(full) + (235.0 - f32::from(full)) * (1.0 - strength)) as u8;
-            if contact.gap < 0.0 {
-                [235, faded(30), faded(20)]
-            } else {
-                [faded(30), faded(90), 235]
-            }
+            let full = if contact.gap < 0.0 { DEEP } else { WIDE };
+            faded(full, 1.0 - strength)
         });
-        let enlarged = views.enlargement();
+        let enlarged = views.enlargement(CONTACTS_EDGE);
         for contact in &answer.report.contacts {
             let seen = views.camera.view_from_point(Vec3::from(contact.point));
             let [u, v] = views.camera.pixel_from_view(seen);
             let place = [u - views.origin[0] as f32, v - views.origin[1] as f32];
             cross(&mut picture, place.map(|c| c * enlarged as f32));
         }
-        picture
+        let caption = format!("view {}, {} contact pixels", view + 1, contacts.len());
+        Panel { picture, caption }
     });
-    mosaic(&[panels.collect()])
+    let panels = panels.collect();
+    let millimetres = |metres: f32| format!("{:.1} mm", 1e3 * metres);
+    let deepest = answer.result.contacts.iter().map(|contact| -contact.gap);
+    let legend = [
+        Key::new(
+            DEEP,
+            format!(
+                "penetration, at most {}",
+                millimetres(deepest.fold(0.0, f32::max))
+            ),
+        ),
+        Key::new(WIDE, format!("gap, up to {} counts", millimetres(scale))),
+        Key::new(SOLVER_POINT, "crosses: points for the solver"),
+        Key::new(ONLY[0], "only A is there"),
+        Key::new(ONLY[1], "only B is there"),
+        Key::new(BOTH, "both are there, out of reach of each other"),
+    ];
+    sheet(&[panels], &legend)
+}
+
+/// A cut through both images along a row of pixels, seen from the side: the rays go down. Dark: the
+/// surface of each layer; medium: what was merged into it, from nearest to farthest; pale: between a layer
+/// where the ray enters a body and the next where it leaves it, red where that is so of both. The row is
+/// that with most contact pixels, or the middle one.
+pub fn section(query: &CloudQuery, answer: &Answer) -> Picture {
+    let views = Views::new(query, answer);
+    let images = views.images(query);
+    let row = section_row(&views, answer);
+    let x_of = |column: u32| views.origin[0] + column as i32;
+    let columns: Vec<[&[Layer]; 2]> = (0..views.size[0])
+        .map(|column| (images.each_ref()).map(|image| views.layers_at(image, [x_of(column), row])))
+        .collect();
+    let ends = columns.iter().flatten().copied().flatten();
+    let (near, far) = ends.fold((f32::MAX, f32::MIN), |(near, far), layer| {
+        (near.min(layer.near), far.max(layer.far))
+    });
+    let enlarged = views.enlargement(SECTION_WIDTH);
+    // As many picture pixels a metre along the rays as across them.
+    let scale = enlarged as f32 / views.params.pixel_size;
+    let margin = 4.0 * enlarged as f32;
+    let height = ((far - near).max(0.0) * scale + 2.0 * margin) as u32;
+    let color_at = |layers: &[&[Layer]; 2], y: u32| {
+        let depth = near + (y as f32 + 0.5 - margin) / scale;
+        let half_line = SURFACE_LINE / scale;
+        let of_surface = (layers.iter().zip(SIDES))
+            .find(|(layers, _)| layers.iter().any(|l| (l.depth - depth).abs() < half_line));
+        let of_layer = (layers.iter().zip(SIDES))
+            .find(|(layers, _)| layers.iter().any(|l| (l.near..=l.far).contains(&depth)));
+        match (of_surface, of_layer, layers.map(|l| is_inside(l, depth))) {
+            (Some((_, color)), ..) => color,
+            (_, Some((_, color)), _) => faded(color, 0.5),
+            (.., [true, true]) => faded(DEEP, 0.3),
+            (.., [true, false]) => faded(SIDES[0], 0.8),
+            (.., [false, true]) => faded(SIDES[1], 0.8),
+            _ => NOTHING,
+        }
+    };
+    let width = views.size[0] * enlarged;
+    let rgb = (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        // A gap between the columns shows the rays.
+        .map(|(x, y)| match x % enlarged {
+            0 if enlarged > 2 => NOTHING,
+            _ => color_at(&columns[(x / enlarged) as usize], y),
+        })
+        .collect();
+    let picture = Picture {
+        size: [width, height],
+        rgb,
+    };
+    let legend = [
+        Key::new(SIDES[0], "surface of A in each layer, pale inside of A"),
+        Key::new(SIDES[1], "surface of B, and inside of it"),
+        Key::new(faded(DEEP, 0.3), "inside both: penetration"),
+    ];
+    let caption = "one row of pixels from the side: the rays go down".to_owned();
+    sheet(&[vec![Panel { picture, caption }]], &legend)
+}
+
+/// The row with most contact pixels of the first view, in the rows of `views`, or else the middle one.
+fn section_row(views: &Views, answer: &Answer) -> i32 {
+    let by_query = answer.params.pixel_size / views.params.pixel_size;
+    let contacts = (answer.result.contacts.iter()).filter(|contact| contact.view == 0);
+    let rows: Vec<i32> = contacts
+        .map(|contact| ((contact.pixel[1] as f32 + 0.5) * by_query).floor() as i32)
+        .collect();
+    let count = |row: i32| rows.iter().filter(|other| **other == row).count();
+    let fullest = rows.iter().copied().max_by_key(|row| (count(*row), -*row));
+    fullest.unwrap_or(views.origin[1] + views.size[1] as i32 / 2)
+}
+
+/// Whether a ray is inside a body at a depth: past a layer where it enters, before the next where it
+/// leaves.
+fn is_inside(layers: &[Layer], depth: f32) -> bool {
+    layers.windows(2).any(|pair| {
+        pair[0].facing == Facing::Entry
+            && pair[1].facing == Facing::Exit
+            && (pair[0].depth..pair[1].depth).contains(&depth)
+    })
+}
+
+/// A colour mixed with near-white, all of which is at a `share` of 1.
+fn faded(color: [u8; 3], share: f32) -> [u8; 3] {
+    color.map(|c| (f32::from(c) + (240.0 - f32::from(c)) * share) as u8)
 }
 
 fn layer_color(image: &Tldi, views: &Views, [x, y]: [i32; 2], k: usize) -> [u8; 3] {
@@ -152,14 +275,14 @@ fn layer_color(image: &Tldi, views: &Views, [x, y]: [i32; 2], k: usize) -> [u8; 
         return NOTHING;
     };
     let full = match layer.facing {
-        Facing::Entry => [240.0, 140.0, 60.0],
-        Facing::Exit => [80.0, 140.0, 230.0],
-        Facing::Unknown => [190.0, 190.0, 190.0],
+        Facing::Entry => ENTRY,
+        Facing::Exit => EXIT,
+        Facing::Unknown => UNKNOWN,
     };
     let [near, far] = views.depths;
     let farness = (layer.depth - near) / (far - near).max(1e-9);
     let light = (1.0 - 0.5 * farness) * (0.55 + 0.45 * layer.normal.z.abs());
-    full.map(|c| (c * light) as u8)
+    full.map(|c| (f32::from(c) * light) as u8)
 }
 
 /// A rectangle of a view's pixels that both images are shown in.
@@ -245,14 +368,15 @@ impl Views {
         }
     }
 
-    /// Picture pixels along the edge of a pixel of the view.
-    fn enlargement(&self) -> u32 {
-        (PANEL_EDGE / self.size[0].max(self.size[1])).max(1)
+    /// Picture pixels along the edge of a pixel of the view, in a panel of up to `edge` picture pixels.
+    fn enlargement(&self, edge: u32) -> u32 {
+        (edge / self.size[0].max(self.size[1])).max(1)
     }
 
-    /// A picture of the rectangle; `color` gets columns and rows of the view.
-    fn panel(&self, color: impl Fn(i32, i32) -> [u8; 3]) -> Picture {
-        let enlarged = self.enlargement();
+    /// A picture of the rectangle, enlarged up to `edge` picture pixels; `color` gets columns and rows
+    /// of the view.
+    fn panel(&self, edge: u32, color: impl Fn(i32, i32) -> [u8; 3]) -> Picture {
+        let enlarged = self.enlargement(edge);
         let size = self.size.map(|n| n * enlarged);
         let colors: Vec<[u8; 3]> = (0..self.size[1] as i32)
             .flat_map(|j| (0..self.size[0] as i32).map(move |i| (i, j)))
@@ -275,38 +399,6 @@ fn axis_of(query: &CloudQuery, answer: &Answer, view: usize) -> Vec3 {
         .unwrap_or_else(|| apart.normalize_or(Vec3::Z))
 }
 
-/// Panels in rows, with space between them.
-fn mosaic(rows: &[Vec<Picture>]) -> Picture {
-    let width_of = |row: &Vec<Picture>| {
-        let panels: u32 = row.iter().map(|panel| panel.size[0] + PANEL_SPACE).sum();
-        panels + PANEL_SPACE
-    };
-    let height_of = |row: &Vec<Picture>| row.iter().map(|panel| panel.size[1]).max().unwrap_or(0);
-    let width = rows.iter().map(width_of).max().unwrap_or(1);
-    let heights = rows.iter().map(|row| height_of(row) + PANEL_SPACE);
-    let height = heights.sum::<u32>() + PANEL_SPACE;
-    let mut rgb = vec![PAPER; (width * height) as usize];
-    let mut top = PANEL_SPACE;
-    for row in rows {
-        let mut left = PANEL_SPACE;
-        for panel in row {
-            let [columns, panel_rows] = panel.size;
-            for y in 0..panel_rows {
-                let from = (y * columns) as usize;
-                let to = ((top + y) * width + left) as usize;
-                rgb[to..to + columns as usize]
-                    .copy_from_slice(&panel.rgb[from..from + columns as usize]);
-            }
-            left += columns + PANEL_SPACE;
-        }
-        top += height_of(row) + PANEL_SPACE;
-    }
-    Picture {
-        size: [width, height],
-        rgb,
-    }
-}
-
 fn cross(picture: &mut Picture, [u, v]: [f32; 2]) {
     const ARM: i32 = 5;
     for step in -ARM..=ARM {
@@ -316,7 +408,7 @@ fn cross(picture: &mut Picture, [u, v]: [f32; 2]) {
                 let [width, height] = picture.size.map(|n| n as i32);
                 if (0..width).contains(&x) && (0..height).contains(&y) {
                     let color = if across == 0 {
-                        [255, 230, 40]
+                        SOLVER_POINT
                     } else {
                         [40, 20, 20]
                     };

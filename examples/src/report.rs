@@ -1,37 +1,23 @@
 //! Results as JSON and as a table.
 
-use crate::devices::Devices;
+use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
 
 /// What a run of `drop` found, as written to `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct DropReport {
-    /// What compared the clouds.
+    /// Counts over all steps; contacts are those of any pair.
     #[serde(flatten)]
-    pub devices: Devices,
-    /// Steps simulated.
-    pub steps: usize,
-    /// Length of a step in seconds.
-    pub dt: f32,
-    /// Wall-clock time of the simulation in seconds.
-    pub wall_seconds: f64,
-    /// Simulated time by wall-clock time.
-    pub real_time_factor: f64,
+    pub totals: StepTotals,
     /// Points of the scan.
     pub scan_points: usize,
     /// Mean point radius in metres of the coarser of scan and bodies.
     pub mean_radius: f32,
     /// Up direction, in the frame of the scan.
     pub up: [f32; 3],
-    /// Steps with at least one pair in contact.
-    pub contact_steps: usize,
     /// Deepest penetration in metres after the last step.
     pub max_penetration: f32,
-    /// Pairs compared in batches, over all steps.
-    pub pairs_batched: usize,
-    /// Pairs compared on the spot, over all steps.
-    pub pairs_missed: usize,
     /// The bodies, in the order in which they were inserted.
     pub bodies: Vec<BodyReport>,
 }
@@ -93,18 +79,11 @@ impl DropReport {
         }
         writeln!(
             out,
-            "{} steps of {:.4} s in {:.2} s ({:.1} x real time) on {}; {} scan points; \
-             {} pairs batched, {} missed; penetration at the end {:.2} mm (mean radius {:.2} mm)",
-            self.steps,
-            self.dt,
-            self.wall_seconds,
-            self.real_time_factor,
-            self.devices.backend,
+            "{} scan points; penetration at the end {:.2} mm (mean radius {:.2} mm)",
             self.scan_points,
-            self.pairs_batched,
-            self.pairs_missed,
             1e3 * self.max_penetration,
             1e3 * self.mean_radius
-        )
+        )?;
+        self.totals.write_line(out)
     }
 }

@@ -1,8 +1,8 @@
 //! Lets bodies fall onto a scan and records what happens.
 
-use crate::devices::Devices;
 use crate::report::{BodyReport, DropReport};
 use crate::spots::Spot;
+use crate::step_totals::StepTotals;
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -50,13 +50,8 @@ pub struct DropSimulation {
     up: Vec3,
     scan: PointCloud<'static>,
     bodies: Vec<Body>,
-    steps: usize,
-    contact_steps: usize,
-    pairs_batched: usize,
-    pairs_missed: usize,
+    totals: StepTotals,
     max_penetration: f32,
-    devices: Devices,
-    wall_seconds: f64,
 }
 
 struct Body {
@@ -114,13 +109,8 @@ impl DropSimulation {
             up,
             scan,
             bodies,
-            steps: 0,
-            contact_steps: 0,
-            pairs_batched: 0,
-            pairs_missed: 0,
+            totals: StepTotals::new(DT),
             max_penetration: 0.0,
-            devices: Devices::default(),
-            wall_seconds: 0.0,
         })
     }
 
@@ -131,16 +121,12 @@ impl DropSimulation {
     pub fn step(&mut self) -> Result<(), TldiError> {
         let start = Instant::now();
         let report = self.tldi.step(&mut self.world)?;
-        self.wall_seconds += start.elapsed().as_secs_f64();
-        self.steps += 1;
-        self.contact_steps += usize::from(report.pairs_in_contact > 0);
-        self.pairs_batched += report.pairs_batched;
-        self.pairs_missed += report.pairs_missed;
+        self.totals.count(&report, report.pairs_in_contact > 0);
+        self.totals.add_wall_seconds(start.elapsed().as_secs_f64());
         self.max_penetration = report.max_penetration;
-        self.devices.note(&report);
         for body in &mut self.bodies {
             body.slept_at_step = if self.world.bodies[body.handle].is_sleeping() {
-                body.slept_at_step.or(Some(self.steps))
+                body.slept_at_step.or(Some(self.totals.steps))
             } else {
                 None
             };
@@ -182,18 +168,11 @@ impl DropSimulation {
             .iter()
             .map(|body| body.named.cloud.mean_radius());
         DropReport {
-            devices: self.devices.clone(),
-            steps: self.steps,
-            dt: DT,
-            wall_seconds: self.wall_seconds,
-            real_time_factor: f64::from(DT) * self.steps as f64 / self.wall_seconds.max(1e-9),
+            totals: self.totals.clone(),
             scan_points: self.scan.len(),
             mean_radius: body_radii.fold(self.scan.mean_radius(), f32::max),
             up: self.up.to_array(),
-            contact_steps: self.contact_steps,
             max_penetration: self.max_penetration,
-            pairs_batched: self.pairs_batched,
-            pairs_missed: self.pairs_missed,
             bodies: self
                 .bodies
                 .iter()

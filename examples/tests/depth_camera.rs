@@ -3,7 +3,8 @@
 mod common;
 
 use common::{
-    PICTURES, assert_keys, assert_pictures, assert_refused, data, folder, number, without_times,
+    PICTURES, TIMES, assert_keys, assert_pictures, assert_refused, data, folder, number,
+    seeded_report,
 };
 use serde_json::Value;
 use std::fs;
@@ -95,30 +96,9 @@ fn what_is_gone_from_the_frame_does_not_hold() {
 #[test]
 fn the_generated_ball_pushes_and_equal_seeds_give_equal_reports() {
     let folder = folder("depth_generated");
-    let run = || {
-        let mut report = report(&folder, &[]);
-        let times = [
-            "wall_seconds",
-            "real_time_factor",
-            "median_latency_ms",
-            "max_latency_ms",
-        ];
-        without_times(&mut report, &times);
-        for frame in report["frames"].as_array_mut().unwrap() {
-            for key in [
-                "decode_ms",
-                "unproject_ms",
-                "update_ms",
-                "step_ms",
-                "latency_ms",
-            ] {
-                frame[key] = Value::Null;
-            }
-        }
-        report
-    };
-    let first = run();
-    assert_eq!(run(), first);
+    let times = [&TIMES[..], &["median_latency_ms", "max_latency_ms"]].concat();
+    let frame_times = ["unproject_ms", "update_ms", "step_ms", "latency_ms"];
+    let first = seeded_report(BINARY, &folder, &[], &times, &frame_times);
     assert_keys(
         &first,
         &[

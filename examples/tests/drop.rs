@@ -3,7 +3,8 @@
 mod common;
 
 use common::{
-    PICTURES, assert_pictures, assert_refused, folder, json, keys, run, without_times, write_ply,
+    PICTURES, TIMES, assert_pictures, assert_refused, folder, json, keys, run, seeded_report,
+    write_ply,
 };
 use serde_json::Value;
 use std::path::Path;
@@ -63,18 +64,10 @@ fn drop_in(folder: &Path, options: &[&str]) -> Output {
 #[test]
 fn bodies_come_to_rest_and_equal_seeds_give_equal_reports() {
     let folder = folder("rest");
-    let run = |json_file: &str, seed: &str| {
-        let options = ["--steps", "120", "--seed", seed, "--json", json_file];
-        let output = drop_in(&folder, &options);
-        let stderr = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{stderr}");
-        let mut report = json(folder.join(json_file));
-        without_times(&mut report, &["wall_seconds", "real_time_factor"]);
-        (report, String::from_utf8(output.stdout).unwrap())
-    };
-    let (report, table) = run("a.json", "7");
-    assert_eq!(run("b.json", "7").0, report);
-    assert_ne!(run("c.json", "8").0, report);
+    write_scene(&folder);
+    let options = [&SCENE[..], &["--steps", "120"]].concat();
+    let report = seeded_report(BINARY, &folder, &options, &TIMES, &[]);
+    let table = String::from_utf8(drop_in(&folder, &["--steps", "1"]).stdout).unwrap();
 
     assert_eq!(
         keys(&report),

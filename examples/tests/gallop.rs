@@ -3,7 +3,8 @@
 mod common;
 
 use common::{
-    PICTURES, assert_keys, assert_pictures, assert_refused, data, folder, number, without_times,
+    PICTURES, TIMES, assert_keys, assert_pictures, assert_refused, data, folder, number,
+    seeded_report,
 };
 use serde_json::Value;
 use std::fs;
@@ -42,17 +43,8 @@ fn write_hopping_ball(path: &Path) {
 #[test]
 fn the_creature_kicks_and_equal_seeds_give_equal_reports() {
     let folder = folder("gallop_generated");
-    let run = |seed: &str| {
-        let mut report = report(&folder, &["--seed", seed, "--steps", "150"]);
-        without_times(&mut report, &["wall_seconds", "real_time_factor"]);
-        for frame in report["frames"].as_array_mut().unwrap() {
-            without_times(frame, &["deform_ms", "step_ms"]);
-        }
-        report
-    };
-    let first = run("1");
-    assert_eq!(run("1"), first);
-    assert_ne!(run("2"), first);
+    let frame_times = ["deform_ms", "step_ms"];
+    let first = seeded_report(BINARY, &folder, &["--steps", "150"], &TIMES, &frame_times);
     assert_keys(
         &first,
         &[

@@ -3,8 +3,8 @@
 mod common;
 
 use common::{
-    PICTURES, assert_keys, assert_pictures, assert_refused, data, folder, json, number, run,
-    stderr, without_times, write_ply,
+    PICTURES, TIMES, assert_keys, assert_pictures, assert_refused, data, folder, json, number, run,
+    seeded_report, stderr, write_ply,
 };
 use serde_json::Value;
 use std::fs;
@@ -81,13 +81,7 @@ fn report(folder: &Path, options: &[&str]) -> Value {
 #[test]
 fn the_built_in_arm_touches_and_equal_seeds_give_equal_reports() {
     let folder = folder("robot_built_in");
-    let run = |seed: &str| {
-        let mut report = report(&folder, &["--seed", seed, "--steps", "500"]);
-        without_times(&mut report, &["wall_seconds", "real_time_factor"]);
-        report
-    };
-    let first = run("1");
-    assert_eq!(run("1"), first);
+    let first = seeded_report(BINARY, &folder, &["--steps", "500"], &TIMES, &[]);
     assert_keys(
         &first,
         &[

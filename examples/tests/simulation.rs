@@ -113,7 +113,7 @@ fn the_report_says_when_a_body_fell_asleep() {
     let slept_at = body.slept_at_seconds.expect("it sleeps");
     assert!((slept_at - first as f32 / 60.0).abs() < 1e-4, "{slept_at}");
     assert!((body.translation[2] - 0.5 * EDGE).abs() < 0.005, "{body:?}");
-    assert_eq!(report.steps, first + 5);
+    assert_eq!(report.totals.steps, first + 5);
     // The scan has the larger radii.
     assert_eq!(report.mean_radius, 0.02);
 }
@@ -146,10 +146,14 @@ fn bodies_end_in_the_same_places_on_the_gpu() {
         }
         (simulation.snapshot().scan_from_body, simulation.report())
     });
-    assert_eq!(on_cpu.1.devices.adapter, None);
-    assert!(on_gpu.1.devices.adapter.is_some(), "{:?}", on_gpu.1.devices);
-    assert_eq!(on_gpu.1.devices.fallback, None);
-    assert!(on_gpu.1.contact_steps > 60 && on_gpu.1.pairs_missed == 0);
+    assert_eq!(on_cpu.1.totals.devices.adapter, None);
+    assert!(
+        on_gpu.1.totals.devices.adapter.is_some(),
+        "{:?}",
+        on_gpu.1.totals.devices
+    );
+    assert_eq!(on_gpu.1.totals.devices.fallback, None);
+    assert!(on_gpu.1.totals.contact_steps > 60 && on_gpu.1.totals.pairs_missed == 0);
     for (a, b) in on_cpu.0.iter().zip(&on_gpu.0) {
         // Gaps differ by up to 0.006 radii of 2 cm, in each of the few steps of the impact in which an
         // edge turns about its first contact: a tenth of a radius, and as much of turn over 10 cm.

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{
-    assert_keys, assert_pictures, assert_refused, folder, json, run, stderr, without_times,
+    assert_keys, assert_pictures, assert_refused, folder, json, run, seeded_report, stderr,
     write_ply,
 };
 use serde_json::Value;
@@ -72,7 +72,13 @@ fn spheres_answer_as_geometry_says() {
         let contacts = answer["contacts"].as_array().unwrap().len();
         assert_eq!(contacts > 0, depth > -0.01, "{answer}");
     }
-    let names = ["scene.png", "layers.png", "zone.png", "pixels.png"];
+    let names = [
+        "scene.png",
+        "zone.png",
+        "layers.png",
+        "section.png",
+        "pixels.png",
+    ];
     assert_pictures(&folder.join("pictures"), &names);
 }
 
@@ -98,17 +104,7 @@ fn a_velocity_tells_when_they_meet() {
 #[test]
 fn without_files_there_is_something_to_see_and_it_is_the_same_twice() {
     let folder = folder("two_clouds_generated");
-    let ask = |seed: &str| {
-        let options = ["--json", "answer.json", "--seed", seed];
-        let output = run(BINARY, &folder, &options);
-        assert!(output.status.success(), "{}", stderr(&output));
-        let mut answer = json(folder.join("answer.json"));
-        without_times(&mut answer, &["wall_seconds"]);
-        answer
-    };
-    let first = ask("3");
-    assert_eq!(ask("3"), first);
-    assert_ne!(ask("4"), first);
+    let first = seeded_report(BINARY, &folder, &[], &["wall_seconds"], &[]);
     assert_eq!(first["collides"], true);
     assert!(first["contacts"].as_array().unwrap().len() >= 3);
     assert_keys(

@@ -1,35 +1,21 @@
 //! What a run of `depth_camera` found.
 
-use crate::devices::Devices;
+use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
 
 /// As written to `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct DepthReport {
-    /// What compared the clouds.
+    /// Counts over all steps; contacts are those of any pair.
     #[serde(flatten)]
-    pub devices: Devices,
-    /// Steps simulated.
-    pub steps: usize,
-    /// Length of a step in seconds.
-    pub dt: f32,
+    pub totals: StepTotals,
     /// Frames per second of the camera, in simulated time.
     pub frame_rate: f32,
-    /// Wall-clock time of frames and steps in seconds, without decoding.
-    pub wall_seconds: f64,
-    /// Simulated time by wall-clock time.
-    pub real_time_factor: f64,
     /// Up direction, in the frame of the world.
     pub up: [f32; 3],
-    /// Steps in which a body touched the frame or another body.
-    pub contact_steps: usize,
     /// Deepest penetration in metres over all steps.
     pub max_penetration: f32,
-    /// Pairs compared in batches, over all steps.
-    pub pairs_batched: usize,
-    /// Pairs compared on the spot, over all steps.
-    pub pairs_missed: usize,
     /// Frames that are listed but not there.
     pub missing_frames: Vec<String>,
     /// Median of the frames' `latency_ms`.
@@ -136,18 +122,10 @@ impl DepthReport {
         }
         writeln!(
             out,
-            "{} frames, {} steps of {:.4} s in {:.2} s ({:.1} x real time) on {}; contacts in {} \
-             steps, at most {:.2} mm deep; {} pairs batched, {} missed",
+            "{} frames; contacts at most {:.2} mm deep",
             self.frames.len(),
-            self.steps,
-            self.dt,
-            self.wall_seconds,
-            self.real_time_factor,
-            self.devices.backend,
-            self.contact_steps,
-            1e3 * self.max_penetration,
-            self.pairs_batched,
-            self.pairs_missed
-        )
+            1e3 * self.max_penetration
+        )?;
+        self.totals.write_line(out)
     }
 }

@@ -2,10 +2,10 @@
 
 use super::report::{DepthBodyReport, DepthReport, FrameReport};
 use super::source::TimedFrame;
-use crate::devices::Devices;
 use crate::load;
 use crate::simulation::NamedCloud;
 use crate::spots::Spot;
+use crate::step_totals::StepTotals;
 use anyhow::Context;
 use fastrand::Rng;
 use rapier3d::prelude::*;
@@ -68,13 +68,8 @@ pub struct DepthSimulation {
     memory: usize,
     remembered: VecDeque<DepthCloud>,
     frames: Vec<FrameReport>,
-    devices: Devices,
-    steps: usize,
-    contact_steps: usize,
-    pairs_batched: usize,
-    pairs_missed: usize,
+    totals: StepTotals,
     max_penetration: f32,
-    wall_seconds: f64,
 }
 
 struct Body {
@@ -141,13 +136,8 @@ impl DepthSimulation {
             memory: scene.memory,
             remembered: VecDeque::new(),
             frames: Vec::new(),
-            devices: Devices::default(),
-            steps: 0,
-            contact_steps: 0,
-            pairs_batched: 0,
-            pairs_missed: 0,
+            totals: StepTotals::new(DT),
             max_penetration: 0.0,
-            wall_seconds: 0.0,
         })
     }
 
@@ -190,7 +180,7 @@ impl DepthSimulation {
         for _ in 1..STEPS_PER_FRAME {
             self.step()?;
         }
-        self.wall_seconds += start.elapsed().as_secs_f64();
+        self.totals.add_wall_seconds(start.elapsed().as_secs_f64());
         Ok(())
     }
 
@@ -223,18 +213,14 @@ impl DepthSimulation {
     /// One step; gives the pairs in contact.
     fn step(&mut self) -> Result<usize, TldiError> {
         let report = self.tldi.step(&mut self.world)?;
-        self.steps += 1;
-        self.pairs_batched += report.pairs_batched;
-        self.pairs_missed += report.pairs_missed;
+        self.totals.count(&report, report.pairs_in_contact > 0);
         self.max_penetration = self.max_penetration.max(report.max_penetration);
-        self.contact_steps += usize::from(report.pairs_in_contact > 0);
-        self.devices.note(&report);
         for body in &mut self.bodies {
             let rigid_body = &self.world.bodies[body.handle];
             let is_slow = rigid_body.linvel().length() < REST_SPEED;
             body.slow_steps = if is_slow { body.slow_steps + 1 } else { 0 };
             if body.slow_steps == REST_STEPS && body.first_rested_at_step.is_none() {
-                body.first_rested_at_step = Some(self.steps);
+                body.first_rested_at_step = Some(self.totals.steps);
                 body.home = rigid_body.translation();
             }
         }
@@ -278,17 +264,10 @@ impl DepthSimulation {
         let last = latencies.len().saturating_sub(1);
         let latency = |k: usize| latencies.get(k).copied().unwrap_or(0.0);
         DepthReport {
-            devices: self.devices.clone(),
-            steps: self.steps,
-            dt: DT,
+            totals: self.totals.clone(),
             frame_rate: 1.0 / (DT * STEPS_PER_FRAME as f32),
-            wall_seconds: self.wall_seconds,
-            real_time_factor: f64::from(DT) * self.steps as f64 / self.wall_seconds.max(1e-9),
             up: self.up.to_array(),
-            contact_steps: self.contact_steps,
             max_penetration: self.max_penetration,
-            pairs_batched: self.pairs_batched,
-            pairs_missed: self.pairs_missed,
             missing_frames,
             median_latency_ms: latency(last / 2),
             max_latency_ms: latency(last),

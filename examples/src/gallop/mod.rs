@@ -10,4 +10,4 @@ pub use creature::creature;
 pub use ground::Ground;
 pub use report::{GallopFrame, GallopReport};
 pub use runner::{FacesOutOfRange, Runner};
-pub use simulation::{GallopScene, GallopSimulation, GallopSnapshot};
+pub use simulation::{DT, GallopScene, GallopSimulation, GallopSnapshot};

@@ -1,23 +1,15 @@
 //! What a run of `gallop` found.
 
-use crate::devices::Devices;
+use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
 
 /// As written to `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct GallopReport {
-    /// What compared the clouds.
+    /// Counts over all steps; a frame is a step, contacts are those of what runs.
     #[serde(flatten)]
-    pub devices: Devices,
-    /// Steps simulated; a frame is a step.
-    pub steps: usize,
-    /// Length of a step in seconds.
-    pub dt: f32,
-    /// Wall-clock time of the simulation in seconds.
-    pub wall_seconds: f64,
-    /// Simulated time by wall-clock time.
-    pub real_time_factor: f64,
+    pub totals: StepTotals,
     /// Points of what runs.
     pub points: usize,
     /// Frames of its cycle, as read.
@@ -28,14 +20,8 @@ pub struct GallopReport {
     pub mean_radius: f32,
     /// Speed of the run, m/s.
     pub speed: f32,
-    /// Steps in which it touched ground or bodies.
-    pub contact_steps: usize,
     /// Deepest penetration in metres over all steps.
     pub max_penetration: f32,
-    /// Pairs compared in batches, over all steps.
-    pub pairs_batched: usize,
-    /// Pairs compared on the spot, over all steps.
-    pub pairs_missed: usize,
     /// Every step.
     pub frames: Vec<GallopFrame>,
     /// Loose bodies.
@@ -100,24 +86,11 @@ impl GallopReport {
         writeln!(
             out,
             "median step: {:.2} ms for new points, {:.2} ms for contacts and solver; {contacts} contact \
-             points in {} of {} steps",
+             points, at most {:.2} mm deep",
             median(|frame| frame.deform_ms),
             median(|frame| frame.step_ms),
-            self.contact_steps,
-            self.steps
+            1e3 * self.max_penetration
         )?;
-        writeln!(
-            out,
-            "{} steps of {:.4} s in {:.2} s ({:.1} x real time) on {}; at most {:.2} mm deep; {} pairs \
-             batched, {} missed",
-            self.steps,
-            self.dt,
-            self.wall_seconds,
-            self.real_time_factor,
-            self.devices.backend,
-            1e3 * self.max_penetration,
-            self.pairs_batched,
-            self.pairs_missed
-        )
+        self.totals.write_line(out)
     }
 }

@@ -148,8 +148,8 @@ impl Runner {
 mod tests {
     use super::*;
 
-    /// Two feet that go back along −z by 0.4 while they are down, and a head: x is ahead afterwards,
-    /// and the stride is known.
+    /// Two feet that go back along −z by 0.4 each while they are down, and a head that is longer: x is
+    /// ahead afterwards, and the stride is known.
     #[test]
     fn it_runs_against_its_feet() {
         let frame = |k: usize| {
@@ -168,13 +168,17 @@ mod tests {
         // z up in the file: turned about x.
         runner.points.map(|p| Vec3::new(p.x, -p.z, p.y));
         let stride = runner.stand(Vec3::Z, 2.4);
-        // One of the two lowest points is down at a time, the other 0.3 higher goes ahead.
         assert!((runner.size() - 2.4).abs() < 1e-4);
+        // The head, 39 × 0.03 long, has become 2.4 m long. One foot is down at a time.
+        let scale = 2.4 / 1.17;
+        assert!((stride - 0.8 * scale).abs() < 1e-4, "{stride}");
         let (points, _) = runner.at(0.0);
         let lowest = points.iter().map(|p| p.y).fold(f32::MAX, f32::min);
         assert!(lowest.abs() < 1e-4, "{lowest}");
-        assert!(stride >= 0.0);
-        assert!(points.iter().all(|p| p.z.abs() < 0.01), "it runs along x");
+        assert!(points.iter().all(|p| p.z.abs() < 1e-4), "it runs along x");
+        // The first foot is down and goes back.
+        let (later, _) = runner.at(1.0 / 8.0);
+        assert!((later[0] - points[0]).distance(-0.1 * scale * Vec3::X) < 1e-4);
     }
 
     #[test]

@@ -3,9 +3,9 @@
 use super::ground::Ground;
 use super::report::{GallopBody, GallopFrame, GallopReport};
 use super::runner::Runner;
-use crate::devices::Devices;
 use crate::load;
 use crate::scene::BodyShape;
+use crate::step_totals::StepTotals;
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -14,7 +14,7 @@ use tldi::Backend;
 use tldi::glamx::{Pose3, Quat, Vec3};
 
 /// Length of a step in seconds.
-pub(super) const DT: f32 = 1.0 / 60.0;
+pub const DT: f32 = 1.0 / 60.0;
 /// Mass per volume of the bodies in kg/m³.
 const DENSITY: f32 = 150.0;
 /// Width of the bodies, and the strip along the run on which they lie, in sizes of what runs.
@@ -66,11 +66,8 @@ pub struct GallopSimulation {
     frames: Vec<GallopFrame>,
     mean_radius: f32,
     ground_points: usize,
-    devices: Devices,
-    contact_steps: usize,
-    pairs_missed: usize,
+    totals: StepTotals,
     max_penetration: f32,
-    wall_seconds: f64,
 }
 
 struct Body {
@@ -132,11 +129,8 @@ impl GallopSimulation {
             frames: Vec::new(),
             mean_radius,
             ground_points,
-            devices: Devices::default(),
-            contact_steps: 0,
-            pairs_missed: 0,
+            totals: StepTotals::new(DT),
             max_penetration: 0.0,
-            wall_seconds: 0.0,
         })
     }
 
@@ -152,7 +146,7 @@ impl GallopSimulation {
     /// Those of the pipeline.
     pub fn step(&mut self) -> Result<(), TldiError> {
         let start = Instant::now();
-        let time = (self.frames.len() + 1) as f32 * DT;
+        let time = (self.totals.steps + 1) as f32 * DT;
         let (points, normals) = self.scene.runner.at(time / self.scene.cycle);
         (self.tldi).deform(&mut self.world, self.runner.1, &points, normals.as_deref())?;
         let (points, normals) = self.scene.ground.at(time);
@@ -160,12 +154,10 @@ impl GallopSimulation {
         let deformed = start.elapsed();
         let report = self.tldi.step(&mut self.world)?;
         let stepped = start.elapsed();
-        self.wall_seconds += stepped.as_secs_f64();
-        self.devices.note(&report);
-        self.pairs_missed += report.pairs_missed;
         self.max_penetration = self.max_penetration.max(report.max_penetration);
         let contacts = self.runner_contacts();
-        self.contact_steps += usize::from(!contacts.is_empty());
+        self.totals.count(&report, !contacts.is_empty());
+        self.totals.add_wall_seconds(stepped.as_secs_f64());
         for body in &mut self.bodies {
             body.kicked |= contacts
                 .iter()
@@ -228,22 +220,14 @@ impl GallopSimulation {
     /// What happened so far.
     pub fn report(&self) -> GallopReport {
         let [cycle_frames, points] = self.scene.runner.counts();
-        let steps = self.frames.len();
         GallopReport {
-            devices: self.devices.clone(),
-            steps,
-            dt: DT,
-            wall_seconds: self.wall_seconds,
-            real_time_factor: f64::from(DT) * steps as f64 / self.wall_seconds.max(1e-9),
+            totals: self.totals.clone(),
             points,
             cycle_frames,
             ground_points: self.ground_points,
             mean_radius: self.mean_radius,
             speed: self.scene.speed,
-            contact_steps: self.contact_steps,
             max_penetration: self.max_penetration,
-            pairs_batched: self.frames.iter().map(|frame| frame.pairs_batched).sum(),
-            pairs_missed: self.pairs_missed,
             frames: self.frames.clone(),
             bodies: (self.bodies.iter())
                 .map(|body| {

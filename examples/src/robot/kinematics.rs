@@ -353,10 +353,11 @@ mod tests {
     #[test]
     fn poses_follow_the_joints() {
         let quarter = std::f32::consts::FRAC_PI_2;
-        let poses = arm().poses(&[quarter, quarter, -quarter]);
-        // Leant over to x, turned to y, and the last link upright again.
+        let poses = arm().poses(&[quarter / 3.0, quarter, -quarter]);
+        // Leant over to x, turned by 30° towards y, and the last link upright again.
         let tip = poses[3] * (0.5 * Vec3::Z);
-        assert!((tip - Vec3::new(0.0, 0.5, 0.8)).length() < 1e-5, "{tip}");
+        let expected = Vec3::new(0.5 * 0.75_f32.sqrt(), 0.25, 0.8);
+        assert!((tip - expected).length() < 1e-5, "{tip}");
     }
 
     #[test]

@@ -154,6 +154,40 @@ pub(super) fn world_groups() -> InteractionGroups {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::robot::kinematics::{JointKind, JointModel};
+    use crate::scene::BodyShape;
+    use tldi::glamx::Vec3;
+
+    /// A chain of pebbles: the third lies within the first, the fourth across it, the last far away.
+    #[test]
+    fn neighbours_and_what_overlaps_at_the_start_are_silent() {
+        let joint = |parent: usize| JointModel {
+            name: format!("joint {parent}"),
+            kind: JointKind::Revolute,
+            parent,
+            child: parent + 1,
+            parent_from_joint: Pose3::IDENTITY,
+            axis: Vec3::Z,
+            limits: [-1.0, 1.0],
+            max_effort: None,
+            max_speed: None,
+            mimic: None,
+        };
+        let kinematics = Kinematics::new(5, (0..4).map(joint).collect());
+        let sample = load::body_from_surface(BodyShape::Pebble.sample(0.05, 1)).unwrap();
+        // Widths and places along x, metres.
+        let links = [(1.0, 0.0), (0.3, 2.0), (0.2, 0.0), (0.3, 0.5), (0.3, 5.0)];
+        let clouds: Vec<LinkCloud> = (links.iter().enumerate())
+            .map(|(link, (size, _))| LinkCloud {
+                link,
+                name: format!("link {link}"),
+                cloud: load::resized(&sample, *size).unwrap(),
+            })
+            .collect();
+        let poses = links.map(|(_, x)| Pose3::from_translation(x * Vec3::X));
+        let silent = silent_pairs(&kinematics, &clouds, &poses);
+        assert_eq!(silent, [[0, 1], [0, 2], [1, 2], [0, 3], [2, 3], [3, 4]]);
+    }
 
     #[test]
     fn groups_silence_pairs_and_nothing_else() {

@@ -1,23 +1,15 @@
 //! What a run of `robot_in_scan` found.
 
-use crate::devices::Devices;
+use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
 
 /// As written to `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct RobotReport {
-    /// What compared the clouds.
+    /// Counts over all steps; contacts are those of the robot with the scan or a loose body.
     #[serde(flatten)]
-    pub devices: Devices,
-    /// Steps simulated.
-    pub steps: usize,
-    /// Length of a step in seconds.
-    pub dt: f32,
-    /// Wall-clock time of the simulation in seconds.
-    pub wall_seconds: f64,
-    /// Simulated time by wall-clock time.
-    pub real_time_factor: f64,
+    pub totals: StepTotals,
     /// Points of the scan.
     pub scan_points: usize,
     /// Points of the scan, or of the last frame of the robot's camera, that lay on the robot and
@@ -37,14 +29,8 @@ pub struct RobotReport {
     pub links: Vec<LinkReport>,
     /// Number of `links`.
     pub link_count: usize,
-    /// Steps in which the robot touched the scan or a loose body.
-    pub contact_steps: usize,
     /// Deepest penetration in metres over all steps and contacts of clouds.
     pub max_penetration: f32,
-    /// Pairs compared in batches, over all steps.
-    pub pairs_batched: usize,
-    /// Pairs compared on the spot, over all steps.
-    pub pairs_missed: usize,
     /// Loose bodies.
     pub bodies: Vec<LooseBodyReport>,
     /// What of the URDF could not be used.
@@ -115,19 +101,11 @@ impl RobotReport {
         }
         writeln!(
             out,
-            "{} steps of {:.4} s in {:.2} s ({:.1} x real time) on {}; {} scan points, {} of them on \
-             the robot left out; contacts in {} steps, at most {:.2} mm deep; {} pairs batched, {} missed",
-            self.steps,
-            self.dt,
-            self.wall_seconds,
-            self.real_time_factor,
-            self.devices.backend,
+            "{} scan points, without {} on the robot; contacts at most {:.2} mm deep",
             self.scan_points,
             self.self_filtered_points,
-            self.contact_steps,
-            1e3 * self.max_penetration,
-            self.pairs_batched,
-            self.pairs_missed
-        )
+            1e3 * self.max_penetration
+        )?;
+        self.totals.write_line(out)
     }
 }

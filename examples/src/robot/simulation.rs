@@ -9,8 +9,8 @@ use super::placing::{Site, place};
 use super::plan::{Build, Tip, plan_motion, start_pose};
 use super::report::{LinkReport, RobotReport};
 use super::{Motion, SelfFilter};
-use crate::devices::Devices;
 use crate::load;
+use crate::step_totals::StepTotals;
 use anyhow::bail;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -103,13 +103,8 @@ pub struct RobotSimulation {
     filter: Option<SelfFilter>,
     own_camera: Option<OwnCamera>,
     self_filtered: usize,
-    devices: Devices,
-    steps: usize,
-    contact_steps: usize,
-    pairs_batched: usize,
-    pairs_missed: usize,
+    totals: StepTotals,
     max_penetration: f32,
-    wall_seconds: f64,
 }
 
 /// Contacts of a link so far.
@@ -222,13 +217,8 @@ impl RobotSimulation {
             motion,
             filter,
             self_filtered,
-            devices: Devices::default(),
-            steps: 0,
-            contact_steps: 0,
-            pairs_batched: 0,
-            pairs_missed: 0,
+            totals: StepTotals::new(DT),
             max_penetration: 0.0,
-            wall_seconds: 0.0,
         })
     }
 
@@ -248,10 +238,10 @@ impl RobotSimulation {
     /// Those of the pipeline, and a robot that is nowhere any more.
     pub fn step(&mut self) -> anyhow::Result<()> {
         let start = Instant::now();
-        if self.steps.is_multiple_of(STEPS_PER_FRAME) {
+        if self.totals.steps.is_multiple_of(STEPS_PER_FRAME) {
             self.take_frame()?;
         }
-        let time = self.steps as f32 * DT;
+        let time = self.totals.steps as f32 * DT;
         let targets = self.motion.positions(time);
         (self.assembled).drive(
             &mut self.world,
@@ -260,13 +250,11 @@ impl RobotSimulation {
             &self.motion,
         );
         let report = self.tldi.step(&mut self.world)?;
-        self.wall_seconds += start.elapsed().as_secs_f64();
-        self.steps += 1;
-        self.pairs_batched += report.pairs_batched;
-        self.pairs_missed += report.pairs_missed;
+        let seconds = start.elapsed().as_secs_f64();
+        let touches = self.count_contacts();
+        self.totals.count(&report, touches);
+        self.totals.add_wall_seconds(seconds);
         self.max_penetration = self.max_penetration.max(report.max_penetration);
-        self.devices.note(&report);
-        self.count_contacts();
         let bounds = self.scan.bounds();
         let farthest = FAR_AWAY * bounds.extents().length().max(self.build.size);
         let is_lost = |pose: &Pose3| {
@@ -301,7 +289,8 @@ impl RobotSimulation {
         Ok(())
     }
 
-    fn count_contacts(&mut self) {
+    /// Adds to the tallies; gives whether the robot touches the scan or a loose body.
+    fn count_contacts(&mut self) -> bool {
         let link_of: &HashMap<ColliderHandle, usize> = &self.assembled.cloud_of_collider;
         let mut impulses = vec![Vec3::ZERO; self.clouds.len()];
         let mut touches_world = false;
@@ -329,7 +318,6 @@ impl RobotSimulation {
                 body.touched = true;
             }
         }
-        self.contact_steps += usize::from(touches_world);
         for (tally, impulse) in self.tally.iter_mut().zip(impulses) {
             if tally.touches {
                 let force = impulse.length() / DT;
@@ -338,6 +326,7 @@ impl RobotSimulation {
                 tally.force_sum += f64::from(force);
             }
         }
+        touches_world
     }
 
     fn scan_from_link(&self) -> Vec<Pose3> {
@@ -396,11 +385,7 @@ impl RobotSimulation {
         };
         let links: Vec<LinkReport> = self.clouds.iter().zip(&self.tally).map(link).collect();
         RobotReport {
-            devices: self.devices.clone(),
-            steps: self.steps,
-            dt: DT,
-            wall_seconds: self.wall_seconds,
-            real_time_factor: f64::from(DT) * self.steps as f64 / self.wall_seconds.max(1e-9),
+            totals: self.totals.clone(),
             scan_points: self.scan.len(),
             self_filtered_points: self.self_filtered,
             mean_radius: self.scan.mean_radius(),
@@ -410,10 +395,7 @@ impl RobotSimulation {
             driven_joints: self.assembled.driven_joints(),
             link_count: links.len(),
             links,
-            contact_steps: self.contact_steps,
             max_penetration: self.max_penetration,
-            pairs_batched: self.pairs_batched,
-            pairs_missed: self.pairs_missed,
             bodies: self
                 .loose
                 .iter()

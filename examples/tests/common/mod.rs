@@ -69,6 +69,34 @@ pub(crate) fn report(binary: &str, folder: &Path, options: &[&str]) -> Value {
     json(folder.join("report.json"))
 }
 
+/// Runs a binary twice with one seed and once with another: but for times, the first two reports must
+/// be equal, and the third must not. Gives the first. `times` are the keys of the report that differ
+/// from run to run, `frame_times` those of each of its `frames`, where it has any.
+pub(crate) fn seeded_report(
+    binary: &str,
+    folder: &Path,
+    options: &[&str],
+    times: &[&str],
+    frame_times: &[&str],
+) -> Value {
+    let run = |seed: &str| {
+        let mut report = report(binary, folder, &[options, &["--seed", seed]].concat());
+        without_times(&mut report, times);
+        let frames = report.get_mut("frames").and_then(Value::as_array_mut);
+        for frame in frames.into_iter().flatten() {
+            without_times(frame, frame_times);
+        }
+        report
+    };
+    let first = run("1");
+    assert_eq!(run("1"), first);
+    assert_ne!(run("2"), first);
+    first
+}
+
+/// Keys of a report's times.
+pub(crate) const TIMES: [&str; 2] = ["wall_seconds", "real_time_factor"];
+
 /// Runs a binary with options that it must refuse: with this exit status, and a message that says so.
 pub(crate) fn assert_refused(binary: &str, folder: &Path, cases: &[(&[&str], i32, &str)]) {
     for (options, code, message) in cases {
