@@ -1,11 +1,12 @@
 //! Ours, and the paper's, as a peer: clouds get new points, then are compared.
 
-use super::{Found, Frame, Peer};
+use super::{Deepest, Found, Frame, Peer};
 use crate::stopwatch::Stopwatch;
 use ::tldi::glamx::{Pose3, Vec3};
 use ::tldi::{
     Backend, PairQuery, PairResult, Params, PointCloud, Radii, Surface, View, VirtualCamera,
 };
+use tldi_tests::deepest_contact;
 
 /// How clouds are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,6 +148,8 @@ impl Peer for TldiPeer {
                 query_seconds: start.seconds() - built,
                 collides: results[0].collides,
                 contacts: results[0].contacts.len(),
+                deepest: deepest_contact(&results[0])
+                    .map(|(normal, depth)| Deepest { normal, depth }),
             }
         })
     }
