@@ -11,7 +11,7 @@ use clap::Parser;
 use indicatif::ProgressBar;
 use std::path::PathBuf;
 use tldi_benches::accuracy::Contender;
-use tldi_benches::contact_quality::measure;
+use tldi_benches::contact_quality::{Plan, measure};
 use tldi_benches::peers::{Culled, Grid, Method, Peer, TldiPeer, TriMeshPeer, VoxelsRebuild};
 use tldi_benches::stored::{self, ContactRow, Provenance};
 use tldi_tests::{ContactPair, Regime};
@@ -40,6 +40,9 @@ struct Args {
         default_value = "0.25,0.35,0.5,0.7,1"
     )]
     peer_radius: Vec<f32>,
+    /// Tell no method how the bodies move
+    #[arg(long)]
+    without_motion: bool,
     /// Where clouds are compared, on one thread
     #[arg(long, value_name = "auto|cpu|gpu", default_value_t = BackendChoice::Cpu)]
     backend: BackendChoice,
@@ -62,13 +65,13 @@ fn main() -> anyhow::Result<()> {
     let mut contenders = contenders(&args)?;
     let count = Regime::ALL.len() * ContactPair::ALL.len() * args.cases;
     let progress = ProgressBar::new(count as u64);
-    let rows = measure(
-        &mut contenders,
-        &ContactPair::ALL,
-        args.cases,
-        args.seed,
-        || progress.inc(1),
-    );
+    let plan = Plan {
+        pairs: &ContactPair::ALL,
+        cases: args.cases,
+        seed: args.seed,
+        tells_motion: !args.without_motion,
+    };
+    let rows = measure(&mut contenders, &plan, || progress.inc(1));
     progress.finish_and_clear();
     print(&rows);
     if let Some(path) = &args.json {
@@ -113,13 +116,14 @@ fn contenders(args: &Args) -> anyhow::Result<Vec<Contender>> {
 
 fn print(rows: &[ContactRow]) {
     println!(
-        "{:<15} {:<8} {:<32} {:>5} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9}",
+        "{:<15} {:<8} {:<32} {:>5} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9}",
         "pair",
         "regime",
         "variant",
         "pixel",
         "radius",
         "missed %",
+        "> 90° %",
         "normal °",
         "95 %",
         "depth r",
@@ -130,13 +134,14 @@ fn print(rows: &[ContactRow]) {
     let error = |value: Option<f64>| value.map_or_else(|| "inf".to_owned(), |v| format!("{v:.3}"));
     for row in rows {
         println!(
-            "{:<15} {:<8} {:<32} {:>5} {:>6} {:>8.1} {:>8} {:>8} {:>8} {:>8} {:>9.3}",
+            "{:<15} {:<8} {:<32} {:>5} {:>6} {:>8.1} {:>8.1} {:>8} {:>8} {:>8} {:>8} {:>9.3}",
             row.pair.map_or("all", ContactPair::name),
             row.regime.name(),
             row.variant,
             scale(row.pixel_scale),
             scale(row.radius_scale),
             row.missed_pct,
+            row.wrong_side_pct,
             error(row.normal_median_deg),
             error(row.normal_p95_deg),
             error(row.depth_median_radii),

@@ -353,21 +353,27 @@ pub fn measure_accuracy(
 }
 
 impl ContactCase<'_> {
-    /// Compares with a hint `angle` radians from the true normal.
-    fn compare(&self, angle: f32, policy: CameraPolicy, rng: &mut fastrand::Rng) -> PairResult {
+    /// A motion of `b` relative to `a` against the true normal, but for `angle` radians to a random
+    /// side: over a step, metres, in the frame of `a`.
+    pub fn motion(&self, angle: f32, rng: &mut fastrand::Rng) -> Vec3 {
         let tangent = loop {
             let across = random_unit(rng).reject_from(self.normal);
             if let Some(tangent) = across.try_normalize() {
                 break tangent;
             }
         };
+        -MOTION * (angle.cos() * self.normal + angle.sin() * tangent)
+    }
+
+    /// Compares with a hint `angle` radians from the true normal.
+    fn compare(&self, angle: f32, policy: CameraPolicy, rng: &mut fastrand::Rng) -> PairResult {
         let query = PairQuery {
             a: Surface::Cloud(self.a),
             b: Surface::Cloud(self.b),
             a_from_b: self.a_from_b,
             view: View::Aim {
                 policy,
-                motion: -MOTION * (angle.cos() * self.normal + angle.sin() * tangent),
+                motion: self.motion(angle, rng),
                 last_axis: None,
             },
             params: Params::for_radius(R),

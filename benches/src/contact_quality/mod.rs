@@ -13,6 +13,23 @@ use tldi_tests::{CONTACT_SPACING, ContactCase, ContactClouds, ContactPair, Regim
 /// How far the bodies lie from the origin at most, metres.
 const REACH: f32 = 1.0;
 
+/// Greatest angle between the motion and the true normal, degrees: beyond, it hardly tells from which
+/// side a body came.
+const MOST_ANGLE: f32 = 80.0;
+
+/// Which contacts are measured.
+pub struct Plan<'a> {
+    /// Of which shapes.
+    pub pairs: &'a [ContactPair],
+    /// Contacts for each pair and regime.
+    pub cases: usize,
+    /// Of the random places, rotations, depths and motions.
+    pub seed: u64,
+    /// Whether methods are told how the second body moves: at 3 m/s towards the first, up to 80° from the
+    /// true normal, as an engine knows it.
+    pub tells_motion: bool,
+}
+
 /// What was told of some cases.
 #[derive(Clone, Default)]
 struct Told {
@@ -28,12 +45,14 @@ struct Told {
 struct Scene {
     points: [Vec<Vec3>; 2],
     meshes: [Mesh; 2],
+    motion: Vec3,
     truth: Deepest,
 }
 
 impl Scene {
-    /// The case, in a frame in which the first body lies in the pose `of_a`.
-    fn new(case: &ContactCase, of_a: &Pose3) -> Self {
+    /// The case, in a frame in which the first body lies in the pose `of_a`; the motion is given in that
+    /// of the first body.
+    fn new(case: &ContactCase, of_a: &Pose3, motion: Vec3) -> Self {
         let poses = [*of_a, *of_a * case.a_from_b];
         let side = |k: usize| {
             let points = [case.a, case.b][k].points();
@@ -47,6 +66,7 @@ impl Scene {
         Self {
             points: [a, b],
             meshes: [mesh_a, mesh_b],
+            motion: of_a.rotation * motion,
             truth: Deepest {
                 normal: of_a.rotation * case.normal,
                 depth: case.depth,
@@ -58,7 +78,10 @@ impl Scene {
     fn frame(&self, contender: &Contender) -> Frame<'_> {
         let radius = contender.radius_scale.unwrap_or(1.0) * CONTACT_SPACING;
         if !contender.peer.needs_faces() {
-            return Frame::new(&self.points[0], &self.points[1], radius);
+            return Frame {
+                motion: self.motion,
+                ..Frame::new(&self.points[0], &self.points[1], radius)
+            };
         }
         let [a, b] = &self.meshes;
         Frame {
@@ -68,32 +91,37 @@ impl Scene {
     }
 }
 
-/// Deepest contacts of all contenders in `cases` contacts for each of the pairs and regimes, at random
-/// places, rotations and depths, from clouds without normals whose spacing and radius is r̄. A row a
-/// contender, regime and pair, and one for all pairs together. `on_case` is called after each case.
+/// Deepest contacts of all contenders in the cases of `plan`, at random places, rotations and depths, from
+/// clouds without normals whose spacing and radius is r̄. A row a contender, regime and pair, and one for
+/// all pairs together. `on_case` is called after each case.
 ///
 /// Seconds go from points to contacts: all points are taken to be new. All contenders answer a case
 /// before the next, so that a change of the machine's speed meets all alike; the first case is answered
 /// twice, so that memory is warm.
 pub fn measure(
     contenders: &mut [Contender],
-    pairs: &[ContactPair],
-    cases: usize,
-    seed: u64,
+    plan: &Plan,
     mut on_case: impl FnMut(),
 ) -> Vec<ContactRow> {
-    let mut rng = fastrand::Rng::with_seed(seed);
+    let mut rng = fastrand::Rng::with_seed(plan.seed);
     let clouds = ContactClouds::new(false);
     let mut rows = Vec::new();
     let mut is_warm = false;
     for regime in Regime::ALL {
         let mut all = vec![Told::default(); contenders.len()];
-        for &pair in pairs {
+        for &pair in plan.pairs {
             let mut told = vec![Told::default(); contenders.len()];
-            for _ in 0..cases {
+            for _ in 0..plan.cases {
                 let depth = regime.random_depth(&mut rng);
                 let case = clouds.case(pair, depth, &mut rng);
-                let scene = Scene::new(&case, &random_pose(&mut rng, REACH));
+                let angle = (MOST_ANGLE * rng.f32()).to_radians();
+                let motion = case.motion(angle, &mut rng);
+                let told_motion = if plan.tells_motion {
+                    motion
+                } else {
+                    Vec3::ZERO
+                };
+                let scene = Scene::new(&case, &random_pose(&mut rng, REACH), told_motion);
                 for (contender, told) in contenders.iter_mut().zip(&mut told) {
                     let frame = scene.frame(contender);
                     if !is_warm {
@@ -150,7 +178,9 @@ impl Told {
             values.sort_unstable_by(f64::total_cmp);
         }
         let cases = self.seconds.len();
-        let missed = self.depth_errors.iter().filter(|e| e.is_infinite()).count();
+        let share = |is_so: fn(&&f64) -> bool| {
+            100.0 * self.normal_errors.iter().filter(is_so).count() as f64 / cases as f64
+        };
         let at = |sorted: &[f64], percent: usize| sorted[(percent * cases / 100).min(cases - 1)];
         let ms = |percent: usize| 1e3 * at(&self.seconds, percent);
         let finite = |sorted: &[f64], percent: usize| {
@@ -164,7 +194,8 @@ impl Told {
             backend: contender.peer.backend().map(|b| b.name().to_owned()),
             pixel_scale: contender.pixel_scale,
             radius_scale: contender.radius_scale,
-            missed_pct: 100.0 * missed as f64 / cases as f64,
+            missed_pct: share(|error| error.is_infinite()),
+            wrong_side_pct: share(|error| error.is_finite() && **error > 90.0),
             normal_median_deg: finite(&self.normal_errors, 50),
             normal_p95_deg: finite(&self.normal_errors, 95),
             depth_median_radii: finite(&self.depth_errors, 50),

@@ -29,12 +29,21 @@ fn balls(radius_scale: f32) -> Contender {
     }
 }
 
+fn plan(pairs: &[ContactPair], cases: usize) -> Plan<'_> {
+    Plan {
+        pairs,
+        cases,
+        seed: 3,
+        tells_motion: true,
+    }
+}
+
 /// As good as the testkit wants contacts of spheres to be, whatever the frame; deep ones by the limit
 /// of the least deep.
 #[test]
 fn ours_is_within_the_limits_on_spheres() {
     let pairs = [ContactPair::SphereSphere, ContactPair::SpherePlane];
-    let rows = measure(&mut [ours()], &pairs, 21, 3, || ());
+    let rows = measure(&mut [ours()], &plan(&pairs, 21), || ());
     assert_eq!(rows.len(), 6);
     for row in rows {
         let limit = match row.regime {
@@ -55,7 +64,8 @@ fn ours_is_within_the_limits_on_spheres() {
 fn what_is_missed_is_infinitely_wrong() {
     let pairs = [ContactPair::SpherePlane, ContactPair::BoxPlane];
     let mut cases = 0;
-    let rows = measure(&mut [balls(1e-3), balls(1.0)], &pairs, 5, 4, || cases += 1);
+    let mut contenders = [balls(1e-3), balls(1.0)];
+    let rows = measure(&mut contenders, &plan(&pairs, 5), || cases += 1);
     assert_eq!((cases, rows.len()), (20, 12));
     for row in rows {
         assert_eq!(row.cases, if row.pair.is_none() { 10 } else { 5 });
@@ -74,7 +84,7 @@ fn meshes_are_where_the_points_are() {
     let mut rng = fastrand::Rng::with_seed(5);
     for pair in ContactPair::ALL {
         let case = clouds.case(pair, 0.0, &mut rng);
-        let scene = Scene::new(&case, &random_pose(&mut rng, REACH));
+        let scene = Scene::new(&case, &random_pose(&mut rng, REACH), Vec3::ZERO);
         for (points, mesh) in scene.points.iter().zip(&scene.meshes) {
             let vector = |p: &Vec3| Vector::new(p.x, p.y, p.z);
             let vertices = mesh.vertices.iter().map(vector).collect();

@@ -47,6 +47,9 @@ pub struct Frame<'a> {
     pub radii: Option<[&'a [f32]; 2]>,
     /// Faces over the points of both, as indices, where the points are those of meshes.
     pub faces: Option<[&'a [[u32; 3]]; 2]>,
+    /// Of the second body relative to the first over a step, for methods that can make use of it, metres;
+    /// zero: not known.
+    pub motion: Vec3,
 }
 
 impl<'a> Frame<'a> {
@@ -58,6 +61,7 @@ impl<'a> Frame<'a> {
             radius,
             radii: None,
             faces: None,
+            motion: Vec3::ZERO,
         }
     }
 }

@@ -172,6 +172,9 @@ pub struct ContactRow {
     pub radius_scale: Option<f32>,
     /// Share of the cases in which no contact was told.
     pub missed_pct: f64,
+    /// Share of the cases in which the told normal is more than 90° from the true one: bodies are
+    /// pushed through each other.
+    pub wrong_side_pct: f64,
     /// Median angle between told and true normal, degrees. `None`: infinite.
     pub normal_median_deg: Option<f64>,
     /// Nineteen of twenty angles are at most this, degrees. `None`: infinite.
@@ -203,10 +206,11 @@ impl Measured for ContactRow {
         if !(times[0] > 0.0 && times.is_sorted()) {
             return Some(format!("times of {times:?} ms are not positive and rising"));
         }
-        if !(0.0..=100.0).contains(&self.missed_pct) {
+        let shares = [self.missed_pct, self.wrong_side_pct];
+        let are_possible = shares.iter().all(|share| *share >= 0.0);
+        if !are_possible || shares.iter().sum::<f64>() > 100.0 + 1e-6 {
             return Some(format!(
-                "missed_pct {} is not within 0 and 100",
-                self.missed_pct
+                "missed_pct and wrong_side_pct, {shares:?}, are not shares of the same cases"
             ));
         }
         for (name, median, most) in [

@@ -1,0 +1,179 @@
+//! Contact quality against time: every method that tells its deepest contact.
+
+use super::figure::{Axis, Curve, Entry, Figure, Panel, Point};
+use super::front::{front, steps};
+use super::{looks, origin};
+use crate::stored::{ContactRow, Stored};
+use tldi_tests::Regime;
+
+type Run = Stored<ContactRow>;
+
+/// An error that is drawn.
+struct Quantity {
+    axis: &'static str,
+    title: &'static str,
+    median: fn(&ContactRow) -> Option<f64>,
+    p95: fn(&ContactRow) -> Option<f64>,
+}
+
+const QUANTITIES: [Quantity; 2] = [
+    Quantity {
+        axis: "error of the normal, degrees",
+        title: "Normal",
+        median: |row| row.normal_median_deg,
+        p95: |row| row.normal_p95_deg,
+    },
+    Quantity {
+        axis: "error of the depth, r",
+        title: "Depth",
+        median: |row| row.depth_median_radii,
+        p95: |row| row.depth_p95_radii,
+    },
+];
+
+/// A row that has a place in a panel.
+#[derive(Clone, Copy)]
+struct Placed<'a> {
+    row: &'a ContactRow,
+    error: f64,
+}
+
+/// A chart for each run that has rows of all pairs.
+pub(super) fn figures(runs: &[Run]) -> Vec<Figure> {
+    let drawn = runs.iter().filter(|run| of_all_pairs(run).next().is_some());
+    let named = drawn.enumerate().map(|(k, run)| match k {
+        0 => figure(run, "contact_quality".to_owned()),
+        _ => figure(run, format!("contact_quality_{}", k + 1)),
+    });
+    named.collect()
+}
+
+fn of_all_pairs(run: &Run) -> impl Iterator<Item = &ContactRow> {
+    run.rows.iter().filter(|row| row.pair.is_none())
+}
+
+/// Names of methods, ours last, so that it is painted above the others.
+fn methods(run: &Run) -> Vec<&str> {
+    let mut all: Vec<&str> = Vec::new();
+    for row in of_all_pairs(run) {
+        if !all.contains(&&*row.variant) {
+            all.push(&row.variant);
+        }
+    }
+    all.sort_by_key(|method| looks::look(method) == looks::OURS);
+    all
+}
+
+fn setting_label(row: &ContactRow) -> String {
+    match (row.pixel_scale, row.radius_scale) {
+        (Some(scale), _) => format!("pixel {scale} r"),
+        (_, Some(scale)) => format!("{scale} r"),
+        _ => String::new(),
+    }
+}
+
+fn figure(run: &Run, name: String) -> Figure {
+    let methods = methods(run);
+    let mut panels = Vec::new();
+    for regime in Regime::ALL {
+        for quantity in &QUANTITIES {
+            panels.push(panel(run, &methods, regime, quantity));
+        }
+    }
+    let entry = |method: &&str| Entry {
+        look: looks::look(method),
+        label: looks::title(method),
+    };
+    let mut legend: Vec<Entry> = methods.iter().rev().map(entry).collect();
+    legend.push(Entry {
+        look: looks::FRONT,
+        label: "Pareto front (points alone)".to_owned(),
+    });
+    Figure {
+        name,
+        title: "How wrong are the normal and the depth of a contact, and how long does it take?"
+            .to_owned(),
+        subtitle: vec![
+            "Spheres, boxes, edges and corners in each other, in planes and on ramps, sampled without \
+             normals: the deepest contact that a method tells, held against the shapes' own."
+                .to_owned(),
+            "Every case is a frame of new points: building and finding the contacts is counted, in \
+             processor time of one thread. Lower left is better."
+                .to_owned(),
+        ],
+        columns: QUANTITIES.len(),
+        panels,
+        panel_size: [640, 400],
+        legend,
+        notes: vec![
+            "r: spacing of the points. Along a curve varies, of this project: the pixel's edge; of the \
+             grid of balls: their radius; of voxels: half their edge."
+                .to_owned(),
+            "Balls: the pair that is deepest in each other, its normal from centre to centre, its depth \
+             2 radii less the distance. Voxels and meshes: the deepest point of rapier's manifolds."
+                .to_owned(),
+            "Marks: the median of all cases; bars, on the front: up to 95 % of the cases, and the middle \
+             half of the times. A missed contact is infinitely wrong; what misses half is not drawn."
+                .to_owned(),
+            "Meshes are given their triangles, as fine as the points; the others only points. On the front \
+             no other method of those is both faster and less wrong."
+                .to_owned(),
+            origin([&run.provenance]),
+        ],
+    }
+}
+
+fn panel(run: &Run, methods: &[&str], regime: Regime, quantity: &Quantity) -> Panel {
+    let of_regime = of_all_pairs(run).filter(|row| row.regime == regime);
+    let placed: Vec<Placed> = of_regime
+        .filter_map(|row| (quantity.median)(row).map(|error| Placed { row, error }))
+        .collect();
+    let at = |placed: &Placed| [placed.row.median_ms, placed.error];
+    // Meshes have no radius.
+    let of_points = placed.iter().filter(|p| p.row.radius_scale.is_some());
+    let of_points: Vec<Placed> = of_points.copied().collect();
+    let places: Vec<[f64; 2]> = of_points.iter().map(at).collect();
+    let on_front: Vec<Placed> = front(&places).into_iter().map(|i| of_points[i]).collect();
+    let spread = |p: &Placed| [p.row.lower_quartile_ms, p.row.upper_quartile_ms];
+    let times = placed.iter().map(|p| p.row.median_ms);
+    let x = Axis::log(
+        "time for one frame, ms (median of all cases)",
+        times.chain(on_front.iter().flat_map(spread)),
+    );
+    let most = on_front.iter().filter_map(|p| (quantity.p95)(p.row));
+    let y = Axis::log(quantity.axis, placed.iter().map(|p| p.error).chain(most));
+    let mut curves = vec![Curve {
+        look: looks::FRONT,
+        points: steps(on_front.iter().map(at)),
+    }];
+    for method in methods {
+        let of_method = placed.iter().filter(|p| p.row.variant == *method);
+        let point = |p: &Placed| {
+            let is_on_front = on_front.iter().any(|other| std::ptr::eq(other.row, p.row));
+            let most = (quantity.p95)(p.row).unwrap_or(y.range[1]);
+            Point {
+                x: p.row.median_ms,
+                y: p.error,
+                x_spread: is_on_front.then(|| spread(p)),
+                y_spread: is_on_front.then_some([p.error, most]),
+                label: is_on_front.then(|| setting_label(p.row)),
+            }
+        };
+        curves.push(Curve {
+            look: looks::look(method),
+            points: of_method.map(point).collect(),
+        });
+    }
+    let [low, high] = regime.depths();
+    let cases = placed.iter().map(|p| p.row.cases).max().unwrap_or(0);
+    Panel {
+        title: format!(
+            "{}, contacts {low} to {high} r deep, {cases} cases",
+            quantity.title
+        ),
+        x,
+        y,
+        curves,
+        levels: Vec::new(),
+    }
+}
