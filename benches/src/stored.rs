@@ -208,4 +208,4 @@ fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, StoredError>
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -1,6 +1,6 @@
 //! Contact quality against time: every method that tells its deepest contact.
 
-use super::figure::{Axis, Curve, Entry, Figure, Panel, Point};
+use super::figure::{Axis, Curve, Entry, Figure, Level, Panel, Point};
 use super::front::{front, steps};
 use super::{looks, origin};
 use crate::stored::{ContactRow, Stored};
@@ -14,6 +14,8 @@ struct Quantity {
     title: &'static str,
     median: fn(&ContactRow) -> Option<f64>,
     p95: fn(&ContactRow) -> Option<f64>,
+    /// The median error of an answer that takes no look at the points.
+    blind: fn(Regime) -> Level,
 }
 
 const QUANTITIES: [Quantity; 2] = [
@@ -22,12 +24,23 @@ const QUANTITIES: [Quantity; 2] = [
         title: "Normal",
         median: |row| row.normal_median_deg,
         p95: |row| row.normal_p95_deg,
+        blind: |_| Level {
+            y: 90.0,
+            label: "a guess: any direction".to_owned(),
+        },
     },
     Quantity {
         axis: "error of the depth, r",
         title: "Depth",
         median: |row| row.depth_median_radii,
         p95: |row| row.depth_p95_radii,
+        blind: |regime| {
+            let [low, high] = regime.depths().map(f64::from);
+            Level {
+                y: 0.5 * (low + high),
+                label: "no answer: always 0".to_owned(),
+            }
+        },
     },
 ];
 
@@ -112,8 +125,8 @@ fn figure(run: &Run, name: String) -> Figure {
             "Balls: the pair that is deepest in each other, its normal from centre to centre, its depth \
              2 radii less the distance. Voxels and meshes: the deepest point of rapier's manifolds."
                 .to_owned(),
-            "Marks: the median of all cases; bars, on the front: up to 95 % of the cases, and the middle \
-             half of the times. A missed contact is infinitely wrong; what misses half is not drawn."
+            "Marks: the median of all cases; bars, on the front: what 95 % of the cases are below. A missed \
+             contact is infinitely wrong; what misses half is not drawn."
                 .to_owned(),
             "Meshes are given their triangles, as fine as the points; the others only points. On the front \
              no other method of those is both faster and less wrong."
@@ -134,34 +147,38 @@ fn panel(run: &Run, methods: &[&str], regime: Regime, quantity: &Quantity) -> Pa
     let of_points: Vec<Placed> = of_points.copied().collect();
     let places: Vec<[f64; 2]> = of_points.iter().map(at).collect();
     let on_front: Vec<Placed> = front(&places).into_iter().map(|i| of_points[i]).collect();
-    let spread = |p: &Placed| [p.row.lower_quartile_ms, p.row.upper_quartile_ms];
-    let times = placed.iter().map(|p| p.row.median_ms);
     let x = Axis::log(
         "time for one frame, ms (median of all cases)",
-        times.chain(on_front.iter().flat_map(spread)),
+        placed.iter().map(|p| p.row.median_ms),
     );
+    let blind = (quantity.blind)(regime);
     let most = on_front.iter().filter_map(|p| (quantity.p95)(p.row));
-    let y = Axis::log(quantity.axis, placed.iter().map(|p| p.error).chain(most));
+    let errors = placed.iter().map(|p| p.error).chain(most);
+    let y = Axis::log(quantity.axis, errors.chain([blind.y]));
     let mut curves = vec![Curve {
         look: looks::FRONT,
         points: steps(on_front.iter().map(at)),
     }];
     for method in methods {
-        let of_method = placed.iter().filter(|p| p.row.variant == *method);
+        let of_method = |p: &&Placed| p.row.variant == *method;
+        let best: Vec<&Placed> = on_front.iter().filter(of_method).collect();
         let point = |p: &Placed| {
-            let is_on_front = on_front.iter().any(|other| std::ptr::eq(other.row, p.row));
+            let is = |other: &&Placed| std::ptr::eq(other.row, p.row);
+            let is_on_front = best.iter().any(is);
+            // Where the method's part of the front begins and ends.
+            let is_end = best.first().is_some_and(is) || best.last().is_some_and(is);
             let most = (quantity.p95)(p.row).unwrap_or(y.range[1]);
             Point {
                 x: p.row.median_ms,
                 y: p.error,
-                x_spread: is_on_front.then(|| spread(p)),
+                x_spread: None,
                 y_spread: is_on_front.then_some([p.error, most]),
-                label: is_on_front.then(|| setting_label(p.row)),
+                label: is_end.then(|| setting_label(p.row)),
             }
         };
         curves.push(Curve {
             look: looks::look(method),
-            points: of_method.map(point).collect(),
+            points: placed.iter().filter(of_method).map(point).collect(),
         });
     }
     let [low, high] = regime.depths();
@@ -174,6 +191,6 @@ fn panel(run: &Run, methods: &[&str], regime: Regime, quantity: &Quantity) -> Pa
         x,
         y,
         curves,
-        levels: Vec::new(),
+        levels: vec![blind],
     }
 }

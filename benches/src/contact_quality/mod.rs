@@ -148,9 +148,10 @@ pub fn measure(
 impl Told {
     fn push(&mut self, seconds: f64, deepest: Option<Deepest>, truth: &Deepest) {
         let errors = deepest.map(|told| {
-            let angle = told.normal.angle_between(truth.normal).to_degrees();
+            // In f32, the angles of almost equal directions come in steps of 0.02°.
+            let [normal, truly] = [told.normal, truth.normal].map(|n| n.as_dvec3());
             let off = (told.depth - truth.depth).abs() / CONTACT_SPACING;
-            [angle, off].map(f64::from)
+            [normal.angle_between(truly).to_degrees(), f64::from(off)]
         });
         let [normal, depth] = errors.unwrap_or([f64::INFINITY; 2]);
         self.seconds.push(seconds);
