@@ -128,12 +128,26 @@ fn figure(run: &Run, name: String) -> Figure {
             "Marks: the median of all cases; bars, on the front: what 95 % of the cases are below. A missed \
              contact is infinitely wrong; what misses half is not drawn."
                 .to_owned(),
-            "Meshes are given their triangles, as fine as the points; the others only points. On the front \
-             no other method of those is both faster and less wrong."
+            given_note(run),
+            "On the front no other method that is given points alone is both faster and less wrong; its \
+             best setting there is said."
                 .to_owned(),
             origin([&run.provenance]),
         ],
     }
+}
+
+/// What methods know beside the points.
+fn given_note(run: &Run) -> String {
+    let motion = match of_all_pairs(run).all(|row| row.tells_motion) {
+        true => {
+            "The motion of the bodies, as an engine knows it, is told; only this project uses it."
+        }
+        false => "The motion of the bodies, which an engine knows, is not told.",
+    };
+    format!(
+        "Meshes are given their triangles, as fine as the points; the others only points. {motion}"
+    )
 }
 
 fn panel(run: &Run, methods: &[&str], regime: Regime, quantity: &Quantity) -> Panel {
@@ -165,15 +179,13 @@ fn panel(run: &Run, methods: &[&str], regime: Regime, quantity: &Quantity) -> Pa
         let point = |p: &Placed| {
             let is = |other: &&Placed| std::ptr::eq(other.row, p.row);
             let is_on_front = best.iter().any(is);
-            // Where the method's part of the front begins and ends.
-            let is_end = best.first().is_some_and(is) || best.last().is_some_and(is);
             let most = (quantity.p95)(p.row).unwrap_or(y.range[1]);
             Point {
                 x: p.row.median_ms,
                 y: p.error,
                 x_spread: None,
                 y_spread: is_on_front.then_some([p.error, most]),
-                label: is_end.then(|| setting_label(p.row)),
+                label: best.last().is_some_and(is).then(|| setting_label(p.row)),
             }
         };
         curves.push(Curve {

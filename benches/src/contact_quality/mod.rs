@@ -136,11 +136,11 @@ pub fn measure(
             }
             for ((contender, told), all) in contenders.iter().zip(told).zip(&mut all) {
                 all.append(&told);
-                rows.push(told.row(contender, Some(pair), regime));
+                rows.push(told.row(contender, plan, Some(pair), regime));
             }
         }
         let of_all = contenders.iter().zip(all);
-        rows.extend(of_all.map(|(contender, told)| told.row(contender, None, regime)));
+        rows.extend(of_all.map(|(contender, told)| told.row(contender, plan, None, regime)));
     }
     rows
 }
@@ -168,6 +168,7 @@ impl Told {
     fn row(
         mut self,
         contender: &Contender,
+        plan: &Plan,
         pair: Option<ContactPair>,
         regime: Regime,
     ) -> ContactRow {
@@ -195,6 +196,7 @@ impl Told {
             backend: contender.peer.backend().map(|b| b.name().to_owned()),
             pixel_scale: contender.pixel_scale,
             radius_scale: contender.radius_scale,
+            tells_motion: plan.tells_motion,
             missed_pct: share(|error| error.is_infinite()),
             wrong_side_pct: share(|error| error.is_finite() && **error > 90.0),
             normal_median_deg: finite(&self.normal_errors, 50),

@@ -170,6 +170,8 @@ pub struct ContactRow {
     /// Radii of the points, of balls, half the edges of voxels, in r̄, which is the spacing of the
     /// points. `None` for methods without any.
     pub radius_scale: Option<f32>,
+    /// Whether methods were told how the bodies move, which this project makes use of.
+    pub tells_motion: bool,
     /// Share of the cases in which no contact was told.
     pub missed_pct: f64,
     /// Share of the cases in which the told normal is more than 90° from the true one: bodies are

@@ -42,6 +42,7 @@ pub(crate) fn contact_row() -> ContactRow {
         backend: Some("cpu".to_owned()),
         pixel_scale: Some(1.0),
         radius_scale: Some(1.0),
+        tells_motion: true,
         missed_pct: 5.0,
         wrong_side_pct: 10.0,
         normal_median_deg: Some(0.25),
