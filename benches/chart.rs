@@ -9,7 +9,7 @@ use clap::Parser;
 use std::path::PathBuf;
 use tldi_benches::charts::draw_all;
 
-/// Draws charts of the results that `accuracy` and `bvh_vs_tldi` stored with --json, as SVG and PNG.
+/// Draws charts of the results that `accuracy`, `contact_quality` and `bvh_vs_tldi` stored with --json, as SVG and PNG.
 /// Nothing is measured.
 #[derive(Parser)]
 struct Args {

@@ -2,6 +2,7 @@
 
 pub mod accuracy;
 pub mod charts;
+pub mod contact_quality;
 pub mod floor;
 pub mod mesh_truth;
 pub mod model;
@@ -72,8 +73,15 @@ fn bumpy(p: Vec3) -> Vec3 {
 }
 
 /// Points and faces of a ball with bumps of a tenth of its radius: a closed, smooth mesh of about
-/// `points` points (an icosphere).
+/// `points` points.
 pub fn bumpy_ball(points: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let (sphere, faces) = icosphere(points);
+    (sphere.into_iter().map(bumpy).collect(), faces)
+}
+
+/// Vertices and faces of the unit sphere: an icosahedron, subdivided until it has at least `points`
+/// vertices.
+fn icosphere(points: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let golden = 0.5 * (1.0 + 5.0f32.sqrt());
     let mut corners = Vec::new();
     for [x, y] in [
@@ -100,20 +108,27 @@ pub fn bumpy_ball(points: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     }
     let mut sphere: Vec<Vec3> = corners.iter().map(|c| c.normalize()).collect();
     while sphere.len() < points {
-        let mut middles = HashMap::new();
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                sphere.push((sphere[a as usize] + sphere[b as usize]).normalize());
-                sphere.len() as u32 - 1
-            })
-        };
-        faces = faces
-            .iter()
-            .flat_map(|&[a, b, c]| {
-                let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-                [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
-            })
-            .collect();
+        let known = sphere.len();
+        faces = subdivided(&mut sphere, &faces);
+        sphere[known..].iter_mut().for_each(|p| *p = p.normalize());
     }
-    (sphere.into_iter().map(bumpy).collect(), faces)
+    (sphere, faces)
+}
+
+/// Four faces in place of each; the middles of the edges are added to the vertices.
+fn subdivided(vertices: &mut Vec<Vec3>, faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let mut middles = HashMap::new();
+    let mut middle = |a: u32, b: u32| {
+        *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+            vertices.push(0.5 * (vertices[a as usize] + vertices[b as usize]));
+            vertices.len() as u32 - 1
+        })
+    };
+    faces
+        .iter()
+        .flat_map(|&[a, b, c]| {
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
+        })
+        .collect()
 }

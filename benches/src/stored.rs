@@ -2,7 +2,7 @@
 
 mod rows;
 
-pub use rows::{AccuracyRow, DistanceTally, FrameRow};
+pub use rows::{AccuracyRow, ContactRow, DistanceTally, FrameRow};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -208,4 +208,4 @@ fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, StoredError>
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -1,14 +1,16 @@
 //! How well the comparison measures contacts of known normal and depth, by angle of motion.
 
-use crate::compare_batch;
 use crate::{Samples, random_unit, sampled_box, sampled_plane, sampled_ramp, sampled_sphere};
-use serde::Serialize;
+use crate::{compare_batch, deepest_contact};
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi::{CameraPolicy, PairQuery, PairResult, Params, PointCloud, Surface, View};
 
-/// Spacing and radius r̄ of all samples, metres.
-const R: f32 = 0.01;
+/// Spacing of the samples of [`ContactClouds`] and their radius r̄, metres.
+pub const CONTACT_SPACING: f32 = 0.01;
+
+const R: f32 = CONTACT_SPACING;
 
 /// Radii of the spheres, metres.
 const BIG: f32 = 0.25;
@@ -41,7 +43,7 @@ pub const SHALLOW_LIMIT: f32 = 0.1;
 pub const DEEP_LIMIT: f32 = 0.05;
 
 /// A pair of shapes in contact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactPair {
     /// A sphere in a sphere.
@@ -83,7 +85,7 @@ impl ContactPair {
 }
 
 /// How deep the surfaces are in each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Regime {
     /// Up to 2 r̄.
@@ -105,11 +107,17 @@ impl Regime {
     }
 
     /// Least and greatest depth, in r̄.
-    fn depths(self) -> [f32; 2] {
+    pub fn depths(self) -> [f32; 2] {
         match self {
             Self::Shallow => [0.0, 2.0],
             Self::Deep => [2.0, 10.0],
         }
+    }
+
+    /// A depth within, metres.
+    pub fn random_depth(self, rng: &mut fastrand::Rng) -> f32 {
+        let [low, high] = self.depths();
+        (low + (high - low) * rng.f32()) * R
     }
 
     /// Error of a depth in the unit of the regime's limit: r̄ where shallow, parts of the depth
@@ -174,19 +182,37 @@ impl fmt::Display for AccuracyRow {
     }
 }
 
+/// A shape about the origin of its frame, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ContactShape {
+    /// A sphere of this radius.
+    Sphere(f32),
+    /// A box with these halves of its edges.
+    Box(Vec3),
+    /// A square of this edge in the plane y = 0.
+    Plane(f32),
+    /// A wedge of this size, as [`sampled_ramp`] has it.
+    Ramp(Vec3),
+}
+
 /// Clouds in a pose to each other, with the truth.
-struct Case<'a> {
-    a: &'a PointCloud<'a>,
-    b: &'a PointCloud<'a>,
-    a_from_b: Pose3,
+pub struct ContactCase<'a> {
+    /// The first.
+    pub a: &'a PointCloud<'a>,
+    /// The second.
+    pub b: &'a PointCloud<'a>,
+    /// What the clouds were sampled from, in the frame of each.
+    pub shapes: [ContactShape; 2],
+    /// From the frame of `b` to that of `a`.
+    pub a_from_b: Pose3,
     /// From `a` towards `b`, unit length, in the frame of `a`.
-    normal: Vec3,
+    pub normal: Vec3,
     /// Metres.
-    depth: f32,
+    pub depth: f32,
 }
 
 /// The clouds of all pairs.
-struct Clouds {
+pub struct ContactClouds {
     big: PointCloud<'static>,
     small: PointCloud<'static>,
     boxed: PointCloud<'static>,
@@ -196,8 +222,9 @@ struct Clouds {
     ramp_from_slope: Pose3,
 }
 
-impl Clouds {
-    fn new(with_normals: bool) -> Self {
+impl ContactClouds {
+    /// Samples all shapes, [`CONTACT_SPACING`] apart, with or without normals.
+    pub fn new(with_normals: bool) -> Self {
         let mut rng = fastrand::Rng::with_seed(1);
         let cloud = |samples: &Samples| {
             if with_normals {
@@ -218,7 +245,7 @@ impl Clouds {
     }
 
     /// The pair, `depth` metres deep, at a random rotation to each other and to the frame.
-    fn case(&self, pair: ContactPair, depth: f32, rng: &mut fastrand::Rng) -> Case<'_> {
+    pub fn case(&self, pair: ContactPair, depth: f32, rng: &mut fastrand::Rng) -> ContactCase<'_> {
         // In a frame where the normal is +y and the surface of `a` passes through the origin.
         let spin = |rng: &mut fastrand::Rng| {
             Quat::from_axis_angle(Vec3::Y, std::f32::consts::TAU * rng.f32())
@@ -236,29 +263,35 @@ impl Clouds {
             }
             ContactPair::CornerPlane => (&self.boxed, on_a_corner(rng)),
         };
-        let lowest = match pair {
-            ContactPair::SphereSphere | ContactPair::SpherePlane => -SMALL,
-            _ => -(rotation.inverse() * Vec3::Y).abs().dot(HALF),
+        let (shape_b, lowest) = match pair {
+            ContactPair::SphereSphere | ContactPair::SpherePlane => {
+                (ContactShape::Sphere(SMALL), -SMALL)
+            }
+            _ => {
+                let reach = (rotation.inverse() * Vec3::Y).abs().dot(HALF);
+                (ContactShape::Box(HALF), -reach)
+            }
         };
         let mut contact_from_b = Pose3::from_parts(Vec3::Y * (-depth - lowest), rotation);
-        let (a, a_from_contact) = match pair {
+        let (a, shape_a, a_from_contact) = match pair {
             ContactPair::SphereSphere => {
                 let rotation = random_rotation(rng);
                 let top = Pose3::from_parts(rotation * (Vec3::Y * BIG), rotation);
-                (&self.big, top)
+                (&self.big, ContactShape::Sphere(BIG), top)
             }
             ContactPair::BoxRamp => {
                 contact_from_b.translation += aside;
-                (&self.ramp, self.ramp_from_slope)
+                (&self.ramp, ContactShape::Ramp(RAMP), self.ramp_from_slope)
             }
             _ => {
                 contact_from_b.translation += aside;
-                (&self.plane, Pose3::IDENTITY)
+                (&self.plane, ContactShape::Plane(PLANE), Pose3::IDENTITY)
             }
         };
-        Case {
+        ContactCase {
             a,
             b,
+            shapes: [shape_a, shape_b],
             a_from_b: a_from_contact * contact_from_b,
             normal: a_from_contact.rotation * Vec3::Y,
             depth,
@@ -296,14 +329,13 @@ pub fn measure_accuracy(
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut rows = Vec::new();
     for with_normals in [true, false] {
-        let clouds = Clouds::new(with_normals);
+        let clouds = ContactClouds::new(with_normals);
         for pair in ContactPair::ALL {
             for regime in Regime::ALL {
                 for angle_bin in 0..ANGLE_BINS {
                     let mut errors = Errors::default();
                     for _ in 0..cases {
-                        let [low, high] = regime.depths();
-                        let depth = (low + (high - low) * rng.f32()) * R;
+                        let depth = regime.random_depth(&mut rng);
                         let case = clouds.case(pair, depth, &mut rng);
                         let angle =
                             ((angle_bin as f32 + rng.f32()) * ANGLE_STEP as f32).to_radians();
@@ -320,22 +352,28 @@ pub fn measure_accuracy(
     rows
 }
 
-impl Case<'_> {
-    /// Compares with a hint `angle` radians from the true normal.
-    fn compare(&self, angle: f32, policy: CameraPolicy, rng: &mut fastrand::Rng) -> PairResult {
+impl ContactCase<'_> {
+    /// A motion of `b` relative to `a` against the true normal, but for `angle` radians to a random
+    /// side: over a step, metres, in the frame of `a`.
+    pub fn motion(&self, angle: f32, rng: &mut fastrand::Rng) -> Vec3 {
         let tangent = loop {
             let across = random_unit(rng).reject_from(self.normal);
             if let Some(tangent) = across.try_normalize() {
                 break tangent;
             }
         };
+        -MOTION * (angle.cos() * self.normal + angle.sin() * tangent)
+    }
+
+    /// Compares with a hint `angle` radians from the true normal.
+    fn compare(&self, angle: f32, policy: CameraPolicy, rng: &mut fastrand::Rng) -> PairResult {
         let query = PairQuery {
             a: Surface::Cloud(self.a),
             b: Surface::Cloud(self.b),
             a_from_b: self.a_from_b,
             view: View::Aim {
                 policy,
-                motion: -MOTION * (angle.cos() * self.normal + angle.sin() * tangent),
+                motion: self.motion(angle, rng),
                 last_axis: None,
             },
             params: Params::for_radius(R),
@@ -353,18 +391,15 @@ struct Errors {
 }
 
 impl Errors {
-    fn push(&mut self, case: &Case, result: &PairResult, regime: Regime) {
-        // Patches are ordered by depth.
-        let Some(patch) = result.patches.first() else {
+    fn push(&mut self, case: &ContactCase, result: &PairResult, regime: Regime) {
+        let Some((normal, measured)) = deepest_contact(result) else {
             self.missed += 1;
             self.normal.push(f32::INFINITY);
             self.depth.push(f32::INFINITY);
             return;
         };
-        let deepest = patch.points.iter().map(|p| -p.gap);
-        let measured = deepest.fold(f32::NEG_INFINITY, f32::max);
         self.normal
-            .push(patch.normal.angle_between(case.normal).to_degrees());
+            .push(normal.angle_between(case.normal).to_degrees());
         self.depth.push(regime.error(measured, case.depth));
     }
 

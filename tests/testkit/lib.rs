@@ -13,15 +13,16 @@ mod shapes;
 mod sheets;
 
 pub use accuracy::{
-    ACCURACY_ROWS, ANGLE_BINS, ANGLE_STEP, AccuracyRow, ContactPair, DEEP_LIMIT, NORMAL_LIMIT,
-    Regime, SHALLOW_LIMIT, measure_accuracy,
+    ACCURACY_ROWS, ANGLE_BINS, ANGLE_STEP, AccuracyRow, CONTACT_SPACING, ContactCase,
+    ContactClouds, ContactPair, ContactShape, DEEP_LIMIT, NORMAL_LIMIT, Regime, SHALLOW_LIMIT,
+    measure_accuracy,
 };
 pub use backend::{compare_batch, gpu_backend};
 pub use data::{data_file, load_cloud};
 pub use half_space::HalfSpace;
 pub use host::Host;
 pub use oracle::{OracleFragment, oracle_layers};
-pub use pairs::{aimed, compare, compare_clouds, deepest_point};
+pub use pairs::{aimed, compare, compare_clouds, deepest_contact, deepest_point};
 pub use policy::PolicyChoice;
 pub use random::{random_pose, random_unit};
 pub use shapes::{Samples, sampled_box, sampled_plane, sampled_ramp, sampled_sphere};

@@ -40,3 +40,12 @@ pub fn deepest_point(result: &PairResult) -> Option<(f32, Vec3)> {
         .min_by(|p, q| p.gap.total_cmp(&q.gap))
         .map(|p| (p.gap, 0.5 * (p.point_a + p.point_b)))
 }
+
+/// Normal (unit, from the first surface towards the second, in the frame of the first) of the deepest
+/// patch, and the depth of its deepest point, metres, negative where there is a gap.
+pub fn deepest_contact(result: &PairResult) -> Option<(Vec3, f32)> {
+    // Patches are ordered by depth.
+    let patch = result.patches.first()?;
+    let depths = patch.points.iter().map(|p| -p.gap);
+    Some((patch.normal, depths.fold(f32::NEG_INFINITY, f32::max)))
+}

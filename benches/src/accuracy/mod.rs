@@ -87,11 +87,9 @@ pub fn measure(
             let scale = contender.radius_scale.unwrap_or(1.0);
             let [radii_a, radii_b] = &scaled[&scale.to_bits()];
             let frame = Frame {
-                a: &points[0],
-                b: &moved,
-                radius: scale * mean_radius,
                 radii: Some([radii_a, radii_b]),
                 faces: Some([&copies.model.faces, &copies.model.faces]),
+                ..Frame::new(&points[0], &moved, scale * mean_radius)
             };
             if k == 0 {
                 contender.peer.compare(&frame);

@@ -106,7 +106,7 @@ impl Peer for Oracle {
             build_seconds: 1e-3 * f64::from(middle(frame.b).x + 1.0),
             query_seconds: 1e-3,
             collides: middle(frame.a).distance(middle(frame.b)) < self.reach,
-            contacts: 0,
+            ..Found::default()
         }
     }
 }

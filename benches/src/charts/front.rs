@@ -1,5 +1,7 @@
 //! The Pareto front: methods that no other one beats in both time and error.
 
+use super::figure::Point;
+
 /// Indices of the points of which no other has less of one and no more of the other, by rising first
 /// coordinate. Of equal points the first.
 pub(super) fn front(points: &[[f64; 2]]) -> Vec<usize> {
@@ -15,6 +17,23 @@ pub(super) fn front(points: &[[f64; 2]]) -> Vec<usize> {
         is_better
     });
     order
+}
+
+/// A line through the points of a front, by rising first coordinate: between two of them nothing better
+/// than the first is known.
+pub(super) fn steps(on_front: impl IntoIterator<Item = [f64; 2]>) -> Vec<Point> {
+    let mut steps: Vec<Point> = Vec::new();
+    for [x, y] in on_front {
+        let corner = steps.last().map(|last| last.y);
+        for y in corner.into_iter().chain([y]) {
+            steps.push(Point {
+                x,
+                y,
+                ..Point::default()
+            });
+        }
+    }
+    steps
 }
 
 #[cfg(test)]

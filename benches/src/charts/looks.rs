@@ -38,6 +38,13 @@ pub(super) const OURS: Look = Look {
     line: Line::Thick,
 };
 
+/// Of the Pareto front.
+pub(super) const FRONT: Look = Look {
+    color: [150, 150, 150],
+    mark: Mark::None,
+    line: Line::Dashed,
+};
+
 /// Of a row's method, whatever its form.
 pub(super) fn look(method: &str) -> Look {
     if method == "default" || method.starts_with("tldi") {

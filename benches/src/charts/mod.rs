@@ -1,6 +1,7 @@
 //! Charts from stored results alone: nothing is measured here.
 
 mod canvas;
+mod contact_quality;
 mod figure;
 mod frames;
 mod front;
@@ -10,7 +11,9 @@ mod speed_accuracy;
 mod sweeps;
 mod ticks;
 
-use crate::stored::{self, AccuracyRow, FrameRow, Measured, Provenance, Stored, StoredError};
+use crate::stored::{
+    self, AccuracyRow, ContactRow, FrameRow, Measured, Provenance, Stored, StoredError,
+};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -38,6 +41,7 @@ pub enum ChartError {
 #[derive(Default)]
 struct Results {
     accuracy: Vec<Stored<AccuracyRow>>,
+    contacts: Vec<Stored<ContactRow>>,
     frames: Vec<Stored<FrameRow>>,
 }
 
@@ -67,6 +71,8 @@ impl Results {
             let kind = stored::kind(&path)?;
             if kind == AccuracyRow::KIND {
                 all.accuracy.push(stored::read(&path)?);
+            } else if kind == ContactRow::KIND {
+                all.contacts.push(stored::read(&path)?);
             } else if kind == FrameRow::KIND {
                 all.frames.push(stored::read(&path)?);
             } else {
@@ -87,6 +93,7 @@ pub fn draw_all(results: &Path, out: &Path) -> Result<Vec<PathBuf>, ChartError> 
     })?;
     let mut figures = speed_accuracy::figures(&all.accuracy);
     figures.extend(sweeps::figures(&all.accuracy));
+    figures.extend(contact_quality::figures(&all.contacts));
     figures.extend(frames::figures(&all.frames));
     let mut files = Vec::new();
     for figure in figures {

@@ -1,18 +1,12 @@
 //! Speed against accuracy: every method on the accuracy protocol.
 
-use super::figure::{Axis, Curve, Entry, Figure, Line, Look, Mark, Panel, Point};
-use super::front::front;
+use super::figure::{Axis, Curve, Entry, Figure, Panel, Point};
+use super::front::{front, steps};
 use super::{looks, origin};
 use crate::stored::{AccuracyRow, Provenance, Stored};
 
 /// Models in the main chart: those with the most points.
 const IN_MAIN: usize = 2;
-
-const FRONT: Look = Look {
-    color: [150, 150, 150],
-    mark: Mark::None,
-    line: Line::Dashed,
-};
 
 const RADIUS_NOTE: &str = "r: the points' mean radius, 0.65 × the distance of the 7th neighbour. On \
                            the front no other method that is given points alone is both faster and \
@@ -151,7 +145,7 @@ fn figure(models: &[Model], name: String) -> Figure {
         })
         .collect();
     legend.push(Entry {
-        look: FRONT,
+        look: looks::FRONT,
         label: "Pareto front (points alone)".to_owned(),
     });
     Figure {
@@ -240,22 +234,10 @@ fn panel(grouped: &[(&str, Vec<&AccuracyRow>)]) -> Panel {
             })
             .collect(),
     };
-    // Steps: between two points of the front nothing better than the first is known.
-    let mut steps: Vec<Point> = Vec::new();
-    for row in &on_front {
-        let (x, y) = (row.median_ms, row.error_pct);
-        let corner = steps.last().map(|last| last.y);
-        for y in corner.into_iter().chain([y]) {
-            steps.push(Point {
-                x,
-                y,
-                ..Point::default()
-            });
-        }
-    }
+    let on_front_at = on_front.iter().map(|row| [row.median_ms, row.error_pct]);
     let mut curves = vec![Curve {
-        look: FRONT,
-        points: steps,
+        look: looks::FRONT,
+        points: steps(on_front_at),
     }];
     curves.extend(grouped.iter().map(curve));
     let spreads = on_front

@@ -1,5 +1,7 @@
 use super::*;
 use crate::stored::DistanceTally;
+use crate::stored::tests::contact_row;
+use tldi_tests::ContactPair;
 
 fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("tldi_charts_{name}_{}", std::process::id()));
@@ -187,6 +189,77 @@ fn stored_results_become_charts() {
     assert!(text("error_noise.svg").contains("bbb2222"));
     assert!(text("frame_cost_a_ball.svg").contains("ccc3333"));
     std::fs::remove_dir_all(results).expect("it is there");
+}
+
+/// A panel a regime and error; the front is of points alone; what misses half has no place, and what 95 %
+/// of the cases are below is told where it is finite.
+#[test]
+fn contacts_become_panels() {
+    let ours = contact_row();
+    let balls = |radius: f32, error: Option<f64>, median_ms: f64| ContactRow {
+        variant: "grid (counting sort), culled".to_owned(),
+        pixel_scale: None,
+        radius_scale: Some(radius),
+        normal_median_deg: error,
+        lower_quartile_ms: 0.5,
+        median_ms,
+        ..contact_row()
+    };
+    let mesh = ContactRow {
+        radius_scale: None,
+        variant: "mesh rebuild (TriMesh), culled".to_owned(),
+        normal_median_deg: Some(0.1),
+        ..balls(1.0, None, 0.5)
+    };
+    let of_one_pair = ContactRow {
+        pair: Some(ContactPair::BoxPlane),
+        normal_median_deg: Some(0.01),
+        ..contact_row()
+    };
+    let rows = vec![
+        balls(0.5, Some(70.0), 0.9),
+        balls(0.7, Some(80.0), 1.0),
+        balls(1.0, None, 0.8),
+        mesh,
+        of_one_pair,
+        ours,
+    ];
+    let run = Stored {
+        kind: ContactRow::KIND.to_owned(),
+        provenance: provenance("aaa1111"),
+        rows,
+    };
+    let figures = contact_quality::figures(&[run]);
+    let [figure] = &figures[..] else {
+        panic!("a figure a run");
+    };
+    assert_eq!(figure.name, "contact_quality");
+    let [.., deep_normal, deep_depth] = &figure.panels[..] else {
+        panic!("four panels");
+    };
+    let curve = |panel: &figure::Panel, k: usize| -> Vec<(f64, f64)> {
+        let points = &panel.curves[k].points;
+        points.iter().map(|p| (p.x, p.y)).collect()
+    };
+    let steps = [(0.9, 70.0), (2.0, 70.0), (2.0, 0.25)];
+    assert_eq!(curve(deep_normal, 0), steps);
+    assert_eq!(curve(deep_normal, 1), [(0.9, 70.0), (1.0, 80.0)]);
+    assert_eq!(curve(deep_normal, 2), [(0.5, 0.1)]);
+    // The only ones of all pairs.
+    assert_eq!(curve(deep_normal, 3), [(2.0, 0.25)]);
+    let ours = |panel: &figure::Panel| panel.curves[3].points[0].clone();
+    assert_eq!(ours(deep_normal).label.as_deref(), Some("pixel 1 r"));
+    assert_eq!(
+        ours(deep_normal).y_spread,
+        Some([0.25, deep_normal.y.range[1]])
+    );
+    // There balls of all radii are as good, and faster.
+    assert_eq!(ours(deep_depth).y_spread, None);
+    assert_eq!(curve(deep_depth, 0), [(0.8, 0.125)]);
+    assert_eq!(
+        (deep_normal.levels[0].y, deep_depth.levels[0].y),
+        (90.0, 6.0)
+    );
 }
 
 /// The faster form of a peer is drawn, at its time.

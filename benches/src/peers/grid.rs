@@ -1,6 +1,6 @@
 //! A uniform grid by counting sort, rebuilt in every frame.
 
-use super::{Found, Frame, Peer};
+use super::{Deepest, Found, Frame, Peer};
 use crate::stopwatch::Stopwatch;
 use tldi::Aabb;
 use tldi::glamx::{UVec3, Vec3};
@@ -15,6 +15,7 @@ pub struct Grid {
     starts: Vec<u32>,
     cursors: Vec<u32>,
     sorted: Vec<Vec3>,
+    tells_deepest: bool,
 }
 
 /// Cells over the points of a body, and a rim of two: what is near it has neighbours as well.
@@ -69,6 +70,14 @@ impl Cells {
 }
 
 impl Grid {
+    /// One that also tells the deepest pair of balls.
+    pub fn telling_deepest() -> Self {
+        Self {
+            tells_deepest: true,
+            ..Self::default()
+        }
+    }
+
     /// Sorts the points into cells.
     pub(super) fn sort(&mut self, points: &[Vec3], cells: &Cells) {
         self.starts.clear();
@@ -104,6 +113,35 @@ impl Grid {
         };
         cells.rows(cell).map(in_row).sum()
     }
+
+    /// Points within the balls' reach of the points of `b`, and the nearest pair of all.
+    fn nearest(&self, b: &[Vec3], cells: &Cells, reach: f32) -> (usize, Option<Deepest>) {
+        let mut count = 0;
+        let mut least = f32::INFINITY;
+        let mut way = Vec3::ZERO;
+        for p in b {
+            let Some(cell) = cells.of(*p) else {
+                continue;
+            };
+            for first in cells.rows(cell) {
+                let first = first as usize;
+                let row = self.starts[first] as usize..self.starts[first + 3] as usize;
+                for q in &self.sorted[row] {
+                    let squared = p.distance_squared(*q);
+                    count += usize::from(squared <= reach * reach);
+                    if squared < least {
+                        (least, way) = (squared, *p - *q);
+                    }
+                }
+            }
+        }
+        let deepest = Deepest {
+            // Of balls in one place as rapier has it.
+            normal: way.normalize_or(Vec3::Y),
+            depth: reach - least.sqrt(),
+        };
+        (count, (count > 0).then_some(deepest))
+    }
 }
 
 impl Peer for Grid {
@@ -117,7 +155,16 @@ impl Peer for Grid {
         let cells = Cells::new(frame.a, reach);
         self.sort(frame.a, &cells);
         let built = start.seconds();
-        let contacts = frame.b.iter().map(|p| self.near(*p, &cells, reach)).sum();
-        Found::new(&start, built, contacts)
+        let (contacts, deepest) = match self.tells_deepest {
+            true => self.nearest(frame.b, &cells, reach),
+            false => {
+                let near = frame.b.iter().map(|p| self.near(*p, &cells, reach));
+                (near.sum(), None)
+            }
+        };
+        Found {
+            deepest,
+            ..Found::new(&start, built, contacts)
+        }
     }
 }

@@ -47,6 +47,9 @@ pub struct Frame<'a> {
     pub radii: Option<[&'a [f32]; 2]>,
     /// Faces over the points of both, as indices, where the points are those of meshes.
     pub faces: Option<[&'a [[u32; 3]]; 2]>,
+    /// Of the second body relative to the first over a step, for methods that can make use of it, metres;
+    /// zero: not known.
+    pub motion: Vec3,
 }
 
 impl<'a> Frame<'a> {
@@ -58,6 +61,7 @@ impl<'a> Frame<'a> {
             radius,
             radii: None,
             faces: None,
+            motion: Vec3::ZERO,
         }
     }
 }
@@ -73,6 +77,17 @@ pub struct Found {
     pub collides: bool,
     /// Pairs of balls, or contact points, that were found.
     pub contacts: usize,
+    /// The deepest of them, of methods that tell it.
+    pub deepest: Option<Deepest>,
+}
+
+/// The deepest contact of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deepest {
+    /// From the first body towards the second, unit length, in the frame of reference of both.
+    pub normal: Vec3,
+    /// Metres; negative: a gap.
+    pub depth: f32,
 }
 
 impl Found {
@@ -84,6 +99,7 @@ impl Found {
             query_seconds: start.seconds() - built,
             collides: contacts > 0,
             contacts,
+            deepest: None,
         }
     }
 }
@@ -159,16 +175,36 @@ fn compare_shapes<S: Shape>(frame: &Frame, mut build: impl FnMut(&[Vec3]) -> S) 
     let start = Stopwatch::of_thread();
     let (a, b) = (build(frame.a), build(frame.b));
     let built = start.seconds();
-    Found::new(&start, built, touching_points(&a, &b))
+    touching(&a, &b, &start, built)
 }
 
-/// Points of contact of two shapes in one frame of reference that touch, by rapier's manifolds, which
-/// must know the shapes.
-fn touching_points(a: &dyn Shape, b: &dyn Shape) -> usize {
+/// Contacts of two shapes in one frame of reference that touch, by rapier's manifolds, which must know
+/// the shapes. The frame began with `start`, the queries `built` seconds later.
+fn touching(a: &dyn Shape, b: &dyn Shape, start: &Stopwatch, built: f64) -> Found {
     let mut manifolds: Vec<ContactManifold> = Vec::new();
     DefaultQueryDispatcher
         .contact_manifolds(&Pose::IDENTITY, a, b, 0.0, &mut manifolds, &mut None)
         .expect("rapier has manifolds of these shapes");
-    let points = manifolds.iter().flat_map(|manifold| &manifold.points);
-    points.filter(|point| point.dist <= 0.0).count()
+    let mut contacts = 0;
+    let mut deepest: Option<(f32, &ContactManifold)> = None;
+    for manifold in &manifolds {
+        for point in manifold.points.iter().filter(|point| point.dist <= 0.0) {
+            contacts += 1;
+            if deepest.is_none_or(|(dist, _)| point.dist < dist) {
+                deepest = Some((point.dist, manifold));
+            }
+        }
+    }
+    let deepest = deepest.map(|(dist, manifold)| {
+        let part = manifold.subshape_pos1().copied().unwrap_or(Pose::IDENTITY);
+        let normal = part.rotation * manifold.local_n1;
+        Deepest {
+            normal: Vec3::new(normal.x, normal.y, normal.z),
+            depth: -dist,
+        }
+    });
+    Found {
+        deepest,
+        ..Found::new(start, built, contacts)
+    }
 }

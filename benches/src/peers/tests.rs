@@ -5,6 +5,7 @@ use crate::bumpy_ball;
 use crate::mesh_truth::ExactMesh;
 use ::tldi::CpuBackend;
 use ::tldi::glamx::{Pose3, Quat};
+use rapier3d::parry::shape::{Compound, SharedShape};
 
 /// Two boxes of random points that overlap by a part or not at all.
 fn boxes(seed: u64, count: usize) -> [Vec<Vec3>; 2] {
@@ -35,6 +36,69 @@ fn balls_meet_those_that_brute_force_finds() {
                 assert_eq!(found.collides, expected > 0, "seed {seed}: {}", peer.name());
             }
         }
+    }
+}
+
+/// The grid tells the pair of balls that brute force finds to be deepest, behind a cull as well; which of
+/// them is the first body tells where the normal points.
+#[test]
+fn the_deepest_pair_of_balls_is_told() {
+    let plain: [Box<dyn Peer>; 2] = [
+        Box::new(Grid::telling_deepest()),
+        Box::new(Culled::new(Grid::telling_deepest())),
+    ];
+    let mut counts = [0; 2];
+    for mut peer in plain {
+        for seed in 0..40 {
+            let [a, b] = boxes(seed, 120);
+            let radius = 0.03;
+            let pairs = a.iter().flat_map(|p| b.iter().map(move |q| (*p, *q)));
+            let (p, q) = pairs
+                .min_by(|(p, q), (r, s)| p.distance(*q).total_cmp(&r.distance(*s)))
+                .expect("there are points");
+            let depth = 2.0 * radius - p.distance(q);
+            let found = peer.compare(&Frame::new(&a, &b, radius));
+            counts[usize::from(depth > 0.0)] += 1;
+            let Some(deepest) = found.deepest else {
+                assert!(depth < 0.0, "seed {seed}: {}", peer.name());
+                continue;
+            };
+            assert!((deepest.depth - depth).abs() < 1e-6, "seed {seed}");
+            assert!(
+                deepest.normal.dot((q - p).normalize()) > 0.9999,
+                "seed {seed}"
+            );
+        }
+        // Ball in ball.
+        let deepest = peer
+            .compare(&Frame::new(&[Vec3::X], &[Vec3::X], 0.5))
+            .deepest;
+        let expected = Deepest {
+            normal: Vec3::Y,
+            depth: 1.0,
+        };
+        assert_eq!(deepest, Some(expected), "{}", peer.name());
+    }
+    assert!(counts.iter().all(|count| *count > 10), "{counts:?}");
+}
+
+/// The deepest point of rapier's manifolds, its normal from the first shape to the second in the frame
+/// of both, also where the shapes are turned parts of others.
+#[test]
+fn manifolds_tell_the_deepest_point() {
+    let turn = Pose::rotation(Vector::new(0.0, 0.0, 0.5 * std::f32::consts::PI));
+    let part = |x: f32| {
+        let pose = Pose::translation(x, 0.0, 0.0) * turn;
+        (pose, SharedShape::cuboid(0.5, 1.0, 0.5))
+    };
+    let body = Compound::new(vec![part(0.0), part(-5.0)]);
+    // In the first part by 0.25, in no other.
+    for (x, normal) in [(1.75, Vec3::X), (-6.75, -Vec3::X)] {
+        let other = Compound::new(vec![part(x)]);
+        let found = touching(&body, &other, &Stopwatch::of_thread(), 0.0);
+        let deepest = found.deepest.expect("they touch");
+        assert!((deepest.depth - 0.25).abs() < 1e-4, "{deepest:?}");
+        assert!(deepest.normal.distance(normal) < 1e-4, "{deepest:?}");
     }
 }
 

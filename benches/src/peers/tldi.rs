@@ -1,11 +1,13 @@
 //! Ours, and the paper's, as a peer: clouds get new points, then are compared.
 
-use super::{Found, Frame, Peer};
+use super::{Deepest, Found, Frame, Peer};
 use crate::stopwatch::Stopwatch;
 use ::tldi::glamx::{Pose3, Vec3};
 use ::tldi::{
-    Backend, PairQuery, PairResult, Params, PointCloud, Radii, Surface, View, VirtualCamera,
+    Backend, CameraPolicy, PairQuery, PairResult, Params, PointCloud, Radii, Surface, View,
+    VirtualCamera,
 };
+use tldi_tests::deepest_contact;
 
 /// How clouds are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,9 +27,13 @@ pub enum Method {
 }
 
 impl Method {
-    fn view(self) -> View {
+    fn view(self, motion: Vec3) -> View {
         match self {
-            Self::Default { .. } => View::aimed(),
+            Self::Default { .. } => View::Aim {
+                policy: CameraPolicy::default(),
+                motion,
+                last_axis: None,
+            },
             Self::Paper { resolution, .. } => View::Fixed(VirtualCamera::perspective(
                 4.0 * Vec3::Z,
                 Vec3::ZERO,
@@ -136,7 +142,7 @@ impl Peer for TldiPeer {
                 a: Surface::Cloud(a),
                 b: Surface::Cloud(b),
                 a_from_b: Pose3::IDENTITY,
-                view: method.view(),
+                view: method.view(frame.motion),
                 params: method.params(a.mean_radius()),
             };
             backend
@@ -147,6 +153,8 @@ impl Peer for TldiPeer {
                 query_seconds: start.seconds() - built,
                 collides: results[0].collides,
                 contacts: results[0].contacts.len(),
+                deepest: deepest_contact(&results[0])
+                    .map(|(normal, depth)| Deepest { normal, depth }),
             }
         })
     }

@@ -1,6 +1,6 @@
 //! parry's triangle meshes, where a mesh is at hand: surfaces that the other peers know as points.
 
-use super::{Found, Frame, Peer, touching_points, vector};
+use super::{Found, Frame, Peer, touching, vector};
 use crate::stopwatch::Stopwatch;
 use rapier3d::math::Vector;
 use rapier3d::parry::shape::{TriMesh, TriMeshFlags};
@@ -78,10 +78,9 @@ impl Peer for TriMeshPeer {
             self.kept = meshes(frame, TriMeshFlags::empty());
         }
         let built = start.seconds();
-        let contacts = match &self.kept {
-            Some([a, b]) => touching_points(a, b),
-            None => 0,
-        };
-        Found::new(&start, built, contacts)
+        match &self.kept {
+            Some([a, b]) => touching(a, b, &start, built),
+            None => Found::new(&start, built, 0),
+        }
     }
 }

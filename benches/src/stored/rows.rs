@@ -2,6 +2,7 @@
 
 use super::Measured;
 use serde::{Deserialize, Serialize};
+use tldi_tests::{ContactPair, Regime};
 
 /// Answers of one method, with its settings, to the cases of the accuracy protocol.
 #[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
@@ -145,6 +146,85 @@ impl Measured for FrameRow {
         }
         if self.floor_ratio.is_nan() || self.floor_ratio <= 0.0 {
             return Some(format!("floor_ratio {} is not positive", self.floor_ratio));
+        }
+        None
+    }
+}
+
+/// Contacts of known normal and depth as one method tells them, with its settings: the deepest contact
+/// of each case. A missed contact counts as infinitely wrong.
+#[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
+pub struct ContactRow {
+    /// The shapes; `None`: those of all rows of the same method and regime together.
+    pub pair: Option<ContactPair>,
+    /// How deep they are in each other.
+    pub regime: Regime,
+    /// Contacts that were tried.
+    pub cases: usize,
+    /// `default` or the name of a peer.
+    pub variant: String,
+    /// What compared, of methods that have a backend.
+    pub backend: Option<String>,
+    /// Edge of the default's pixels in r̄.
+    pub pixel_scale: Option<f32>,
+    /// Radii of the points, of balls, half the edges of voxels, in r̄, which is the spacing of the
+    /// points. `None` for methods without any.
+    pub radius_scale: Option<f32>,
+    /// Whether methods were told how the bodies move, which this project makes use of.
+    pub tells_motion: bool,
+    /// Share of the cases in which no contact was told.
+    pub missed_pct: f64,
+    /// Share of the cases in which the told normal is more than 90° from the true one: bodies are
+    /// pushed through each other.
+    pub wrong_side_pct: f64,
+    /// Median angle between told and true normal, degrees. `None`: infinite.
+    pub normal_median_deg: Option<f64>,
+    /// Nineteen of twenty angles are at most this, degrees. `None`: infinite.
+    pub normal_p95_deg: Option<f64>,
+    /// Median absolute error of the depth, in r̄. `None`: infinite.
+    pub depth_median_radii: Option<f64>,
+    /// Nineteen of twenty errors of the depth are at most this, in r̄. `None`: infinite.
+    pub depth_p95_radii: Option<f64>,
+    /// From new points to the contacts, processor time of one thread: median over the cases.
+    pub median_ms: f64,
+    /// A quarter of the cases took less.
+    pub lower_quartile_ms: f64,
+    /// A quarter of the cases took more.
+    pub upper_quartile_ms: f64,
+}
+
+impl Measured for ContactRow {
+    const KIND: &'static str = "contact_quality";
+
+    fn fault(&self) -> Option<String> {
+        if self.cases == 0 {
+            return Some("cases must be at least 1".to_owned());
+        }
+        let times = [
+            self.lower_quartile_ms,
+            self.median_ms,
+            self.upper_quartile_ms,
+        ];
+        if !(times[0] > 0.0 && times.is_sorted()) {
+            return Some(format!("times of {times:?} ms are not positive and rising"));
+        }
+        let shares = [self.missed_pct, self.wrong_side_pct];
+        let are_possible = shares.iter().all(|share| *share >= 0.0);
+        if !are_possible || shares.iter().sum::<f64>() > 100.0 + 1e-6 {
+            return Some(format!(
+                "missed_pct and wrong_side_pct, {shares:?}, are not shares of the same cases"
+            ));
+        }
+        for (name, median, most) in [
+            ("normal", self.normal_median_deg, self.normal_p95_deg),
+            ("depth", self.depth_median_radii, self.depth_p95_radii),
+        ] {
+            let errors = [median, most].map(|error| error.unwrap_or(f64::INFINITY));
+            if !(errors[0] >= 0.0 && errors.is_sorted()) {
+                return Some(format!(
+                    "errors of the {name}, {errors:?}, are not positive and rising"
+                ));
+            }
         }
         None
     }

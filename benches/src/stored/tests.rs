@@ -1,4 +1,5 @@
 use super::*;
+use tldi_tests::Regime;
 
 /// A possible row.
 pub(crate) fn accuracy_row() -> AccuracyRow {
@@ -31,6 +32,29 @@ pub(crate) fn accuracy_row() -> AccuracyRow {
     }
 }
 
+/// A possible row.
+pub(crate) fn contact_row() -> ContactRow {
+    ContactRow {
+        pair: None,
+        regime: Regime::Deep,
+        cases: 20,
+        variant: "default".to_owned(),
+        backend: Some("cpu".to_owned()),
+        pixel_scale: Some(1.0),
+        radius_scale: Some(1.0),
+        tells_motion: true,
+        missed_pct: 5.0,
+        wrong_side_pct: 10.0,
+        normal_median_deg: Some(0.25),
+        normal_p95_deg: None,
+        depth_median_radii: Some(0.125),
+        depth_p95_radii: Some(0.5),
+        median_ms: 2.0,
+        lower_quartile_ms: 1.0,
+        upper_quartile_ms: 3.0,
+    }
+}
+
 fn provenance() -> Provenance {
     Provenance {
         date: "2026-01-31".to_owned(),
@@ -58,6 +82,26 @@ fn what_is_written_is_read() {
     let stored = read::<AccuracyRow>(&path).expect("it can be read");
     assert_eq!(stored.provenance, provenance());
     assert_eq!(stored.rows, [row]);
+}
+
+/// Errors are infinite, or rise; shares are of the same cases.
+#[test]
+fn contacts_that_cannot_be_are_refused() {
+    let good = contact_row();
+    assert_eq!(good.fault(), None);
+    let faults: [fn(&mut ContactRow); 6] = [
+        |row| row.cases = 0,
+        |row| row.median_ms = 5.0,
+        |row| row.wrong_side_pct = 96.0,
+        |row| row.missed_pct = -1.0,
+        |row| row.depth_median_radii = None,
+        |row| row.depth_p95_radii = Some(0.1),
+    ];
+    for (k, fault) in faults.into_iter().enumerate() {
+        let mut row = good.clone();
+        fault(&mut row);
+        assert!(row.fault().is_some(), "{k}");
+    }
 }
 
 #[test]

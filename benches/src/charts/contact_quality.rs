@@ -1,0 +1,208 @@
+//! Contact quality against time: every method that tells its deepest contact.
+
+use super::figure::{Axis, Curve, Entry, Figure, Level, Panel, Point};
+use super::front::{front, steps};
+use super::{looks, origin};
+use crate::stored::{ContactRow, Stored};
+use tldi_tests::Regime;
+
+type Run = Stored<ContactRow>;
+
+/// An error that is drawn.
+struct Quantity {
+    axis: &'static str,
+    title: &'static str,
+    median: fn(&ContactRow) -> Option<f64>,
+    p95: fn(&ContactRow) -> Option<f64>,
+    /// The median error of an answer that takes no look at the points.
+    blind: fn(Regime) -> Level,
+}
+
+const QUANTITIES: [Quantity; 2] = [
+    Quantity {
+        axis: "error of the normal, degrees",
+        title: "Normal",
+        median: |row| row.normal_median_deg,
+        p95: |row| row.normal_p95_deg,
+        blind: |_| Level {
+            y: 90.0,
+            label: "a guess: any direction".to_owned(),
+        },
+    },
+    Quantity {
+        axis: "error of the depth, r",
+        title: "Depth",
+        median: |row| row.depth_median_radii,
+        p95: |row| row.depth_p95_radii,
+        blind: |regime| {
+            let [low, high] = regime.depths().map(f64::from);
+            Level {
+                y: 0.5 * (low + high),
+                label: "no answer: always 0".to_owned(),
+            }
+        },
+    },
+];
+
+/// A row that has a place in a panel.
+#[derive(Clone, Copy)]
+struct Placed<'a> {
+    row: &'a ContactRow,
+    error: f64,
+}
+
+/// A chart for each run that has rows of all pairs.
+pub(super) fn figures(runs: &[Run]) -> Vec<Figure> {
+    let drawn = runs.iter().filter(|run| of_all_pairs(run).next().is_some());
+    let named = drawn.enumerate().map(|(k, run)| match k {
+        0 => figure(run, "contact_quality".to_owned()),
+        _ => figure(run, format!("contact_quality_{}", k + 1)),
+    });
+    named.collect()
+}
+
+fn of_all_pairs(run: &Run) -> impl Iterator<Item = &ContactRow> {
+    run.rows.iter().filter(|row| row.pair.is_none())
+}
+
+/// Names of methods, ours last, so that it is painted above the others.
+fn methods(run: &Run) -> Vec<&str> {
+    let mut all: Vec<&str> = Vec::new();
+    for row in of_all_pairs(run) {
+        if !all.contains(&&*row.variant) {
+            all.push(&row.variant);
+        }
+    }
+    all.sort_by_key(|method| looks::look(method) == looks::OURS);
+    all
+}
+
+fn setting_label(row: &ContactRow) -> String {
+    match (row.pixel_scale, row.radius_scale) {
+        (Some(scale), _) => format!("pixel {scale} r"),
+        (_, Some(scale)) => format!("{scale} r"),
+        _ => String::new(),
+    }
+}
+
+fn figure(run: &Run, name: String) -> Figure {
+    let methods = methods(run);
+    let mut panels = Vec::new();
+    for regime in Regime::ALL {
+        for quantity in &QUANTITIES {
+            panels.push(panel(run, &methods, regime, quantity));
+        }
+    }
+    let entry = |method: &&str| Entry {
+        look: looks::look(method),
+        label: looks::title(method),
+    };
+    let mut legend: Vec<Entry> = methods.iter().rev().map(entry).collect();
+    legend.push(Entry {
+        look: looks::FRONT,
+        label: "Pareto front (points alone)".to_owned(),
+    });
+    Figure {
+        name,
+        title: "How wrong are the normal and the depth of a contact, and how long does it take?"
+            .to_owned(),
+        subtitle: vec![
+            "Spheres, boxes, edges and corners in each other, in planes and on ramps, sampled without \
+             normals: the deepest contact that a method tells, held against the shapes' own."
+                .to_owned(),
+            "Every case is a frame of new points: building and finding the contacts is counted, in \
+             processor time of one thread. Lower left is better."
+                .to_owned(),
+        ],
+        columns: QUANTITIES.len(),
+        panels,
+        panel_size: [640, 400],
+        legend,
+        notes: vec![
+            "r: spacing of the points. Along a curve varies, of this project: the pixel's edge; of the \
+             grid of balls: their radius; of voxels: half their edge."
+                .to_owned(),
+            "Balls: the pair that is deepest in each other, its normal from centre to centre, its depth \
+             2 radii less the distance. Voxels and meshes: the deepest point of rapier's manifolds."
+                .to_owned(),
+            "Marks: the median of all cases; bars, on the front: what 95 % of the cases are below. A missed \
+             contact is infinitely wrong; what misses half is not drawn."
+                .to_owned(),
+            given_note(run),
+            "On the front no other method that is given points alone is both faster and less wrong; its \
+             best setting there is said."
+                .to_owned(),
+            origin([&run.provenance]),
+        ],
+    }
+}
+
+/// What methods know beside the points.
+fn given_note(run: &Run) -> String {
+    let motion = match of_all_pairs(run).all(|row| row.tells_motion) {
+        true => {
+            "The motion of the bodies, as an engine knows it, is told; only this project uses it."
+        }
+        false => "The motion of the bodies, which an engine knows, is not told.",
+    };
+    format!(
+        "Meshes are given their triangles, as fine as the points; the others only points. {motion}"
+    )
+}
+
+fn panel(run: &Run, methods: &[&str], regime: Regime, quantity: &Quantity) -> Panel {
+    let of_regime = of_all_pairs(run).filter(|row| row.regime == regime);
+    let placed: Vec<Placed> = of_regime
+        .filter_map(|row| (quantity.median)(row).map(|error| Placed { row, error }))
+        .collect();
+    let at = |placed: &Placed| [placed.row.median_ms, placed.error];
+    // Meshes have no radius.
+    let of_points = placed.iter().filter(|p| p.row.radius_scale.is_some());
+    let of_points: Vec<Placed> = of_points.copied().collect();
+    let places: Vec<[f64; 2]> = of_points.iter().map(at).collect();
+    let on_front: Vec<Placed> = front(&places).into_iter().map(|i| of_points[i]).collect();
+    let x = Axis::log(
+        "time for one frame, ms (median of all cases)",
+        placed.iter().map(|p| p.row.median_ms),
+    );
+    let blind = (quantity.blind)(regime);
+    let most = on_front.iter().filter_map(|p| (quantity.p95)(p.row));
+    let errors = placed.iter().map(|p| p.error).chain(most);
+    let y = Axis::log(quantity.axis, errors.chain([blind.y]));
+    let mut curves = vec![Curve {
+        look: looks::FRONT,
+        points: steps(on_front.iter().map(at)),
+    }];
+    for method in methods {
+        let of_method = |p: &&Placed| p.row.variant == *method;
+        let best: Vec<&Placed> = on_front.iter().filter(of_method).collect();
+        let point = |p: &Placed| {
+            let is = |other: &&Placed| std::ptr::eq(other.row, p.row);
+            let is_on_front = best.iter().any(is);
+            let most = (quantity.p95)(p.row).unwrap_or(y.range[1]);
+            Point {
+                x: p.row.median_ms,
+                y: p.error,
+                x_spread: None,
+                y_spread: is_on_front.then_some([p.error, most]),
+                label: best.last().is_some_and(is).then(|| setting_label(p.row)),
+            }
+        };
+        curves.push(Curve {
+            look: looks::look(method),
+            points: placed.iter().filter(of_method).map(point).collect(),
+        });
+    }
+    let [low, high] = regime.depths();
+    let cases = placed.iter().map(|p| p.row.cases).max().unwrap_or(0);
+    Panel {
+        title: format!(
+            "{}, contacts {low} to {high} r deep, {cases} cases",
+            quantity.title
+        ),
+        x,
+        y,
+        curves,
+        levels: vec![blind],
+    }
+}
