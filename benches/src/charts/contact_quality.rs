@@ -16,6 +16,8 @@ struct Quantity {
     p95: fn(&ContactRow) -> Option<f64>,
     /// The median error of an answer that takes no look at the points.
     blind: fn(Regime) -> Level,
+    /// Whether the setting of ours matters.
+    says_setting: bool,
 }
 
 const QUANTITIES: [Quantity; 2] = [
@@ -28,6 +30,7 @@ const QUANTITIES: [Quantity; 2] = [
             y: 90.0,
             label: "a guess: any direction".to_owned(),
         },
+        says_setting: false,
     },
     Quantity {
         axis: "error of the depth, r",
@@ -41,6 +44,7 @@ const QUANTITIES: [Quantity; 2] = [
                 label: "no answer: always 0".to_owned(),
             }
         },
+        says_setting: true,
     },
 ];
 
@@ -77,12 +81,8 @@ fn methods(run: &Run) -> Vec<&str> {
     all
 }
 
-fn setting_label(row: &ContactRow) -> String {
-    match (row.pixel_scale, row.radius_scale) {
-        (Some(scale), _) => format!("pixel {scale} r"),
-        (_, Some(scale)) => format!("{scale} r"),
-        _ => String::new(),
-    }
+fn setting_label(row: &ContactRow) -> Option<String> {
+    row.pixel_scale.map(|scale| format!("pixel {scale} r"))
 }
 
 fn figure(run: &Run, name: String) -> Figure {
@@ -129,8 +129,7 @@ fn figure(run: &Run, name: String) -> Figure {
              contact is infinitely wrong; what misses half is not drawn."
                 .to_owned(),
             given_note(run),
-            "On the front no other method that is given points alone is both faster and less wrong; its \
-             best setting there is said."
+            "On the front no other method that is given points alone is both faster and less wrong."
                 .to_owned(),
             origin([&run.provenance]),
         ],
@@ -168,7 +167,8 @@ fn panel(run: &Run, methods: &[&str], regime: Regime, quantity: &Quantity) -> Pa
     let blind = (quantity.blind)(regime);
     let most = on_front.iter().filter_map(|p| (quantity.p95)(p.row));
     let errors = placed.iter().map(|p| p.error).chain(most);
-    let y = Axis::log(quantity.axis, errors.chain([blind.y]));
+    let mut y = Axis::log(quantity.axis, errors.chain([blind.y]));
+    y.range[0] /= 1.4; // room for whole marks
     let mut curves = vec![Curve {
         look: looks::FRONT,
         points: steps(on_front.iter().map(at)),
@@ -179,13 +179,16 @@ fn panel(run: &Run, methods: &[&str], regime: Regime, quantity: &Quantity) -> Pa
         let point = |p: &Placed| {
             let is = |other: &&Placed| std::ptr::eq(other.row, p.row);
             let is_on_front = best.iter().any(is);
+            let is_said = quantity.says_setting
+                && looks::look(method) == looks::OURS
+                && best.last().is_some_and(is);
             let most = (quantity.p95)(p.row).unwrap_or(y.range[1]);
             Point {
                 x: p.row.median_ms,
                 y: p.error,
                 x_spread: None,
                 y_spread: is_on_front.then_some([p.error, most]),
-                label: best.last().is_some_and(is).then(|| setting_label(p.row)),
+                label: is_said.then(|| setting_label(p.row)).flatten(),
             }
         };
         curves.push(Curve {

@@ -201,6 +201,7 @@ fn contacts_become_panels() {
         pixel_scale: None,
         radius_scale: Some(radius),
         normal_median_deg: error,
+        depth_median_radii: Some(0.25),
         lower_quartile_ms: 0.5,
         median_ms,
         ..contact_row()
@@ -248,14 +249,16 @@ fn contacts_become_panels() {
     // The only ones of all pairs.
     assert_eq!(curve(deep_normal, 3), [(2.0, 0.25)]);
     let ours = |panel: &figure::Panel| panel.curves[3].points[0].clone();
-    assert_eq!(ours(deep_normal).label.as_deref(), Some("pixel 1 r"));
+    assert_eq!(ours(deep_depth).label.as_deref(), Some("pixel 1 r"));
     assert_eq!(
         ours(deep_normal).y_spread,
         Some([0.25, deep_normal.y.range[1]])
     );
-    // There balls of all radii are as good, and faster.
-    assert_eq!(ours(deep_depth).y_spread, None);
-    assert_eq!(curve(deep_depth, 0), [(0.8, 0.125)]);
+    assert_eq!(ours(deep_depth).y_spread, Some([0.125, 0.5]));
+    // Of balls those on the front alone have a bar.
+    let bars = deep_depth.curves[1].points.iter().map(|p| p.y_spread);
+    let expected = [None, None, Some([0.25, 0.5])];
+    assert_eq!(bars.collect::<Vec<_>>(), expected);
     assert_eq!(
         (deep_normal.levels[0].y, deep_depth.levels[0].y),
         (90.0, 6.0)
