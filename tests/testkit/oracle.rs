@@ -23,7 +23,8 @@ pub struct OracleFragment {
 /// nothing changes (O(n²)).
 ///
 /// `None` where a decision (covered or not, which class, merged or not) is closer than `f32` can
-/// tell: there the oracle knows no better than what it judges.
+/// tell: there the oracle knows no better than what it judges. The depth alone is not a number where
+/// that holds for the face at a crease.
 pub fn oracle_layers(
     cloud: &PointCloud,
     i: i32,

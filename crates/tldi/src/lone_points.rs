@@ -300,35 +300,32 @@ mod tests {
             .collect()
     }
 
-    /// Whether the grid knows the answer or all blocks must be asked.
+    /// Whether the grid knows the answer or all blocks must be asked; and where it has so few buckets
+    /// that cells share them.
     #[test]
     fn the_nearest_points_are_those_of_brute_force() {
         let mut rng = fastrand::Rng::with_seed(3);
         let mut random = |size: f32| size * Vec3::from_array(std::array::from_fn(|_| rng.f32()));
-        let points: Vec<Vec3> = (0..2000).map(|_| random(0.4)).collect();
-        let cloud = cloud(points.clone());
-        let mut around = Surroundings::default();
-        // Around a part of the cloud only.
-        around.find(&cloud, [Vec3::splat(0.1), Vec3::splat(0.2)].into_iter());
-        assert!((300..1500).contains(&around.points.len()));
-        for k in 0..300 {
-            let place = random(0.5);
-            let beyond = [0.0, 0.01, 0.03][k % 3];
-            let reach = [0.02, 0.06, 1.0][k / 3 % 3];
-            let mut expected: Vec<f32> = points
-                .iter()
-                .map(|p| p.distance_squared(place))
-                .filter(|squared| (beyond * beyond..=reach * reach).contains(squared))
-                .collect();
-            expected.sort_by(f32::total_cmp);
-            expected.resize(NEIGHBORS.max(expected.len()), f32::INFINITY);
-            let found = around.nearest(&cloud, place, beyond, reach);
-            let squares = found.map(|(squared, _)| squared);
-            assert_eq!(
-                squares[..],
-                expected[..NEIGHBORS],
-                "{place} {beyond} {reach}"
-            );
+        for (count, size) in [(2000, 0.4), (40, 0.1)] {
+            let points: Vec<Vec3> = (0..count).map(|_| random(size)).collect();
+            let cloud = cloud(points.clone());
+            let mut around = Surroundings::default();
+            // Around a part of the larger cloud only.
+            around.find(&cloud, [0.1, 0.2].map(Vec3::splat).into_iter());
+            assert!((40..1500).contains(&around.points.len()));
+            for k in 0..300 {
+                let place = random(1.2 * size);
+                let beyond = [0.0, 0.01, 0.03][k % 3];
+                let reach = [0.02, 0.04, 0.06, 1.0][k / 3 % 4];
+                let squares = points.iter().map(|p| p.distance_squared(place));
+                let limits = beyond * beyond..=reach * reach;
+                let mut expected: Vec<f32> = squares.filter(|s| limits.contains(s)).collect();
+                expected.sort_by(f32::total_cmp);
+                expected.resize(NEIGHBORS.max(expected.len()), f32::INFINITY);
+                let found = around.nearest(&cloud, place, beyond, reach);
+                let found = found.map(|(squared, _)| squared);
+                assert_eq!(found[..], expected[..NEIGHBORS], "{place} {beyond} {reach}");
+            }
         }
     }
 
