@@ -211,8 +211,10 @@ fn compare(
     case: &Case,
     resolution: Resolution,
 ) -> anyhow::Result<Outcome> {
-    let mut world = PhysicsWorld::default();
-    world.gravity = Vector::ZERO;
+    let mut world = PhysicsWorld {
+        gravity: Vector::ZERO,
+        ..PhysicsWorld::default()
+    };
     let config = TldiConfig {
         resolution,
         scatter: 0.0,
