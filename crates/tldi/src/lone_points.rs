@@ -7,7 +7,7 @@
 use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
 use crate::links::{Groups, Links};
 use crate::{Aabb, BLOCK, ContactPixel, PairQuery, PairResult, PointCloud, Surface};
-use glamx::{IVec3, Pose3, UVec3, Vec3};
+use glamx::{Pose3, Vec3};
 
 /// Neighbours that tell how dense points are. Clouds of fewer have no lone points.
 const NEIGHBORS: usize = 4;
@@ -105,14 +105,16 @@ impl Surroundings {
         }
     }
 
-    fn cell_of(&self, point: Vec3) -> IVec3 {
-        ((point - self.region.min) / self.cell).floor().as_ivec3()
+    fn cell_of(&self, point: Vec3) -> [i32; 3] {
+        let place = (point - self.region.min) / self.cell;
+        place.to_array().map(|c| c.floor() as i32)
     }
 
     /// By the primes of Teschner et al. 2003, "Optimized Spatial Hashing".
-    fn bucket(&self, cell: IVec3) -> usize {
-        let hashed = cell.as_uvec3() * UVec3::new(73_856_093, 19_349_663, 83_492_791);
-        (hashed.x ^ hashed.y ^ hashed.z) as usize & (self.starts.len() - 2)
+    fn bucket(&self, cell: [i32; 3]) -> usize {
+        let primes = [73_856_093, 19_349_663, 83_492_791];
+        let hashed = (cell.iter().zip(primes)).fold(0, |all, (c, p)| all ^ c.wrapping_mul(p));
+        hashed as usize & (self.starts.len() - 2)
     }
 
     /// The points of `cloud` nearest to `place`, from `beyond` to `reach` metres away, in ascending
@@ -124,7 +126,8 @@ impl Surroundings {
         if known.contains(place) && !self.points.is_empty() {
             let middle = self.cell_of(place);
             for k in 0..27 {
-                let cell = middle + IVec3::new(k % 3, k / 3 % 3, k / 9) - IVec3::ONE;
+                let offset = [k % 3, k / 3 % 3, k / 9];
+                let cell = [0, 1, 2].map(|axis| middle[axis].wrapping_add(offset[axis] - 1));
                 let bucket = self.bucket(cell);
                 let range = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
                 for &point in &self.points[range] {
