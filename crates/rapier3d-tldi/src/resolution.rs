@@ -9,8 +9,9 @@ const ERROR_PER_PIXEL: f32 = 0.6;
 /// By how much pixels grow at once under [`Resolution::Time`]: half as many pixels.
 const COARSER: f32 = std::f32::consts::SQRT_2;
 
-/// Greatest pixel under [`Resolution::Time`], in mean radii.
-const COARSEST: f32 = 8.0;
+/// Greatest pixel under [`Resolution::Time`], in mean radii: a cube that was left 8 pixels across by
+/// 2.5 sank.
+const COARSEST: f32 = 2.0;
 
 /// Pixels shrink again where a step takes less than this share of the time: finer pixels, of which
 /// there are twice as many, then take less than all of it.
@@ -39,7 +40,7 @@ pub enum Resolution {
     /// corners of what touches, where they err most; never smaller than a mean radius.
     Error(f32),
     /// A time budget for the comparisons of a step, longer than zero: a mean radius, but coarser by
-    /// and by, up to 8, while they take longer. What a step costs beside its pixels, a pass over the
+    /// and by, up to 2, while they take longer. What a step costs beside its pixels, a pass over the
     /// points that are near, stays. Results then depend on the machine and its load: not for
     /// simulations that are to be repeated.
     Time(Duration),
@@ -117,12 +118,12 @@ mod tests {
             }
             (last, coarsening)
         };
-        let (last, coarsening) = run(0.05);
+        let (last, coarsening) = run(0.015);
         assert!(
             last[0] == last[1] && (0.005..=0.01).contains(&last[1]),
             "{last:?}"
         );
-        assert!((coarsening - 8.0f32.sqrt()).abs() < 1e-5, "{coarsening}");
+        assert!((coarsening - COARSER).abs() < 1e-5, "{coarsening}");
         assert_eq!(run(10.0).1, COARSEST);
         assert_eq!(run(0.003).1, 1.0);
         assert_eq!(Resolution::Radii(2.0).coarsened(1.0, 9.0), 1.0);
