@@ -9,8 +9,8 @@ const ERROR_PER_PIXEL: f32 = 0.6;
 /// By how much pixels grow at once under [`Resolution::Time`]: half as many pixels.
 const COARSER: f32 = std::f32::consts::SQRT_2;
 
-/// Greatest pixel under [`Resolution::Time`], in mean radii: a cube that was left 8 pixels across by
-/// 2.5 sank.
+/// Greatest pixel under [`Resolution::Time`], in mean radii: beyond, a cube sank while its pixels
+/// grew to an eighth of it; with pixels that are as large from the start it rests.
 const COARSEST: f32 = 2.0;
 
 /// Pixels shrink again where a step takes less than this share of the time: finer pixels, of which
