@@ -13,11 +13,12 @@ use std::path::PathBuf;
 use tldi::glamx::Vec3;
 use tldi::{CpuBackend, PointCloud};
 use tldi_benches::accuracy::{Contender, Copies, Truth, measure};
+use tldi_benches::args::{NameArgs, RunArgs};
 use tldi_benches::mesh_truth::ExactMesh;
 use tldi_benches::model::Model;
-use tldi_benches::peers::{Frame, Method, TldiPeer, all_peers, is_wanted};
+use tldi_benches::peers::{Frame, Method, TldiPeer, all_peers};
 use tldi_benches::protocol::{ALL_CASES, Case, cases};
-use tldi_benches::stored::{self, AccuracyRow, Provenance};
+use tldi_benches::stored::{AccuracyRow, Provenance};
 use tldi_tests::standard_normal;
 use tldi_wgpu::BackendChoice;
 
@@ -67,24 +68,16 @@ struct Args {
         default_value = "0.15,0.25,0.35,0.5,0.7,1"
     )]
     peer_radius: Vec<f32>,
-    /// Only peers with one of these words in their names, several by commas
-    #[arg(long, value_name = "WORD,WORD", value_delimiter = ',')]
-    only: Vec<String>,
-    /// No peers with one of these words in their names, several by commas
-    #[arg(long, value_name = "WORD,WORD", value_delimiter = ',')]
-    without: Vec<String>,
+    #[command(flatten)]
+    names: NameArgs,
     /// Where clouds are compared, on one thread
     #[arg(long, value_name = "auto|cpu|gpu", default_value_t = BackendChoice::Cpu)]
     backend: BackendChoice,
-    /// Seed of the noise
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
     /// Folder in which the truth of each mesh is kept, so that it is tested once
     #[arg(long, value_name = "DIR", default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/truth"))]
     truth: PathBuf,
-    /// Write the rows to this file as JSON
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,8 +117,8 @@ fn main() -> anyhow::Result<()> {
     let mut rows = Vec::new();
     let mut provenance = Provenance::now(None);
     for &noise in &args.noise {
-        let a = noisy(&model.points, noise, args.seed)?;
-        let b = noisy(&model.points, noise, args.seed + 1)?;
+        let a = noisy(&model.points, noise, args.run.seed)?;
+        let b = noisy(&model.points, noise, args.run.seed + 1)?;
         let copies = Copies {
             model: &model,
             clouds: [&a, &b],
@@ -144,9 +137,7 @@ fn main() -> anyhow::Result<()> {
             provenance.adapter = Some(adapter.to_owned());
         }
     }
-    if let Some(path) = &args.json {
-        stored::write(path, provenance, rows)?;
-    }
+    args.run.store(provenance, rows)?;
     Ok(())
 }
 
@@ -242,7 +233,7 @@ fn contenders(args: &Args, model: &Model) -> anyhow::Result<Vec<Contender>> {
                     .into_iter()
                     .filter(|peer| peer.needs_faces() == radius_scale.is_none())
                     .filter(|peer| peer.refuses(&frame).is_none())
-                    .filter(|peer| is_wanted(&peer.name(), &args.only, &args.without))
+                    .filter(|peer| args.names.take(&peer.name()))
                     .map(|peer| Contender {
                         variant: peer.name(),
                         peer,

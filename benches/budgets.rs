@@ -13,12 +13,12 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::{MassProperties, PhysicsWorld, RigidBodyBuilder};
 use rapier3d_tldi::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
 use std::time::Duration;
 use tldi::glamx::{Pose3, Vec3};
+use tldi_benches::args::RunArgs;
 use tldi_benches::floor::Coordinates;
 use tldi_benches::stopwatch::Stopwatch;
-use tldi_benches::stored::{self, Measured, Provenance};
+use tldi_benches::stored::{Measured, Provenance};
 use tldi_tests::{Samples, sampled_box, sampled_plane, sampled_sphere};
 
 /// A ball, and a cube on its edge and on its corner, 2 to 10 radii deep in a flat scan: how far the
@@ -35,12 +35,8 @@ struct Args {
     /// Points of the largest scan
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     most: usize,
-    /// Seed of the poses
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Write the rows to this file as JSON
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 /// Radius of the ball and half the edges of the cube, metres.
@@ -108,9 +104,7 @@ fn main() -> anyhow::Result<()> {
     println!();
     print(&scenes);
     rows.extend(scenes);
-    if let Some(path) = &args.json {
-        stored::write(path, Provenance::now(None), rows)?;
-    }
+    args.run.store(Provenance::now(None), rows)?;
     Ok(())
 }
 
@@ -129,7 +123,7 @@ fn resolutions() -> Vec<(String, Resolution)> {
 }
 
 fn settings(args: &Args) -> anyhow::Result<Vec<Row>> {
-    let mut rng = fastrand::Rng::with_seed(args.seed);
+    let mut rng = fastrand::Rng::with_seed(args.run.seed);
     let r = args.spacing;
     let scan = sampled_plane(SCAN, r, &mut rng).bare_cloud(r);
     let ball = sampled_sphere(SIZE, r).bare_cloud(r);
@@ -182,7 +176,7 @@ fn scenes(args: &Args) -> anyhow::Result<Vec<Row>> {
     let mut rows = Vec::new();
     let mut count = FEWEST;
     while count <= args.most {
-        let mut rng = fastrand::Rng::with_seed(args.seed);
+        let mut rng = fastrand::Rng::with_seed(args.run.seed);
         let edge = spacing * (count as f32).sqrt();
         let mut samples: Samples = sampled_plane(edge, spacing, &mut rng);
         rng.shuffle(&mut samples.points);

@@ -12,12 +12,13 @@ use peak_alloc::PeakAlloc;
 use std::path::PathBuf;
 use tldi::CpuBackend;
 use tldi::glamx::Pose3;
+use tldi_benches::args::{NameArgs, RunArgs};
 use tldi_benches::floor::Coordinates;
 use tldi_benches::model::Model;
-use tldi_benches::peers::{Found, Frame, Method, Peer, TldiPeer, all_peers, is_wanted};
+use tldi_benches::peers::{Found, Frame, Method, Peer, TldiPeer, all_peers};
 use tldi_benches::placements::{Placement, Source, bounds};
 use tldi_benches::stopwatch::Stopwatch;
-use tldi_benches::stored::{self, FrameRow, Provenance};
+use tldi_benches::stored::{FrameRow, Provenance};
 use tldi_wgpu::BackendChoice;
 
 #[global_allocator]
@@ -37,21 +38,13 @@ struct Args {
     /// Frames that each is measured; medians are told
     #[arg(long, value_name = "N", default_value_t = 5)]
     repeats: usize,
-    /// Only methods with one of these words in their names, several by commas
-    #[arg(long, value_name = "WORD,WORD", value_delimiter = ',')]
-    only: Vec<String>,
-    /// No methods with one of these words in their names, several by commas
-    #[arg(long, value_name = "WORD,WORD", value_delimiter = ',')]
-    without: Vec<String>,
+    #[command(flatten)]
+    names: NameArgs,
     /// Measure our method on this backend too
     #[arg(long, value_name = "auto|cpu|gpu", default_value_t = BackendChoice::Cpu)]
     backend: BackendChoice,
-    /// Seed of the points
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Write the rows to this file as JSON
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 /// Fewest points of a cloud.
@@ -88,9 +81,7 @@ fn main() -> anyhow::Result<()> {
             }
         }
     }
-    if let Some(path) = &args.json {
-        stored::write(path, provenance, rows)?;
-    }
+    args.run.store(provenance, rows)?;
     Ok(())
 }
 
@@ -123,7 +114,7 @@ fn methods(args: &Args) -> anyhow::Result<Vec<Measured>> {
         all.push(ours(args.backend.open()?, cores)?);
     }
     all.extend(all_peers().into_iter().map(|peer| (peer, 1)));
-    let is_kept = |(peer, _): &Measured| is_wanted(&peer.name(), &args.only, &args.without);
+    let is_kept = |(peer, _): &Measured| args.names.take(&peer.name());
     all.retain(is_kept);
     ensure!(!all.is_empty(), "--only and --without leave no method");
     Ok(all)
@@ -144,7 +135,7 @@ fn measure(
     let mut counts = [0; 2];
     let progress = ProgressBar::new((args.repeats + 1) as u64).with_message(placement.name());
     for number in 0..=args.repeats as u64 {
-        let [a, b] = source.bodies(placement, radius, args.seed + number);
+        let [a, b] = source.bodies(placement, radius, args.run.seed + number);
         counts = [a.len(), b.len()];
         let faces = match source {
             Source::Vertices(model) if placement != Placement::BodyOnScan => {

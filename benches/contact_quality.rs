@@ -9,11 +9,11 @@
 use anyhow::ensure;
 use clap::Parser;
 use indicatif::ProgressBar;
-use std::path::PathBuf;
 use tldi_benches::accuracy::Contender;
+use tldi_benches::args::RunArgs;
 use tldi_benches::contact_quality::{Plan, measure};
 use tldi_benches::peers::{Culled, Grid, Method, Peer, TldiPeer, TriMeshPeer, VoxelsRebuild};
-use tldi_benches::stored::{self, ContactRow, Provenance};
+use tldi_benches::stored::{ContactRow, Provenance};
 use tldi_tests::{ContactPair, Regime};
 use tldi_wgpu::BackendChoice;
 
@@ -46,12 +46,8 @@ struct Args {
     /// Where clouds are compared, on one thread
     #[arg(long, value_name = "auto|cpu|gpu", default_value_t = BackendChoice::Cpu)]
     backend: BackendChoice,
-    /// Seed of the random places, rotations and depths
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
-    /// Write the rows to this file as JSON
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 fn main() -> anyhow::Result<()> {
@@ -68,17 +64,15 @@ fn main() -> anyhow::Result<()> {
     let plan = Plan {
         pairs: &ContactPair::ALL,
         cases: args.cases,
-        seed: args.seed,
+        seed: args.run.seed,
         tells_motion: !args.without_motion,
     };
     let rows = measure(&mut contenders, &plan, || progress.inc(1));
     progress.finish_and_clear();
     print(&rows);
-    if let Some(path) = &args.json {
-        let mut backends = contenders.iter().filter_map(|c| c.peer.backend());
-        let backend = backends.find(|backend| backend.adapter().is_some());
-        stored::write(path, Provenance::now(backend), rows)?;
-    }
+    let mut backends = contenders.iter().filter_map(|c| c.peer.backend());
+    let backend = backends.find(|backend| backend.adapter().is_some());
+    args.run.store(Provenance::now(backend), rows)?;
     Ok(())
 }
 

@@ -1,6 +1,7 @@
 //! What the benches share: clouds that a sensor could have handed over this very frame.
 
 pub mod accuracy;
+pub mod args;
 pub mod charts;
 pub mod contact_quality;
 pub mod floor;

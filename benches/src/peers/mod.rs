@@ -156,12 +156,6 @@ pub fn all_peers() -> Vec<Box<dyn Peer>> {
     ]
 }
 
-/// Whether a name has one of the words `only`, if there are any, and none of those `without`.
-pub fn is_wanted(name: &str, only: &[String], without: &[String]) -> bool {
-    let has = |word: &String| name.contains(word.as_str());
-    (only.is_empty() || only.iter().any(has)) && !without.iter().any(has)
-}
-
 #[cfg(test)]
 mod tests;
 

@@ -55,14 +55,15 @@ impl Body {
     /// Whether `b`, off by `offset`, is plainly on the side of `a` that `axis` points away from, or
     /// on the other; `sheet` is the mean of the near points of the larger surface.
     fn side(&self, sheet: Vec3, axis: Vec3, offset: Vec3) -> Option<bool> {
-        let toward_b = if self.is_b {
-            self.middle - sheet
-        } else {
-            sheet - self.middle
-        };
-        let along = axis.dot(toward_b + offset);
+        let along = axis.dot(self.toward_b(sheet) + offset);
         let half = self.half_extents.dot((self.from_a * axis).abs());
         (along.abs() > PLAINLY * half).then_some(along < 0.0)
+    }
+
+    /// From `a` to `b`: from `sheet` to the body's middle, or the opposite, metres.
+    fn toward_b(&self, sheet: Vec3) -> Vec3 {
+        let toward_body = self.middle - sheet;
+        if self.is_b { toward_body } else { -toward_body }
     }
 }
 
@@ -130,6 +131,13 @@ impl Approach {
     /// From `a` towards `b`, unit length or zero.
     pub(crate) fn direction(&self) -> Vec3 {
         self.toward_b().normalize_or_zero()
+    }
+
+    /// The same, from the near points of `a` where they may be a sheet: the bounds of one that is not
+    /// level in its own frame hold a body on either side of it.
+    pub(crate) fn direction_at_sheet(&self) -> Vec3 {
+        let toward_b = |sheet| (self.body.toward_b(sheet) - self.motion).normalize_or_zero();
+        self.sheet.map_or_else(|| self.direction(), toward_b)
     }
 
     /// Half of where the bounds meet, along `axis`, metres.

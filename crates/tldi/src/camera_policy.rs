@@ -170,7 +170,7 @@ fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3,
         .filter(|&remembered| !approach.contradicts(remembered, axis));
     let [of_a, of_b] = sides.each_ref().map(|side| mean_along(side, axis));
     let by_both = conclusive(of_b).filter(|_| conclusive(of_b) == conclusive(-of_a));
-    let by_position = -axis.dot(approach.direction());
+    let by_position = -axis.dot(approach.direction_at_sheet());
     let agrees = by_memory
         .or(by_both)
         .or_else(|| approach.side_by_position(axis))
@@ -407,6 +407,20 @@ mod tests {
         let across = Vec3::new(1.2, 3.0, 0.0);
         let approach = at_sheet(0.4 * Vec3::Y, across, None);
         assert!(zone_axes(sides, &approach)[0].y > 0.9);
+    }
+
+    /// A body less than half through lies on the side of its middle, whatever the bounds seem to tell.
+    #[test]
+    fn a_body_deep_in_a_sheet_lies_on_the_side_of_its_middle() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        for (y, axis) in [(0.1_f32, -Vec3::Y), (-0.1, Vec3::Y)] {
+            let approach = Approach {
+                lies: Vec3::new(0.1, -0.3 * y.signum(), 0.0),
+                ..at_sheet(y * Vec3::Y, Vec3::ZERO, None)
+            };
+            assert!(zone_axes(sides, &approach)[0].dot(axis) > 0.9, "{y}");
+        }
     }
 
     /// Half way through a rough sheet the normals of a ball's rim make an axis along the sheet, to

@@ -92,7 +92,7 @@ mod tests {
         let params = Params::for_radius(1.0);
         let mut links = Links::default();
         links.find(&result.contacts, &params);
-        links.confirm(&mut result, &params);
+        links.confirm(&mut result, &params, true, &mut Vec::new());
         let middle = pixels.iter().position(|p| *p == [0, 0]);
         fitted_gap(
             middle.expect("is among them") as u32,

@@ -22,7 +22,8 @@ pub(crate) struct Links {
     pub(crate) pairs: Vec<(u32, u32)>,
     /// First contact pixel at each pixel of a view's rectangle.
     map: Vec<u32>,
-    /// Links of each contact pixel; then its new index, or [`NONE`].
+    /// Links of each contact pixel; then its new index, or [`NONE`]; then, at each root, whether any of
+    /// its component is shallow.
     counts: Vec<u32>,
     /// Where the neighbours of each contact pixel start in `neighbors`, and their end.
     starts: Vec<u32>,
@@ -91,8 +92,16 @@ impl Links {
 
     /// Cuts the penetrations of `result` to what neighbours confirm: contact pixels deeper than a
     /// layer are removed, with their links, others still touch. Those that are left decide on
-    /// `collides` and `gap`.
-    pub(crate) fn confirm(&mut self, result: &mut PairResult, params: &Params) {
+    /// `collides` and `gap`: where an inside is known (`tells_inside`) all that are deep, elsewhere
+    /// those that continue others which are not. What is deep all over may be the space between two
+    /// limbs. `roots` is overwritten.
+    pub(crate) fn confirm(
+        &mut self,
+        result: &mut PairResult,
+        params: &Params,
+        tells_inside: bool,
+        roots: &mut Vec<u32>,
+    ) {
         let is_deep =
             |c: &ContactPixel| c.point_a.distance(c.point_b) > params.merge_gap && c.gap < 0.0;
         self.counts.clear();
@@ -113,9 +122,6 @@ impl Links {
             }
             *count = kept;
             kept += 1;
-            // Solids that overlap by more than a layer's thickness intersect, even if their
-            // surfaces cross where no view sees them well.
-            result.collides |= is_deep(contact);
             result.gap = Some(result.gap.map_or(contact.gap, |g| g.min(contact.gap)));
         }
         let new_index = &self.counts;
@@ -128,6 +134,30 @@ impl Links {
             *k != NONE && *l != NONE
         });
         self.index(result.contacts.len());
+        // Solids that overlap by more than a layer's thickness intersect, even if their surfaces cross
+        // where no view sees them well.
+        if !result.collides && result.contacts.iter().any(is_deep) {
+            let contacts = &result.contacts;
+            result.collides = tells_inside || self.deep_meets_shallow(contacts, is_deep, roots);
+        }
+    }
+
+    /// Whether some contact pixels that are deep continue others that are not.
+    fn deep_meets_shallow(
+        &mut self,
+        contacts: &[ContactPixel],
+        is_deep: impl Fn(&ContactPixel) -> bool,
+        roots: &mut Vec<u32>,
+    ) -> bool {
+        self.components(contacts.len(), roots);
+        let is_shallow = &mut self.counts;
+        is_shallow.clear();
+        is_shallow.resize(contacts.len(), 0);
+        let of_component = || contacts.iter().zip(roots.iter().map(|&root| root as usize));
+        for (_, root) in of_component().filter(|(contact, _)| !is_deep(contact)) {
+            is_shallow[root] = 1;
+        }
+        of_component().any(|(contact, root)| is_deep(contact) && is_shallow[root] == 1)
     }
 
     /// Contact pixels linked with `k`.
@@ -240,15 +270,15 @@ mod tests {
             .collect()
     }
 
-    fn confirmed(pixels: &[[i32; 2]], depth: f32) -> PairResult {
+    fn confirmed(contacts: Vec<ContactPixel>, tells_inside: bool) -> PairResult {
         let mut result = PairResult {
-            contacts: contacts(pixels, depth),
+            contacts,
             ..PairResult::default()
         };
         let params = Params::for_radius(PIXEL);
         let mut links = Links::default();
         links.find(&result.contacts, &params);
-        links.confirm(&mut result, &params);
+        links.confirm(&mut result, &params, tells_inside, &mut Vec::new());
         let count = result.contacts.len();
         for (k, l) in &links.pairs {
             assert!(links.neighbors(*k).contains(l) && links.neighbors(*l).contains(k));
@@ -260,23 +290,46 @@ mod tests {
     #[test]
     fn a_deep_row_is_no_penetration_but_a_deep_block_is() {
         let row: Vec<[i32; 2]> = (0..9).map(|i| [i, 0]).collect();
-        let result = confirmed(&row, 5.0 * PIXEL);
+        let result = confirmed(contacts(&row, 5.0 * PIXEL), true);
         assert!(result.contacts.is_empty() && !result.collides && result.gap.is_none());
         let block: Vec<[i32; 2]> = (0..25).map(|k| [k % 5, k / 5]).collect();
-        let result = confirmed(&block, 5.0 * PIXEL);
+        let result = confirmed(contacts(&block, 5.0 * PIXEL), true);
         // Corners have three neighbours, the other pixels five and more.
         assert_eq!(result.contacts.len(), 21);
         assert!(result.collides);
         assert_eq!(result.gap, Some(-5.0 * PIXEL));
     }
 
+    /// Two limbs with space between them, which nothing tells from the inside of one body; and a body
+    /// on its corner.
+    #[test]
+    fn without_an_inside_what_is_deep_all_over_does_not_collide() {
+        let block: Vec<[i32; 2]> = (0..64).map(|k| [k % 8, k / 8]).collect();
+        let apart = contacts(&block, 5.0 * PIXEL);
+        let mut sloping = apart.clone();
+        for contact in &mut sloping {
+            let depth = (6.0 - contact.pixel[0] as f32) * PIXEL;
+            contact.point_b = contact.point_a - depth * Vec3::Y;
+            contact.gap = -depth;
+        }
+        for (contacts, tells_inside, collides) in [
+            (&apart, false, false),
+            (&apart, true, true),
+            (&sloping, false, true),
+        ] {
+            let result = confirmed(contacts.clone(), tells_inside);
+            assert_eq!(result.collides, collides);
+            assert!(result.gap < Some(-4.0 * PIXEL));
+        }
+    }
+
     #[test]
     fn a_lone_pixel_touches() {
-        let lone = confirmed(&[[0, 0]], PIXEL);
+        let lone = confirmed(contacts(&[[0, 0]], PIXEL), true);
         assert_eq!(lone.contacts.len(), 1);
         assert_eq!(lone.contacts[0].gap, 0.0);
         // Two neighbours of five confirm two fifths of a merge gap of two pixels.
-        let middle = confirmed(&[[0, 0], [1, 0], [2, 0]], PIXEL).contacts[1];
+        let middle = confirmed(contacts(&[[0, 0], [1, 0], [2, 0]], PIXEL), true).contacts[1];
         assert!((middle.gap + 0.8 * PIXEL).abs() < 1e-6, "{}", middle.gap);
     }
 }

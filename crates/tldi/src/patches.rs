@@ -97,15 +97,15 @@ struct Part {
 }
 
 impl PatchScratch {
-    /// Confirms the contact pixels of `result`, settles what they say of `collides` and `gap`, and
-    /// fills its patches, deepest first.
+    /// Confirms the contact pixels of `result`, settles what they say of `collides` and `gap`, as if
+    /// normals told inside from outside, and fills its patches, deepest first.
     ///
     /// The contact pixels may come in any order; they are left ordered by view, row, column and
     /// gap, as the stage `compare` finds them. Cost: linear in them but for sorting the groups, and
     /// them if need be.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         self.link(result, params);
-        self.reduce_linked(result, params);
+        self.reduce_linked(result, params, true);
     }
 
     /// [`reduce`](Self::reduce) without the contact pixels of points that stand alone: flying pixels
@@ -117,7 +117,8 @@ impl PatchScratch {
         if self.lone_points.drop(result, &self.links, query) {
             self.links.find(&result.contacts, &query.params);
         }
-        self.reduce_linked(result, &query.params);
+        let tells_inside = query.a.is_oriented() || query.b.is_oriented();
+        self.reduce_linked(result, &query.params, tells_inside);
     }
 
     fn link(&mut self, result: &mut PairResult, params: &Params) {
@@ -126,8 +127,9 @@ impl PatchScratch {
         self.links.find(&result.contacts, params);
     }
 
-    fn reduce_linked(&mut self, result: &mut PairResult, params: &Params) {
-        self.links.confirm(result, params);
+    fn reduce_linked(&mut self, result: &mut PairResult, params: &Params, tells_inside: bool) {
+        self.links
+            .confirm(result, params, tells_inside, &mut self.group);
         let (contacts, out) = (&result.contacts, &mut result.patches);
         out.clear();
         if contacts.is_empty() {

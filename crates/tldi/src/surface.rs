@@ -68,6 +68,15 @@ impl Surface<'_> {
         }
     }
 
+    /// Whether the surface's normals tell its inside from its outside.
+    pub(crate) fn is_oriented(&self) -> bool {
+        match self {
+            Surface::Cloud(cloud) => cloud.normals().is_some() && cloud.normals_oriented(),
+            Surface::Exact(surface) => surface.is_closed(),
+            Surface::Device(_) => false,
+        }
+    }
+
     /// Mean point radius in metres; 0 for an exact surface.
     pub fn mean_radius(&self) -> f32 {
         match self {

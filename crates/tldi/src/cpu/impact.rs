@@ -7,7 +7,7 @@
 
 use super::columns::{Columns, dilate};
 use super::cull::{self, PointRadii, Region};
-use super::pair::{Scratch, is_oriented};
+use super::pair::Scratch;
 use super::side::{CloudView, ExactView};
 use super::splat::splat_radius;
 use super::sweep::is_edge_on;
@@ -180,7 +180,7 @@ impl Scratch {
         meeting_a.max.z = meeting_a.max.z.max(seen_b.max.z);
         let beside = (BORDER + 1) as f32 * query.params.pixel_size * Vec3::new(1.0, 1.0, 0.0);
         (meeting_a.min, meeting_a.max) = (meeting_a.min - beside, meeting_a.max + beside);
-        if is_oriented(&query.a) {
+        if query.a.is_oriented() {
             // Whether `b` is inside is told by what is behind it.
             met_by_b.min.z = met_by_b.min.z.min(seen_a.min.z);
         }

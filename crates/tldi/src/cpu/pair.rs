@@ -50,7 +50,7 @@ impl Scratch {
             View::Aim { policy, .. } => {
                 let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| {
                     let is_cloud = matches!(surface, Surface::Cloud(_));
-                    (is_cloud && !is_oriented(&surface)).then(|| side.mean_of_near())
+                    (is_cloud && !surface.is_oriented()).then(|| side.mean_of_near())
                 });
                 let approach = plan.approach.at_sheet(near);
                 let normals = self.zone_normals(query);
@@ -170,7 +170,7 @@ impl Scratch {
     fn zone_normals(&self, query: &PairQuery) -> [ZoneNormals<'_>; 2] {
         [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| ZoneNormals {
             normals: &side.near_normals,
-            oriented: is_oriented(&surface),
+            oriented: surface.is_oriented(),
         })
     }
 
@@ -278,14 +278,5 @@ impl Scratch {
             || side_b.image(b, &imaging, Some(touching)),
         );
         Some(())
-    }
-}
-
-/// Whether the surface's normals tell its outside.
-pub(super) fn is_oriented(surface: &Surface) -> bool {
-    match surface {
-        Surface::Cloud(cloud) => cloud.normals().is_some() && cloud.normals_oriented(),
-        Surface::Exact(surface) => surface.is_closed(),
-        Surface::Device(_) => false,
     }
 }
