@@ -111,10 +111,18 @@ fn sheet_of(pair: u32) -> vec4f {
     return vec4f(low + mean * extents, 1.0);
 }
 
-// From `a` to `b`: from the sheet to the body's middle, or the opposite.
-fn toward_b_at(pair: u32, sheet: vec4f) -> vec3f {
+// How far along the axis `b`, off by `offset`, is from `a`, from the sheet to the body's middle or the
+// opposite, in half extents of the body.
+fn share_along(pair: u32, sheet: vec4f, offset: vec3f) -> f32 {
     let toward_body = pairs[pair].body_middle - sheet.xyz;
-    return select(-toward_body, toward_body, pairs[pair].body_is_b != 0u);
+    let toward_b = select(-toward_body, toward_body, pairs[pair].body_is_b != 0u);
+    let in_body = vec3f(
+        dot(pairs[pair].body_from_a_x, axis),
+        dot(pairs[pair].body_from_a_y, axis),
+        dot(pairs[pair].body_from_a_z, axis),
+    );
+    let half = dot(pairs[pair].body_half_extents, abs(in_body));
+    return dot(toward_b + offset, axis) / max(half, 1e-30);
 }
 
 // Whether `b`, off by `offset`, is plainly on the side of `a` that the axis points away from (1), or
@@ -128,13 +136,8 @@ fn side_of(pair: u32, sheet: vec4f, offset: vec3f) -> i32 {
     );
     var most = dot(pairs[pair].half_extents, abs(in_larger));
     if sheet.w > 0.0 {
-        let in_body = vec3f(
-            dot(pairs[pair].body_from_a_x, axis),
-            dot(pairs[pair].body_from_a_y, axis),
-            dot(pairs[pair].body_from_a_z, axis),
-        );
-        along = dot(toward_b_at(pair, sheet) + offset, axis);
-        most = PLAINLY * dot(pairs[pair].body_half_extents, abs(in_body));
+        along = share_along(pair, sheet, offset);
+        most = PLAINLY;
     }
     return select(0, select(-1, 1, along < 0.0), abs(along) > most);
 }
@@ -159,8 +162,10 @@ fn orientation(pair: u32) -> i32 {
     let is_crossing = abs(dot(motion, axis)) >= CROSSING * length(motion);
     let by_place = select(now, before, is_crossing && before != 0);
     // The bounds of a sheet that is not level in its own frame hold a body on either side of it.
-    let toward_b = select(pairs[pair].toward_b, toward_b_at(pair, sheet) - motion, sheet.w > 0.0);
-    let by_position = -dot(axis, unit_or(toward_b, vec3f()));
+    var by_position = -dot(axis, unit_or(pairs[pair].toward_b, vec3f()));
+    if sheet.w > 0.0 {
+        by_position = -share_along(pair, sheet, -motion);
+    }
     var told = by_memory;
     told = select(by_both, told, told != 0);
     told = select(by_place, told, told != 0);

@@ -55,15 +55,17 @@ impl Body {
     /// Whether `b`, off by `offset`, is plainly on the side of `a` that `axis` points away from, or
     /// on the other; `sheet` is the mean of the near points of the larger surface.
     fn side(&self, sheet: Vec3, axis: Vec3, offset: Vec3) -> Option<bool> {
-        let along = axis.dot(self.toward_b(sheet) + offset);
-        let half = self.half_extents.dot((self.from_a * axis).abs());
-        (along.abs() > PLAINLY * half).then_some(along < 0.0)
+        let share = self.share_along(axis, sheet, offset);
+        (share.abs() > PLAINLY).then_some(share < 0.0)
     }
 
-    /// From `a` to `b`: from `sheet` to the body's middle, or the opposite, metres.
-    fn toward_b(&self, sheet: Vec3) -> Vec3 {
+    /// How far along `axis` `b`, off by `offset`, is from `a`, from `sheet` to the body's middle or the
+    /// opposite, in half extents of the body.
+    fn share_along(&self, axis: Vec3, sheet: Vec3, offset: Vec3) -> f32 {
         let toward_body = self.middle - sheet;
-        if self.is_b { toward_body } else { -toward_body }
+        let toward_b = if self.is_b { toward_body } else { -toward_body };
+        let half = self.half_extents.dot((self.from_a * axis).abs());
+        axis.dot(toward_b + offset) / half.max(f32::MIN_POSITIVE)
     }
 }
 
@@ -133,13 +135,6 @@ impl Approach {
         self.toward_b().normalize_or_zero()
     }
 
-    /// The same, from the near points of `a` where they may be a sheet: the bounds of one that is not
-    /// level in its own frame hold a body on either side of it.
-    pub(crate) fn direction_at_sheet(&self) -> Vec3 {
-        let toward_b = |sheet| (self.body.toward_b(sheet) - self.motion).normalize_or_zero();
-        self.sheet.map_or_else(|| self.direction(), toward_b)
-    }
-
     /// Half of where the bounds meet, along `axis`, metres.
     pub(crate) fn half_extent(&self, axis: Vec3) -> f32 {
         self.half_extents.dot((self.larger_from_a * axis).abs())
@@ -166,6 +161,17 @@ impl Approach {
         let crosses = self.motion.dot(axis).abs() >= CROSSING * self.motion.length();
         let before = side(-self.motion).filter(|_| crosses);
         before.or_else(|| side(Vec3::ZERO))
+    }
+
+    /// Towards which side of `a` `b` seems to lie, or to come from, along `axis`, when nothing is sure: by
+    /// its middle and the near points where they may be a sheet, in half extents of the body, since the
+    /// bounds of a sheet that is not level in its own frame hold a body on either side of it; elsewhere
+    /// by the bounds, as a cosine.
+    pub(crate) fn leaning(&self, axis: Vec3) -> f32 {
+        match self.sheet {
+            Some(sheet) => self.body.share_along(axis, sheet, -self.motion),
+            None => axis.dot(self.direction()),
+        }
     }
 
     /// Whether `b` is plainly not on the side that is remembered, nor comes from there.

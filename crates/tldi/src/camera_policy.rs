@@ -170,7 +170,7 @@ fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3,
         .filter(|&remembered| !approach.contradicts(remembered, axis));
     let [of_a, of_b] = sides.each_ref().map(|side| mean_along(side, axis));
     let by_both = conclusive(of_b).filter(|_| conclusive(of_b) == conclusive(-of_a));
-    let by_position = -axis.dot(approach.direction_at_sheet());
+    let by_position = -approach.leaning(axis);
     let agrees = by_memory
         .or(by_both)
         .or_else(|| approach.side_by_position(axis))
