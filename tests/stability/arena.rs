@@ -88,6 +88,11 @@ impl Arena {
         })
     }
 
+    /// How often the solver goes over all contacts in a step: rapier's default is 4.
+    pub(crate) fn set_solver_iterations(&mut self, count: usize) {
+        self.world.integration_parameters.num_solver_iterations = count;
+    }
+
     /// Declares that lengths are about `unit` metres, as rapier asks for worlds that are not of
     /// human size. The cap on speeds stays where it is.
     pub(crate) fn set_length_unit(&mut self, unit: f32) {

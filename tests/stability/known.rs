@@ -58,17 +58,17 @@ const DEEP_IN_WAVES: &str = "A fast body that a wave catches deep is held there 
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
                             it spins off, as the primitive does, with a little less height, and may land \
                             again with up to 10 % more energy.";
+const FOUR_ITERATIONS: &str = "Rapier's default of 4 solver iterations does not bear ten boxes whose faces are \
+                              not known exactly: its own hulls with corners off by 0.1 r̄ fall too, exact \
+                              ones lean, and meshes fall; with 12 iterations clouds stand.";
 
 /// All of them.
 pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known("rest", "ball, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.3),
-    known(
-        "stack",
-        "10 boxes",
-        "Not fully explained: interfaces tilt by a degree while the stack settles, and it leans more \
-         and more; neither levelled support gaps nor less slack for noise change that, and rapier's \
-         own meshes and voxels fall as well.",
-    ),
+    known("stack", "10 boxes, oriented", FOUR_ITERATIONS),
+    known("stack", "10 boxes, bare", FOUR_ITERATIONS),
+    known("stack", "10 boxes, 12 solver iterations, bare", UNEVEN_GAPS)
+        .no_worse_than("top_drift_mean_radii", 1.5),
     known("slide", "noisy plane, 1 m/s", UNEVEN_GAPS).no_worse_than("heading_deg", 3.0),
     known("slide", "noisy plane, 5 m/s", UNEVEN_GAPS).no_worse_than("hop_mean_radii", 0.7),
     known("bounce", "box, restitution", SOLVER_SPINS)
