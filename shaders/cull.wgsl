@@ -24,15 +24,17 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     let item = items[min(item_index, batch.items - 1u)];
     let side_index = item.x;
     let pair_index = side_index / 2u;
-    let stride = sides[side_index].stride;
-    let offset = lane * stride;
-    let index = item.y + offset;
-    var is_kept = exists && offset < BLOCK && index < sides[side_index].len;
+    let index = item.y + lane;
+    var is_kept = exists && index < sides[side_index].len;
     var position = vec3f();
     var radius = 0.0;
     if is_kept {
         let point = points[sides[side_index].first_point + index];
-        radius = point.w;
+        // Which points are left of a fine cloud, and their radii: see `tldi::thinning`.
+        let stride = sides[side_index].stride;
+        let is_coarse = point.w >= sides[side_index].mean_radius;
+        is_kept = lane % stride == hash(item.y / BLOCK) % stride || is_coarse;
+        radius = select(sides[side_index].radius_scale * point.w, point.w, is_coarse);
         position = moved(
             sides[side_index].frame_from_cloud_x,
             sides[side_index].frame_from_cloud_y,
@@ -45,7 +47,7 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
             sides[side_index].other_from_frame_z,
             position,
         );
-        is_kept = is_within(position, pairs[pair_index].overlap_min, pairs[pair_index].overlap_max)
+        is_kept = is_kept && is_within(position, pairs[pair_index].overlap_min, pairs[pair_index].overlap_max)
             && is_within(in_other, sides[side_index].other_min, sides[side_index].other_max);
     }
     var own = 0u;
@@ -74,8 +76,7 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     if !is_kept || slot >= batch.survivors {
         return;
     }
-    let scaled = radius * sides[side_index].radius_scale;
-    survivors[slot] = Survivor(position, scaled, side_index, index, NONE, 0u);
+    survivors[slot] = Survivor(position, radius, side_index, index, NONE, 0u);
     // The cell of the zone's grid; points outside count to the nearest one.
     let dims = pairs[pair_index].zone_dims;
     let at = (position - pairs[pair_index].overlap_min) * pairs[pair_index].zone_inv_cell;

@@ -55,7 +55,7 @@ struct Params {
     rho: f32,
     stack_segments: u32,
     variant: u32,
-    padding: u32,
+    depth_error: f32,
 }
 
 // Sizes of the batch, capacities in elements, and where the parts of the arena begin, in words.

@@ -2,16 +2,12 @@
 
 use std::time::Duration;
 
-/// Error of a gap, in pixels, where pixels are larger than the points' mean radius: the median at the
-/// corner of a box, the shape that they blunt most. Faces and balls err by less than 0.1.
-const ERROR_PER_PIXEL: f32 = 0.6;
-
 /// By how much pixels grow at once under [`Resolution::Time`]: half as many pixels.
 const COARSER: f32 = std::f32::consts::SQRT_2;
 
-/// Greatest pixel under [`Resolution::Time`], in mean radii: beyond, a cube sank while its pixels
-/// grew to an eighth of it; with pixels that are as large from the start it rests.
-const COARSEST: f32 = 2.0;
+/// Greatest pixel under [`Resolution::Time`], in mean radii: beyond, what does not depend on the pixels
+/// takes most of the time.
+const COARSEST: f32 = 8.0;
 
 /// Pixels shrink again where a step takes less than this share of the time: finer pixels, of which
 /// there are twice as many, then take less than all of it.
@@ -36,11 +32,11 @@ pub enum Resolution {
     /// An edge of so many mean radii of the pair's coarser cloud, greater than 0. 1 resolves the
     /// most that the points tell; 2 averages noise as large as the radii.
     Radii(f32),
-    /// An error budget: pixels as large as gaps may err by this many metres, greater than 0, at the
-    /// corners of what touches, where they err most; never smaller than a mean radius.
+    /// An error budget: pixels of this edge in metres, greater than 0, as gaps err by about a pixel at
+    /// the corners of what touches, and elsewhere by less; never smaller than a mean radius.
     Error(f32),
     /// A time budget for the comparisons of a step, longer than zero: a mean radius, but coarser by
-    /// and by, up to 2, while they take longer. What a step costs beside its pixels, a pass over the
+    /// and by, up to 8, while they take longer. What a step costs beside its pixels, a pass over the
     /// points that are near, stays. Results then depend on the machine and its load: not for
     /// simulations that are to be repeated.
     Time(Duration),
@@ -68,7 +64,7 @@ impl Resolution {
     pub(crate) fn pixel_size(self, mean_radius: f32) -> f32 {
         match self {
             Self::Radii(radii) => radii * mean_radius,
-            Self::Error(error) => mean_radius.max(error / ERROR_PER_PIXEL),
+            Self::Error(error) => mean_radius.max(error),
             Self::Time(_) => mean_radius,
         }
     }
@@ -98,9 +94,9 @@ mod tests {
     fn budgets_decide_the_pixels() {
         let radius = 0.01;
         assert_eq!(Resolution::Radii(2.0).pixel_size(radius), 0.02);
-        // No finer than the points, else by the error at corners.
+        // No finer than the points.
         assert_eq!(Resolution::Error(0.001).pixel_size(radius), radius);
-        assert!((Resolution::Error(0.03).pixel_size(radius) - 0.05).abs() < 1e-6);
+        assert_eq!(Resolution::Error(0.03).pixel_size(radius), 0.03);
     }
 
     /// A step that takes time in proportion to the number of pixels settles at the finest ones that

@@ -1,8 +1,6 @@
 //! What a batch uploads: its pairs, their sides, and the blocks of points in reach.
 
-use crate::layout::{
-    BatchData, COUNTERS, CloudFacts, PairData, SIDE_WORDS, SideData, VIEW_WORDS, is_for_device,
-};
+use crate::layout::{BatchData, COUNTERS, CloudFacts, PairData, SIDE_WORDS, SideData, VIEW_WORDS};
 use crate::readback::Counters;
 use crate::resident::Resident;
 use crate::sources::Sources;
@@ -27,12 +25,12 @@ pub(crate) struct Upload {
 impl Upload {
     /// Selects the pairs that the device takes and whose bounds, and blocks, say that they may
     /// touch.
-    pub(crate) fn select(&mut self, batch: &[PairQuery<'_>]) {
+    pub(crate) fn select(&mut self, batch: &[PairQuery<'_>], left_out: &[usize]) {
         self.pairs_of.clear();
         self.plans.clear();
         self.items.clear();
         for (pair, query) in batch.iter().enumerate() {
-            if !is_for_device(query) {
+            if left_out.binary_search(&pair).is_ok() {
                 continue;
             }
             let Some(plan) = PairPlan::new(query) else {

@@ -6,6 +6,7 @@
 
 use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
 use crate::links::{Groups, Links};
+use crate::thinning::Thinning;
 use crate::{Aabb, BLOCK, ContactPixel, PairQuery, PairResult, PointCloud, Surface};
 use glamx::{Pose3, Vec3};
 
@@ -75,7 +76,14 @@ impl Surroundings {
             other_bounds: self.region,
         };
         let (scratch, around) = (&mut self.scratch, &mut self.around);
-        cull(cloud, &Pose3::IDENTITY, &region, 1, scratch, around);
+        cull(
+            cloud,
+            &Pose3::IDENTITY,
+            &region,
+            Thinning::default(),
+            scratch,
+            around,
+        );
         self.sort();
     }
 

@@ -2,6 +2,7 @@
 //! stages. All backends start from here.
 
 use crate::cpu::{columns, compare, normals, splat, sweep};
+use crate::thinning::Thinning;
 use crate::{Aabb, BLOCK, PairQuery, Params, Surface, View};
 use crate::{approach, camera_policy};
 use glamx::{Pose3, Vec3};
@@ -22,10 +23,6 @@ const REACH: f32 = 2.0;
 /// are culled in vain cost little; the deeper ones of two large clouds would be many.
 const SUNK: f32 = 16.0;
 
-/// Points that are kept per pixel of a surface seen face on: enough for the mean of a layer. With 3,
-/// coarse pixels cost a third, but a pebble on frames of a depth camera does not come to rest.
-const POINTS_PER_PIXEL: f32 = 8.0;
-
 /// Most near points of a cloud whose normals aim the camera, or that are projected onto an exact
 /// surface to aim it; more do not sharpen the mean of their normals.
 pub const AIM_SAMPLES: usize = 512;
@@ -33,10 +30,14 @@ pub const AIM_SAMPLES: usize = 512;
 /// Whether the normal at a near point is one of those that aim the camera: about every `step`-th is,
 /// chosen by the point's index in its cloud, in whatever order the points are found.
 pub fn is_aim_sample(index: u32, step: u32) -> bool {
-    // A mixing of the bits without structure, so that none of a grid of points meets it.
+    hash(index).is_multiple_of(step.max(1))
+}
+
+/// A mixing of the bits without structure, so that none of a grid of points meets it.
+pub(crate) fn hash(index: u32) -> u32 {
     let mut hash = (index ^ (index >> 16)).wrapping_mul(0x7feb_352d);
     hash = (hash ^ (hash >> 15)).wrapping_mul(0x846c_a68b);
-    (hash ^ (hash >> 16)).is_multiple_of(step.max(1))
+    hash ^ (hash >> 16)
 }
 
 /// What a pair's stages `cull`, `zone` and `aim` need beside the points.
@@ -88,7 +89,10 @@ impl PairPlan {
     /// # Ok::<(), tldi::CloudError>(())
     /// ```
     pub fn new(query: &PairQuery) -> Option<Self> {
-        let zone_reach = query.params.prediction + query.a.mean_radius() + query.b.mean_radius();
+        let pixel_size = query.params.pixel_size;
+        let radius =
+            |surface: &Surface| Thinning::new(surface.mean_radius(), pixel_size).mean_radius;
+        let zone_reach = query.params.prediction + radius(&query.a) + radius(&query.b);
         if !within_reach(query, zone_reach) {
             return None;
         }
@@ -134,15 +138,6 @@ impl PairPlan {
     }
 }
 
-/// Every how many points of a cloud of this mean radius are enough for pixels of this size, metres.
-///
-/// With radii of 0.65 × the distance of the 7th neighbour there are 0.94 (pixel / r̄)² points to a
-/// pixel.
-pub fn stride(mean_radius: f32, pixel_size: f32) -> usize {
-    let per_pixel = 0.94 * (pixel_size / mean_radius).powi(2);
-    ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
-}
-
 /// Whether the bounds are within `reach` metres of each other in the frames of both surfaces.
 fn within_reach(query: &PairQuery, reach: f32) -> bool {
     let (a, b) = (query.a.bounds().loosened(reach), query.b.bounds());
@@ -159,12 +154,8 @@ pub(crate) fn ring(surface: &Surface, params: &Params) -> f32 {
         Surface::Exact(_) => false,
         Surface::Device(_) => true,
     };
-    let support = if is_bare {
-        normals::SUPPORT * (stride(surface.mean_radius(), params.pixel_size) as f32).sqrt()
-    } else {
-        0.0
-    };
-    (2.0 + support) * surface.mean_radius()
+    let support = if is_bare { normals::SUPPORT } else { 0.0 };
+    (2.0 + support) * Thinning::new(surface.mean_radius(), params.pixel_size).mean_radius
 }
 
 /// Bounds of both surfaces, each in its own frame; those of the larger one with what of a body may

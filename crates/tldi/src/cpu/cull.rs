@@ -3,9 +3,10 @@
 //!
 //! One pass over the cloud, skipping blocks of [`BLOCK`] points whose bounds miss the overlap: the
 //! floor of the whole pipeline is this stage's reading of the coordinates. Of a cloud much finer
-//! than the pixels only every n-th point is taken ([`stride`](crate::plan::stride)): more would not be seen.
+//! than the pixels only some points are taken ([`Thinning`]).
 
 use super::lanes::multiversioned;
+use crate::thinning::Thinning;
 use crate::{Aabb, BLOCK, PointCloud, Radii};
 use glamx::{Mat3, Pose3, Vec3};
 use rayon::prelude::*;
@@ -18,8 +19,8 @@ pub(crate) struct Survivors {
     pub(crate) z: Vec<f32>,
     /// Indices into the cloud.
     pub(crate) index: Vec<u32>,
-    /// Every how many points of the cloud were taken.
-    stride: usize,
+    /// Which points of the cloud were taken.
+    thinning: Thinning,
 }
 
 impl Survivors {
@@ -50,7 +51,8 @@ impl Survivors {
     }
 
     /// Appends the points of a block that are inside the region, after moving them to its front.
-    fn extend(&mut self, moved: &mut Moved, first: usize, stride: usize) {
+    /// `index` tells the index into the cloud of the block's i-th point.
+    fn extend(&mut self, moved: &mut Moved, index_of: impl Fn(usize) -> u32) {
         let Moved { x, y, z, inside } = moved;
         let mut index = [0; BLOCK];
         let mut kept = 0;
@@ -61,7 +63,7 @@ impl Survivors {
                 let i = 64 * word + mask.trailing_zeros() as usize;
                 mask &= mask - 1;
                 (x[kept], y[kept], z[kept]) = (x[i], y[i], z[i]);
-                index[kept] = (first + i * stride) as u32;
+                index[kept] = index_of(i);
                 kept += 1;
             }
         }
@@ -89,13 +91,12 @@ fn bits(flags: &[u8; 64]) -> u64 {
     })
 }
 
-/// Radii in metres of the culled points, scaled so that they cover the surface even where only
-/// every n-th point is left.
+/// Radii in metres of the culled points, which cover the surface even where some are left out.
 #[derive(Clone, Copy)]
 pub(crate) struct PointRadii<'a> {
     radii: &'a Radii<'a>,
     index: &'a [u32],
-    scale: f32,
+    thinning: Thinning,
 }
 
 impl<'a> PointRadii<'a> {
@@ -103,33 +104,33 @@ impl<'a> PointRadii<'a> {
         Self {
             radii: cloud.radii(),
             index: &points.index,
-            scale: (points.stride as f32).sqrt(),
+            thinning: points.thinning,
         }
     }
 
     /// Mean over the culled points.
     pub(crate) fn mean(&self) -> f32 {
         match self.radii {
-            Radii::Global(r) => self.scale * r,
-            Radii::PerPoint(r) => {
-                let sum: f32 = self.index.iter().map(|&i| r[i as usize]).sum();
-                self.scale * sum / self.index.len().max(1) as f32
+            Radii::Global(r) => self.thinning.radius(*r),
+            Radii::PerPoint(_) => {
+                let sum: f32 = (0..self.index.len()).map(|i| self.of(i)).sum();
+                sum / self.index.len().max(1) as f32
             }
         }
     }
 
     /// At least the largest.
     pub(crate) fn limit(&self, cloud: &PointCloud) -> f32 {
-        self.scale * cloud.max_radius()
+        self.thinning.max_radius(cloud.max_radius())
     }
 
     /// Of the i-th culled point.
     #[inline(always)]
     pub(crate) fn of(&self, i: usize) -> f32 {
-        match self.radii {
-            Radii::Global(r) => self.scale * r,
-            Radii::PerPoint(r) => self.scale * r[self.index[i] as usize],
-        }
+        self.thinning.radius(match self.radii {
+            Radii::Global(r) => *r,
+            Radii::PerPoint(r) => r[self.index[i] as usize],
+        })
     }
 }
 
@@ -154,7 +155,8 @@ pub struct Region {
     pub other_bounds: Aabb,
 }
 
-/// Fills `out` with every `stride`-th point of `cloud` inside `region`, in the order of the cloud.
+/// Fills `out` with the points of `cloud` inside `region` that `thinning` leaves, in the order of the
+/// cloud.
 ///
 /// Cost: linear in the points of the blocks that meet the region; parallel over blocks where there
 /// are many. The result does not depend on the number of threads.
@@ -162,19 +164,19 @@ pub(crate) fn cull(
     cloud: &PointCloud,
     frame_from_cloud: &Pose3,
     region: &Region,
-    stride: usize,
+    thinning: Thinning,
     scratch: &mut CullScratch,
     out: &mut Survivors,
 ) {
     out.clear();
-    out.stride = stride;
+    out.thinning = thinning;
     if region.overlap.is_empty() {
         return;
     }
     let blocks = cloud.blocks().len();
     let tasks = blocks.div_ceil(TASK_BLOCKS);
     if tasks <= 1 {
-        cull_blocks(cloud, frame_from_cloud, region, stride, 0..blocks, out);
+        cull_blocks(cloud, frame_from_cloud, region, thinning, 0..blocks, out);
         return;
     }
     if scratch.tasks.len() < tasks {
@@ -186,10 +188,10 @@ pub(crate) fn cull(
         .for_each(|(task, part)| {
             part.clear();
             // At once for all that may come: which task has how many changes from pose to pose.
-            part.reserve(TASK_BLOCKS * BLOCK.div_ceil(stride));
+            part.reserve(TASK_BLOCKS * BLOCK.div_ceil(thinning.stride));
             let first = task * TASK_BLOCKS;
             let range = first..(first + TASK_BLOCKS).min(blocks);
-            cull_blocks(cloud, frame_from_cloud, region, stride, range, part);
+            cull_blocks(cloud, frame_from_cloud, region, thinning, range, part);
         });
     for part in &scratch.tasks[..tasks] {
         out.append(part);
@@ -200,14 +202,14 @@ fn cull_blocks(
     cloud: &PointCloud,
     frame_from_cloud: &Pose3,
     region: &Region,
-    stride: usize,
+    thinning: Thinning,
     blocks: std::ops::Range<usize>,
     out: &mut Survivors,
 ) {
     let kernel = Kernel::new(frame_from_cloud, region);
     let [x, y, z] = cloud.coordinates();
     let mut moved = Moved::default();
-    let mut thinned = [[0.0; BLOCK]; 3];
+    let mut left = Left::default();
     for block in blocks {
         if !cloud.blocks()[block]
             .transformed(frame_from_cloud)
@@ -216,22 +218,69 @@ fn cull_blocks(
             continue;
         }
         let range = block * BLOCK..((block + 1) * BLOCK).min(x.len());
-        if stride == 1 {
+        if thinning.stride == 1 {
             let [x, y, z] = [x, y, z].map(|c| &c[range.clone()]);
             classify(&kernel, x, y, z, &mut moved);
+            out.extend(&mut moved, |i| (range.start + i) as u32);
         } else {
-            let thin = |c: &[f32], to: &mut [f32; BLOCK]| {
-                let taken = c[range.clone()].iter().step_by(stride);
-                to.iter_mut().zip(taken).for_each(|(to, from)| *to = *from);
-            };
-            thin(x, &mut thinned[0]);
-            thin(y, &mut thinned[1]);
-            thin(z, &mut thinned[2]);
-            let n = range.len().div_ceil(stride);
-            let [x, y, z] = &thinned;
-            classify(&kernel, &x[..n], &y[..n], &z[..n], &mut moved);
+            left.find(cloud.radii(), thinning, range);
+            let [x, y, z] = left.gather([x, y, z]);
+            classify(&kernel, x, y, z, &mut moved);
+            out.extend(&mut moved, |i| left.index[i]);
         }
-        out.extend(&mut moved, range.start, stride);
+    }
+}
+
+/// The points of a block that thinning leaves.
+struct Left {
+    index: [u32; BLOCK],
+    count: usize,
+    coordinates: [[f32; BLOCK]; 3],
+}
+
+impl Default for Left {
+    fn default() -> Self {
+        Self {
+            index: [0; BLOCK],
+            count: 0,
+            coordinates: [[0.0; BLOCK]; 3],
+        }
+    }
+}
+
+impl Left {
+    /// Finds those of the points in `range`, which are a block.
+    fn find(&mut self, radii: &Radii, thinning: Thinning, range: std::ops::Range<usize>) {
+        let first = range.start + thinning.first(range.start / BLOCK);
+        self.count = 0;
+        let mut put = |i: usize| {
+            self.index[self.count] = i as u32;
+            self.count += 1;
+        };
+        match radii {
+            Radii::Global(_) => (first..range.end).step_by(thinning.stride).for_each(put),
+            Radii::PerPoint(radii) => {
+                let mut next = first;
+                for i in range {
+                    if i == next || radii[i] >= thinning.mean_radius {
+                        put(i);
+                    }
+                    if i == next {
+                        next += thinning.stride;
+                    }
+                }
+            }
+        }
+    }
+
+    fn gather(&mut self, from: [&[f32]; 3]) -> [&[f32]; 3] {
+        let index = &self.index[..self.count];
+        for (to, from) in self.coordinates.iter_mut().zip(from) {
+            to.iter_mut()
+                .zip(index)
+                .for_each(|(to, &i)| *to = from[i as usize]);
+        }
+        self.coordinates.each_ref().map(|c| &c[..self.count])
     }
 }
 
@@ -320,6 +369,76 @@ fn classify(k: &Kernel, x: &[f32], y: &[f32], z: &[f32], moved: &mut Moved) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of an image whose rows are two blocks long, every 16th point leaves points in all columns.
+    #[test]
+    fn thinned_rows_are_left_everywhere() {
+        let (width, rows, stride) = (2 * BLOCK, 64, 16);
+        let thinning = Thinning::new(1.0, 4.2);
+        assert_eq!(thinning.stride, stride);
+        let point = |k: usize| Vec3::new((k % width) as f32, (k / width) as f32, 0.0);
+        let points: Vec<Vec3> = (0..width * rows).map(point).collect();
+        let cloud = PointCloud::builder(points).radius(1.0).build().unwrap();
+        let everything = cloud.bounds().loosened(1.0);
+        let region = Region {
+            overlap: everything,
+            other_from_frame: Pose3::IDENTITY,
+            other_bounds: everything,
+        };
+        let mut left = Survivors::default();
+        let mut scratch = CullScratch::default();
+        cull(
+            &cloud,
+            &Pose3::IDENTITY,
+            &region,
+            thinning,
+            &mut scratch,
+            &mut left,
+        );
+        assert_eq!(left.len() * stride, cloud.len());
+        let mut in_strip = vec![0; width / 8];
+        for (k, &index) in left.index.iter().enumerate() {
+            assert_eq!(left.point(k), cloud.point(index as usize));
+            in_strip[left.x[k] as usize / 8] += 1;
+        }
+        // 64 rows × 8 columns / 16, five standard deviations of a binomial.
+        assert!(in_strip.iter().all(|n| (5..60).contains(n)), "{in_strip:?}");
+    }
+
+    /// A fine part of a cloud among points that are far apart, in random order.
+    #[test]
+    fn what_is_far_apart_is_not_thinned() {
+        let mut rng = fastrand::Rng::with_seed(1);
+        let points: Vec<Vec3> = (0..3000).map(|_| Vec3::splat(rng.f32())).collect();
+        let radii: Vec<f32> = (0..3000)
+            .map(|_| if rng.u8(..50) == 0 { 0.5 } else { 0.05 })
+            .collect();
+        let far_apart = radii.iter().filter(|&&r| r == 0.5).count();
+        let cloud = PointCloud::builder(points).radii(radii).build().unwrap();
+        let everything = cloud.bounds().loosened(1.0);
+        let region = Region {
+            overlap: everything,
+            other_from_frame: Pose3::IDENTITY,
+            other_bounds: everything,
+        };
+        let thinning = Thinning::new(cloud.mean_radius(), 4.2 * cloud.mean_radius());
+        let (mut left, mut scratch) = (Survivors::default(), CullScratch::default());
+        cull(
+            &cloud,
+            &Pose3::IDENTITY,
+            &region,
+            thinning,
+            &mut scratch,
+            &mut left,
+        );
+        let radii = PointRadii::new(&cloud, &left);
+        let radii: Vec<f32> = (0..left.len()).map(|i| radii.of(i)).collect();
+        assert_eq!(radii.iter().filter(|&&r| r == 0.5).count(), far_apart);
+        // The others stand for 16, with radii four times as large.
+        let others = radii.iter().filter(|&&r| r == 0.2).count();
+        assert_eq!(others + far_apart, left.len());
+        assert!(16 * others > 2000 && 16 * others < 4000, "{others}");
+    }
 
     #[test]
     fn bits_are_in_the_order_of_the_flags() {

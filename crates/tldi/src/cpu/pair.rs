@@ -8,8 +8,10 @@ use super::side::{CloudView, ExactView, Side};
 use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneGrid, ZoneScratch};
 use crate::camera_policy::{MAX_VIEWS, ZoneNormals, aim, seen_from_behind};
+use crate::deep::compare_deep;
 use crate::patches::PatchScratch;
-use crate::plan::{PairPlan, SidePlan, stride};
+use crate::plan::{PairPlan, SidePlan};
+use crate::thinning::Thinning;
 use crate::{PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
@@ -30,6 +32,20 @@ pub(super) struct Scratch {
 
 impl Scratch {
     pub(super) fn compare(&mut self, query: &PairQuery, result: &mut PairResult) {
+        if !self.compare_deep(query, result) {
+            self.compare_with(query, result);
+        }
+    }
+
+    /// See [`CpuBackend::compare_deep`](super::CpuBackend::compare_deep).
+    pub(super) fn compare_deep(&mut self, query: &PairQuery, result: &mut PairResult) -> bool {
+        compare_deep(query, result, |query, result| {
+            self.compare_with(query, result);
+        })
+    }
+
+    /// With the pixels of the query.
+    fn compare_with(&mut self, query: &PairQuery, result: &mut PairResult) {
         if query.params.variant() == Variant::Paper
             && let View::Fixed(camera) = query.view
         {
@@ -42,6 +58,7 @@ impl Scratch {
         if !self.cull(query, &plan) || !self.zone(query, &plan) {
             return;
         }
+        result.pixel_size = query.params.pixel_size;
         match query.view {
             View::Fixed(camera) => {
                 result.axes.push(camera.axis());
@@ -111,10 +128,10 @@ impl Scratch {
     fn cull(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
         let cull = |side: &mut Side, surface: Surface, plan: &SidePlan| {
             if let Surface::Cloud(cloud) = surface {
-                let stride = stride(cloud.mean_radius(), query.params.pixel_size);
+                let thinning = Thinning::new(cloud.mean_radius(), query.params.pixel_size);
                 let frame = &plan.frame_from_surface;
                 let Side { cull, points, .. } = side;
-                cull::cull(cloud, frame, &plan.region, stride, cull, points);
+                cull::cull(cloud, frame, &plan.region, thinning, cull, points);
                 !points.is_empty()
             } else {
                 side.points.clear();
