@@ -25,34 +25,38 @@ impl Gathered {
         for axis in [&mut self.x, &mut self.y, &mut self.z] {
             axis.resize(count, 0.0);
         }
-        match order {
-            Some(order) => {
-                let ordered = order.iter().map(|&i| points[i as usize]);
-                let slots = self.x.iter_mut().zip(&mut self.y).zip(&mut self.z);
-                for (((x, y), z), point) in slots.zip(ordered) {
-                    (*x, *y, *z) = (point.x, point.y, point.z);
+        // Block by block, so that its bounds are taken of what is still in the core's cache.
+        let (x, y, z) = (&mut self.x, &mut self.y, &mut self.z);
+        let blocks = x
+            .chunks_mut(BLOCK)
+            .zip(y.chunks_mut(BLOCK))
+            .zip(z.chunks_mut(BLOCK));
+        self.blocks.clear();
+        self.blocks
+            .extend(blocks.enumerate().map(|(k, ((x, y), z))| {
+                let range = k * BLOCK..k * BLOCK + x.len();
+                match order {
+                    Some(order) => {
+                        let slots = x.iter_mut().zip(&mut *y).zip(&mut *z);
+                        for (((x, y), z), &i) in slots.zip(&order[range]) {
+                            (*x, *y, *z) = points[i as usize].into();
+                        }
+                    }
+                    None => transpose(&points[range], [&mut *x, &mut *y, &mut *z]),
                 }
-            }
-            None => transpose(points, [&mut self.x, &mut self.y, &mut self.z]),
-        }
+                bounds_of([x, y, z])
+            }));
         self.dropped.clear();
-        self.bound();
         let is_finite = |block: &Aabb| block.min.is_finite() && block.max.is_finite();
         if !self.blocks.iter().all(is_finite) {
             extend_non_finite([&self.x, &self.y, &self.z], &mut self.dropped);
             for axis in [&mut self.x, &mut self.y, &mut self.z] {
                 remove(axis, &self.dropped);
             }
-            self.bound();
+            self.blocks.clear();
+            self.blocks
+                .extend(bounds_of_blocks([&self.x, &self.y, &self.z]));
         }
-    }
-
-    fn bound(&mut self) {
-        let Self {
-            x, y, z, blocks, ..
-        } = self;
-        blocks.clear();
-        blocks.extend(bounds_of_blocks([x, y, z]));
     }
 }
 

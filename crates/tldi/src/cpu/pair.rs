@@ -33,19 +33,21 @@ pub(super) struct Scratch {
 impl Scratch {
     pub(super) fn compare(&mut self, query: &PairQuery, result: &mut PairResult) {
         if !self.compare_deep(query, result) {
-            self.compare_with(query, result);
+            self.find_contacts(query, result);
+            self.patches.reduce_pair(result, query);
         }
     }
 
     /// See [`CpuBackend::compare_deep`](super::CpuBackend::compare_deep).
     pub(super) fn compare_deep(&mut self, query: &PairQuery, result: &mut PairResult) -> bool {
         compare_deep(query, result, |query, result| {
-            self.compare_with(query, result);
+            self.find_contacts(query, result);
+            self.patches.reduce_deep(result, query);
         })
     }
 
-    /// With the pixels of the query.
-    fn compare_with(&mut self, query: &PairQuery, result: &mut PairResult) {
+    /// Fills in what the pixels of the query tell.
+    fn find_contacts(&mut self, query: &PairQuery, result: &mut PairResult) {
         if query.params.variant() == Variant::Paper
             && let View::Fixed(camera) = query.view
         {
@@ -83,7 +85,6 @@ impl Scratch {
                 }
             }
         }
-        self.patches.reduce_pair(result, query);
     }
 
     fn compare_paper(
