@@ -31,8 +31,8 @@ const MAX_GROUPS: u32 = 65_535;
 /// What it does not take is compared on the CPU meanwhile, with the same results: pairs with an
 /// exact surface, [`Variant::Paper`](tldi::Variant::Paper), perspective cameras; pairs so deep that
 /// larger pixels are enough ([`Params::depth_error`](tldi::Params::depth_error)), of which few points
-/// are looked at; and pairs of which a pixel has more than 1024 fragments. A batch costs one submission and one readback,
-/// whatever the number of pairs, and uploads of clouds with new content.
+/// are looked at; and pairs of which a pixel has more than 1024 fragments. A batch costs one
+/// submission and one readback, whatever the number of pairs, and uploads of clouds with new content.
 ///
 /// ```
 /// use tldi::{Backend, PairQuery, Params, PointCloud, Surface, View};

@@ -23,8 +23,8 @@ pub(crate) struct Upload {
 }
 
 impl Upload {
-    /// Selects the pairs that the device takes and whose bounds, and blocks, say that they may
-    /// touch.
+    /// Selects the pairs whose bounds, and blocks, say that they may touch, but for those whose
+    /// indices are in `left_out`, ascending.
     pub(crate) fn select(&mut self, batch: &[PairQuery<'_>], left_out: &[usize]) {
         self.pairs_of.clear();
         self.plans.clear();

@@ -51,7 +51,7 @@ impl Survivors {
     }
 
     /// Appends the points of a block that are inside the region, after moving them to its front.
-    /// `index` tells the index into the cloud of the block's i-th point.
+    /// `index_of` tells the index into the cloud of the i-th of them.
     fn extend(&mut self, moved: &mut Moved, index_of: impl Fn(usize) -> u32) {
         let Moved { x, y, z, inside } = moved;
         let mut index = [0; BLOCK];
