@@ -137,10 +137,7 @@ fn thinned_clouds_are_those_of_the_cpu() {
     for query in &mut batch {
         query.params = Params::for_radius(3.0 * R);
     }
-    let (mut cpu, mut found) = (Vec::new(), Vec::new());
-    CpuBackend::new().compare(&batch, &mut cpu).unwrap();
-    gpu.compare(&batch, &mut found).unwrap();
-    let all = Difference::between(&cpu, &found);
+    let all = Difference::between(&on_cpu(&batch), &compared(&mut gpu, &batch));
     println!("{all:?}");
     assert!(all.answers == 0 && all.contacts > 500, "{all:?}");
     assert!(100 * all.other_contacts <= all.contacts, "{all:?}");
@@ -159,9 +156,7 @@ fn deep_pairs_are_those_of_the_cpu() {
         aimed(a, b, pose, Params::for_radius(0.5 * R))
     };
     let batch = [query(0.1), query(0.54), query(0.2)];
-    let (mut cpu, mut found) = (Vec::new(), Vec::new());
-    CpuBackend::new().compare(&batch, &mut cpu).unwrap();
-    gpu.compare(&batch, &mut found).unwrap();
+    let (cpu, found) = (on_cpu(&batch), compared(&mut gpu, &batch));
     assert_eq!(gpu.pairs_on_cpu(), 2);
     for deep in [0, 2] {
         assert_eq!(found[deep], cpu[deep]);

@@ -370,6 +370,20 @@ fn classify(k: &Kernel, x: &[f32], y: &[f32], z: &[f32], moved: &mut Moved) {
 mod tests {
     use super::*;
 
+    /// What thinning leaves of a whole cloud.
+    fn left_of(cloud: &PointCloud, thinning: Thinning) -> Survivors {
+        let everything = cloud.bounds().loosened(1.0);
+        let region = Region {
+            overlap: everything,
+            other_from_frame: Pose3::IDENTITY,
+            other_bounds: everything,
+        };
+        let (mut left, mut scratch) = (Survivors::default(), CullScratch::default());
+        let frame = Pose3::IDENTITY;
+        cull(cloud, &frame, &region, thinning, &mut scratch, &mut left);
+        left
+    }
+
     /// Of an image whose rows are two blocks long, every 16th point leaves points in all columns.
     #[test]
     fn thinned_rows_are_left_everywhere() {
@@ -379,22 +393,7 @@ mod tests {
         let point = |k: usize| Vec3::new((k % width) as f32, (k / width) as f32, 0.0);
         let points: Vec<Vec3> = (0..width * rows).map(point).collect();
         let cloud = PointCloud::builder(points).radius(1.0).build().unwrap();
-        let everything = cloud.bounds().loosened(1.0);
-        let region = Region {
-            overlap: everything,
-            other_from_frame: Pose3::IDENTITY,
-            other_bounds: everything,
-        };
-        let mut left = Survivors::default();
-        let mut scratch = CullScratch::default();
-        cull(
-            &cloud,
-            &Pose3::IDENTITY,
-            &region,
-            thinning,
-            &mut scratch,
-            &mut left,
-        );
+        let left = left_of(&cloud, thinning);
         assert_eq!(left.len() * stride, cloud.len());
         let mut in_strip = vec![0; width / 8];
         for (k, &index) in left.index.iter().enumerate() {
@@ -415,22 +414,8 @@ mod tests {
             .collect();
         let far_apart = radii.iter().filter(|&&r| r == 0.5).count();
         let cloud = PointCloud::builder(points).radii(radii).build().unwrap();
-        let everything = cloud.bounds().loosened(1.0);
-        let region = Region {
-            overlap: everything,
-            other_from_frame: Pose3::IDENTITY,
-            other_bounds: everything,
-        };
         let thinning = Thinning::new(cloud.mean_radius(), 4.2 * cloud.mean_radius());
-        let (mut left, mut scratch) = (Survivors::default(), CullScratch::default());
-        cull(
-            &cloud,
-            &Pose3::IDENTITY,
-            &region,
-            thinning,
-            &mut scratch,
-            &mut left,
-        );
+        let left = left_of(&cloud, thinning);
         let radii = PointRadii::new(&cloud, &left);
         let radii: Vec<f32> = (0..left.len()).map(|i| radii.of(i)).collect();
         assert_eq!(radii.iter().filter(|&&r| r == 0.5).count(), far_apart);
