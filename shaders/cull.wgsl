@@ -31,10 +31,15 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     if is_kept {
         let point = points[sides[side_index].first_point + index];
         // Which points are left of a fine cloud, and their radii: see `tldi::thinning`.
-        let stride = sides[side_index].stride;
-        let is_coarse = point.w >= sides[side_index].mean_radius;
-        is_kept = lane % stride == hash(item.y / BLOCK) % stride || is_coarse;
-        radius = select(sides[side_index].radius_scale * point.w, point.w, is_coarse);
+        let count = sides[side_index].thinned_area / (point.w * point.w);
+        let per_point = select(1.0, floor(count), count >= 2.0);
+        radius = sqrt(per_point) * point.w;
+        if (sides[side_index].flags & RADII_DIFFER) != 0u {
+            is_kept = f32(hash(index) >> 8u) / 16777216.0 * per_point < 1.0;
+        } else {
+            let stride = sides[side_index].stride;
+            is_kept = lane % stride == hash(item.y / BLOCK) % stride;
+        }
         position = moved(
             sides[side_index].frame_from_cloud_x,
             sides[side_index].frame_from_cloud_y,

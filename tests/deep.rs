@@ -125,7 +125,10 @@ fn deepest(a: &PointCloud, b: &PointCloud, a_from_b: Pose3, what: &str) -> (Vec3
             motion: -0.05 * Vec3::Y,
             last_axis: None,
         },
-        params: Params::for_radius(R),
+        params: Params {
+            depth_error: 0.08,
+            ..Params::for_radius(R)
+        },
     };
     let result = compare_batch(&[query]).remove(0);
     assert!(result.collides, "{what}");

@@ -135,10 +135,12 @@ fn thinned_clouds_are_those_of_the_cpu() {
     pairs[0].2.translation = 0.3 * Vec3::Y;
     let mut batch = queries(&pairs);
     for query in &mut batch {
-        query.params = Params::for_radius(3.0 * R);
+        query.params = Params {
+            points_per_pixel: 1.0,
+            ..Params::for_radius(3.0 * R)
+        };
     }
     let all = Difference::between(&on_cpu(&batch), &compared(&mut gpu, &batch));
-    println!("{all:?}");
     assert!(all.answers == 0 && all.contacts > 500, "{all:?}");
     assert!(100 * all.other_contacts <= all.contacts, "{all:?}");
 }
@@ -153,7 +155,11 @@ fn deep_pairs_are_those_of_the_cpu() {
     let query = |distance: f32| {
         let pose = Pose3::translation(distance, 0.0, 0.0);
         let (a, b) = (Surface::Cloud(&a), Surface::Cloud(&b));
-        aimed(a, b, pose, Params::for_radius(0.5 * R))
+        let params = Params {
+            depth_error: 0.08,
+            ..Params::for_radius(0.5 * R)
+        };
+        aimed(a, b, pose, params)
     };
     let batch = [query(0.1), query(0.54), query(0.2)];
     let (cpu, found) = (on_cpu(&batch), compared(&mut gpu, &batch));

@@ -95,11 +95,7 @@ impl CloudQuery {
     /// Those of the backend.
     pub fn ask(&self, backend: &mut dyn Backend) -> anyhow::Result<Answer> {
         let mean_radius = self.a.mean_radius().max(self.b.mean_radius());
-        // However deep, all is found, and drawn, that the points tell.
-        let params = Params {
-            depth_error: 0.0,
-            ..Params::for_radius(mean_radius)
-        };
+        let params = Params::for_radius(mean_radius);
         let query = PairQuery {
             a: Surface::Cloud(&self.a),
             b: Surface::Cloud(&self.b),

@@ -187,7 +187,7 @@ pub(crate) struct SideData {
     flags: u32,
     first_point: u32,
     first_normal: u32,
-    radius_scale: f32,
+    thinned_area: f32,
     max_radius: f32,
     cell_dims: [u32; 3],
     pub(crate) cell_first: u32,
@@ -206,14 +206,15 @@ impl SideData {
         [first_point, first_normal]: [u32; 2],
         cell_first: u32,
     ) -> Self {
-        let thinning = Thinning::new(cloud.mean_radius, params.pixel_size);
+        let thinning = Thinning::new(cloud.mean_radius, params);
         let mut flags = 0;
         let mut set = |flag: u32, is_set: bool| flags |= flag * u32::from(is_set);
         set(HAS_NORMALS, cloud.has_normals);
         set(ORIENTED, cloud.has_normals && cloud.is_oriented);
         set(RADII_DIFFER, cloud.radii_differ);
         set(HAS_MIDDLE, side.middle.is_some());
-        let cell = plan::SUPPORT * thinning.mean_radius;
+        let mean_radius = thinning.radius(cloud.mean_radius);
+        let cell = plan::SUPPORT * mean_radius;
         let (cell, cell_dims) = match cloud.has_normals {
             true => (cell, [0; 3]),
             false => cells(side.region.overlap.extents(), cell, cloud.len),
@@ -229,12 +230,12 @@ impl SideData {
             flags,
             first_point,
             first_normal,
-            radius_scale: thinning.scale,
+            thinned_area: thinning.area,
             max_radius: thinning.max_radius(cloud.max_radius),
             cell_dims,
             cell_first,
             cell_inv: 1.0 / cell,
-            mean_radius: thinning.mean_radius,
+            mean_radius,
             padding: [0; 2],
         }
     }
@@ -342,6 +343,7 @@ mod tests {
             pixel_size pixel_size, merge_gap merge_gap, prediction prediction,
             slope_damping slope_damping, rho rho, stack_segments stack_segments,
             variant variant, depth_error depth_error,
+            points_per_pixel points_per_pixel,
         ]);
         assert_same_layout!("Batch", BatchData, [
             pairs pairs, items items, survivors survivors, tiles tiles, pixels pixels,
@@ -363,7 +365,7 @@ mod tests {
             frame_from_cloud frame_from_cloud_x, other_from_frame other_from_frame_x,
             other_min other_min, stride stride, other_max other_max, len len, middle middle,
             flags flags, first_point first_point, first_normal first_normal,
-            radius_scale radius_scale, max_radius max_radius, cell_dims cell_dims,
+            thinned_area thinned_area, max_radius max_radius, cell_dims cell_dims,
             cell_first cell_first, cell_inv cell_inv, mean_radius mean_radius,
         ]);
     }

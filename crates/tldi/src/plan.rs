@@ -89,9 +89,7 @@ impl PairPlan {
     /// # Ok::<(), tldi::CloudError>(())
     /// ```
     pub fn new(query: &PairQuery) -> Option<Self> {
-        let pixel_size = query.params.pixel_size;
-        let radius =
-            |surface: &Surface| Thinning::new(surface.mean_radius(), pixel_size).mean_radius;
+        let radius = |surface: &Surface| left_radius(surface, &query.params);
         let zone_reach = query.params.prediction + radius(&query.a) + radius(&query.b);
         if !within_reach(query, zone_reach) {
             return None;
@@ -138,6 +136,12 @@ impl PairPlan {
     }
 }
 
+/// Mean radius in metres of the points that thinning leaves.
+fn left_radius(surface: &Surface, params: &Params) -> f32 {
+    let mean_radius = surface.mean_radius();
+    Thinning::new(mean_radius, params).radius(mean_radius)
+}
+
 /// Whether the bounds are within `reach` metres of each other in the frames of both surfaces.
 fn within_reach(query: &PairQuery, reach: f32) -> bool {
     let (a, b) = (query.a.bounds().loosened(reach), query.b.bounds());
@@ -155,7 +159,7 @@ pub(crate) fn ring(surface: &Surface, params: &Params) -> f32 {
         Surface::Device(_) => true,
     };
     let support = if is_bare { normals::SUPPORT } else { 0.0 };
-    (2.0 + support) * Thinning::new(surface.mean_radius(), params.pixel_size).mean_radius
+    (2.0 + support) * left_radius(surface, params)
 }
 
 /// Bounds of both surfaces, each in its own frame; those of the larger one with what of a body may

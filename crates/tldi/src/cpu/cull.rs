@@ -51,8 +51,7 @@ impl Survivors {
     }
 
     /// Appends the points of a block that are inside the region, after moving them to its front.
-    /// `index_of` tells the index into the cloud of the i-th of them.
-    fn extend(&mut self, moved: &mut Moved, index_of: impl Fn(usize) -> u32) {
+    fn extend(&mut self, moved: &mut Moved, first: usize, stride: usize) {
         let Moved { x, y, z, inside } = moved;
         let mut index = [0; BLOCK];
         let mut kept = 0;
@@ -63,7 +62,7 @@ impl Survivors {
                 let i = 64 * word + mask.trailing_zeros() as usize;
                 mask &= mask - 1;
                 (x[kept], y[kept], z[kept]) = (x[i], y[i], z[i]);
-                index[kept] = index_of(i);
+                index[kept] = (first + i * stride) as u32;
                 kept += 1;
             }
         }
@@ -209,7 +208,7 @@ fn cull_blocks(
     let kernel = Kernel::new(frame_from_cloud, region);
     let [x, y, z] = cloud.coordinates();
     let mut moved = Moved::default();
-    let mut left = Left::default();
+    let mut strided = [[0.0; BLOCK]; 3];
     for block in blocks {
         if !cloud.blocks()[block]
             .transformed(frame_from_cloud)
@@ -217,70 +216,35 @@ fn cull_blocks(
         {
             continue;
         }
-        let range = block * BLOCK..((block + 1) * BLOCK).min(x.len());
-        if thinning.stride == 1 {
+        let end = ((block + 1) * BLOCK).min(x.len());
+        let (first, stride) = match cloud.radii() {
+            Radii::Global(_) => (thinning.first(block), thinning.stride),
+            Radii::PerPoint(_) => (0, 1),
+        };
+        let range = (block * BLOCK + first).min(end)..end;
+        if stride == 1 {
             let [x, y, z] = [x, y, z].map(|c| &c[range.clone()]);
             classify(&kernel, x, y, z, &mut moved);
-            out.extend(&mut moved, |i| (range.start + i) as u32);
         } else {
-            left.find(cloud.radii(), thinning, range);
-            let [x, y, z] = left.gather([x, y, z]);
-            classify(&kernel, x, y, z, &mut moved);
-            out.extend(&mut moved, |i| left.index[i]);
-        }
-    }
-}
-
-/// The points of a block that thinning leaves.
-struct Left {
-    index: [u32; BLOCK],
-    count: usize,
-    coordinates: [[f32; BLOCK]; 3],
-}
-
-impl Default for Left {
-    fn default() -> Self {
-        Self {
-            index: [0; BLOCK],
-            count: 0,
-            coordinates: [[0.0; BLOCK]; 3],
-        }
-    }
-}
-
-impl Left {
-    /// Finds those of the points in `range`, which are a block.
-    fn find(&mut self, radii: &Radii, thinning: Thinning, range: std::ops::Range<usize>) {
-        let first = range.start + thinning.first(range.start / BLOCK);
-        self.count = 0;
-        let mut put = |i: usize| {
-            self.index[self.count] = i as u32;
-            self.count += 1;
-        };
-        match radii {
-            Radii::Global(_) => (first..range.end).step_by(thinning.stride).for_each(put),
-            Radii::PerPoint(radii) => {
-                let mut next = first;
-                for i in range {
-                    if i == next || radii[i] >= thinning.mean_radius {
-                        put(i);
-                    }
-                    if i == next {
-                        next += thinning.stride;
-                    }
-                }
+            for (to, from) in strided.iter_mut().zip([x, y, z]) {
+                let taken = from[range.clone()].iter().step_by(stride);
+                to.iter_mut().zip(taken).for_each(|(to, from)| *to = *from);
             }
+            let n = range.len().div_ceil(stride);
+            let [x, y, z] = strided.each_ref().map(|c| &c[..n]);
+            classify(&kernel, x, y, z, &mut moved);
         }
-    }
-
-    fn gather(&mut self, from: [&[f32]; 3]) -> [&[f32]; 3] {
-        let index = &self.index[..self.count];
-        for (to, from) in self.coordinates.iter_mut().zip(from) {
-            to.iter_mut()
-                .zip(index)
-                .for_each(|(to, &i)| *to = from[i as usize]);
+        if let Radii::PerPoint(radii) = cloud.radii()
+            && thinning.stride > 1
+        {
+            thin(
+                thinning,
+                range.start,
+                &radii[range.clone()],
+                &mut moved.inside,
+            );
         }
-        self.coordinates.each_ref().map(|c| &c[..self.count])
+        out.extend(&mut moved, range.start, stride);
     }
 }
 
@@ -366,9 +330,27 @@ fn classify(k: &Kernel, x: &[f32], y: &[f32], z: &[f32], moved: &mut Moved) {
 }
 }
 
+multiversioned! {
+/// Leaves out those of a block's points, from the one of index `first` on, that thinning does not leave.
+fn thin(thinning: Thinning, first: usize, radii: &[f32], inside: &mut [u8; BLOCK]) {
+    for ((radius, inside), index) in radii.iter().zip(inside).zip(first as u32..) {
+        *inside &= u8::from(thinning.is_left(index, *radius));
+    }
+}
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Params;
+
+    /// Pixels of this edge in metres, each with one point.
+    fn pixels(edge: f32) -> Params {
+        Params {
+            points_per_pixel: 1.0,
+            ..Params::for_radius(edge)
+        }
+    }
 
     /// What thinning leaves of a whole cloud.
     fn left_of(cloud: &PointCloud, thinning: Thinning) -> Survivors {
@@ -388,7 +370,7 @@ mod tests {
     #[test]
     fn thinned_rows_are_left_everywhere() {
         let (width, rows, stride) = (2 * BLOCK, 64, 16);
-        let thinning = Thinning::new(1.0, 4.2);
+        let thinning = Thinning::new(1.0, &pixels(4.2));
         assert_eq!(thinning.stride, stride);
         let point = |k: usize| Vec3::new((k % width) as f32, (k / width) as f32, 0.0);
         let points: Vec<Vec3> = (0..width * rows).map(point).collect();
@@ -414,15 +396,20 @@ mod tests {
             .collect();
         let far_apart = radii.iter().filter(|&&r| r == 0.5).count();
         let cloud = PointCloud::builder(points).radii(radii).build().unwrap();
-        let thinning = Thinning::new(cloud.mean_radius(), 4.2 * cloud.mean_radius());
+        let thinning = Thinning::new(cloud.mean_radius(), &pixels(4.2 * cloud.mean_radius()));
         let left = left_of(&cloud, thinning);
         let radii = PointRadii::new(&cloud, &left);
         let radii: Vec<f32> = (0..left.len()).map(|i| radii.of(i)).collect();
         assert_eq!(radii.iter().filter(|&&r| r == 0.5).count(), far_apart);
-        // The others stand for 16, with radii four times as large.
-        let others = radii.iter().filter(|&&r| r == 0.2).count();
-        assert_eq!(others + far_apart, left.len());
-        assert!(16 * others > 2000 && 16 * others < 4000, "{others}");
+        // The others stand for as many as their new discs are larger.
+        let others: Vec<f32> = radii.into_iter().filter(|&r| r != 0.5).collect();
+        assert!(
+            others.iter().all(|r| *r == others[0] && *r > 0.1),
+            "{}",
+            others[0]
+        );
+        let stand_for = others.len() as f32 * (others[0] / 0.05).powi(2);
+        assert!((2000.0..4000.0).contains(&stand_for), "{stand_for}");
     }
 
     #[test]

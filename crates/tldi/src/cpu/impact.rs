@@ -202,7 +202,7 @@ impl Scratch {
                 other_from_frame: view_from_a,
                 other_bounds: region,
             };
-            let thinning = Thinning::new(cloud.mean_radius(), query.params.pixel_size);
+            let thinning = Thinning::new(cloud.mean_radius(), &query.params);
             cull::cull(
                 cloud,
                 &frame,

@@ -129,7 +129,7 @@ impl Scratch {
     fn cull(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
         let cull = |side: &mut Side, surface: Surface, plan: &SidePlan| {
             if let Surface::Cloud(cloud) = surface {
-                let thinning = Thinning::new(cloud.mean_radius(), query.params.pixel_size);
+                let thinning = Thinning::new(cloud.mean_radius(), &query.params);
                 let frame = &plan.frame_from_surface;
                 let Side { cull, points, .. } = side;
                 cull::cull(cloud, frame, &plan.region, thinning, cull, points);
