@@ -16,8 +16,8 @@ const MOST_TRIES: usize = 2;
 /// was found, which is known within a few pixels.
 const EXPECTED: [f32; MOST_TRIES] = [0.9, 0.8];
 
-/// Share of the pixels with contacts of which one must be deep: of bodies that only touch each other, with limbs around
-/// which rays go astray, at most 6 % seemed to be.
+/// Share of the pixels with contacts of which one must be deep: of bodies that only touch each other,
+/// with limbs around which rays go astray, at most 6 % seemed to be.
 const DEEP_SHARE: f32 = 0.25;
 
 /// Finds the contacts of a pair that may be deep with `compare`, which fills the empty result that it

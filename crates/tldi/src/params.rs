@@ -48,8 +48,8 @@ pub struct Params {
     /// Share of its depth by which a contact may err: pairs that [`View::Aim`](crate::View::Aim) looks
     /// at, and that are so deep in each other that larger pixels than `pixel_size` err by no more, are
     /// compared with those, at a fraction of the cost. Corners err by about a pixel, balls and faces
-    /// by a tenth. 0, the default, never takes larger pixels: of bodies with limbs that only touch, a few
-    /// in a thousand steps are then taken to be deep.
+    /// by a tenth. 0, the default, never takes larger pixels, which now and then take bodies for deep
+    /// whose limbs only touch.
     pub depth_error: f32,
     /// Points that are left per pixel of a cloud finer than the pixels ([`thinning`](crate::thinning)),
     /// at least 1: more average noise, and cost as many times as much.
