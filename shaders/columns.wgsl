@@ -67,7 +67,8 @@ struct Footprint {
 }
 
 fn largest_radius(side: u32, params: Params) -> f32 {
-    return splat_radius(sides[side].max_radius, params.pixel_size);
+    let radius = sides[side].max_radius * sides[side].radius_scale;
+    return splat_radius(radius, params.pixel_size);
 }
 
 fn footprint(view: u32, s: u32, params: Params) -> Footprint {

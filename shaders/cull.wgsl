@@ -24,22 +24,16 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     let item = items[min(item_index, batch.items - 1u)];
     let side_index = item.x;
     let pair_index = side_index / 2u;
-    let index = item.y + lane;
-    var is_kept = exists && index < sides[side_index].len;
+    let stride = sides[side_index].stride;
+    // See `tldi::plan::first_taken`.
+    let offset = hash(item.y / BLOCK) % stride + lane * stride;
+    let index = item.y + offset;
+    var is_kept = exists && offset < BLOCK && index < sides[side_index].len;
     var position = vec3f();
     var radius = 0.0;
     if is_kept {
         let point = points[sides[side_index].first_point + index];
-        // Which points are left of a fine cloud, and their radii: see `tldi::thinning`.
-        let count = sides[side_index].thinned_area / (point.w * point.w);
-        let per_point = select(1.0, floor(count), count >= 2.0);
-        radius = sqrt(per_point) * point.w;
-        if (sides[side_index].flags & RADII_DIFFER) != 0u {
-            is_kept = f32(hash(index) >> 8u) / 16777216.0 * per_point < 1.0;
-        } else {
-            let stride = sides[side_index].stride;
-            is_kept = lane % stride == hash(item.y / BLOCK) % stride;
-        }
+        radius = point.w;
         position = moved(
             sides[side_index].frame_from_cloud_x,
             sides[side_index].frame_from_cloud_y,
@@ -52,7 +46,7 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
             sides[side_index].other_from_frame_z,
             position,
         );
-        is_kept = is_kept && is_within(position, pairs[pair_index].overlap_min, pairs[pair_index].overlap_max)
+        is_kept = is_within(position, pairs[pair_index].overlap_min, pairs[pair_index].overlap_max)
             && is_within(in_other, sides[side_index].other_min, sides[side_index].other_max);
     }
     var own = 0u;
@@ -81,7 +75,8 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     if !is_kept || slot >= batch.survivors {
         return;
     }
-    survivors[slot] = Survivor(position, radius, side_index, index, NONE, 0u);
+    let scaled = radius * sides[side_index].radius_scale;
+    survivors[slot] = Survivor(position, scaled, side_index, index, NONE, 0u);
     // The cell of the zone's grid; points outside count to the nearest one.
     let dims = pairs[pair_index].zone_dims;
     let at = (position - pairs[pair_index].overlap_min) * pairs[pair_index].zone_inv_cell;

@@ -15,7 +15,7 @@ fn support_radius(side: u32) -> f32 {
         let count = f32(max(atomicLoad(&work[state + KEPT_COUNT]), 1u));
         mean = (high * 65536.0 + low) / RADIUS_STEPS / count * sides[side].max_radius;
     }
-    return SUPPORT * mean;
+    return SUPPORT * mean * sides[side].radius_scale;
 }
 
 fn cell_of(side: u32, position: vec3f) -> vec3u {

@@ -55,11 +55,7 @@ struct Params {
     rho: f32,
     stack_segments: u32,
     variant: u32,
-    depth_error: f32,
-    points_per_pixel: f32,
-    padding_a: u32,
-    padding_b: u32,
-    padding_c: u32,
+    padding: u32,
 }
 
 // Sizes of the batch, capacities in elements, and where the parts of the arena begin, in words.
@@ -151,7 +147,7 @@ struct Side {
     first_point: u32,
     first_normal: u32,
     // Of every n-th point: they are scaled to cover the surface.
-    thinned_area: f32,
+    radius_scale: f32,
     // Of all points of the cloud, not scaled.
     max_radius: f32,
     cell_dims: vec3u,

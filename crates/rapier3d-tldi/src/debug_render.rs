@@ -186,6 +186,8 @@ struct Comparison {
     backend: CpuBackend,
     parts: Vec<PartPair>,
     results: Vec<PairResult>,
+    /// Pixel sizes of the queries, metres.
+    pixel_sizes: Vec<f32>,
 }
 
 impl Comparison {
@@ -196,6 +198,7 @@ impl Comparison {
         shapes: &ShapePair<'_>,
     ) -> Result<(), TldiError> {
         self.parts.clear();
+        self.pixel_sizes.clear();
         if !within_reach(
             shapes.shape1,
             shapes.shape2,
@@ -211,6 +214,8 @@ impl Comparison {
         });
         let mut queries: Vec<PairQuery<'_>> = Vec::new();
         append_queries(&self.parts, &sides, &mut queries);
+        self.pixel_sizes
+            .extend(queries.iter().map(|query| query.params.pixel_size));
         let outcome = self.backend.compare(&queries, &mut self.results);
         outcome.map_err(|source| TldiError::Pair {
             collider1: pair.collider1,
@@ -225,7 +230,7 @@ impl Comparison {
                 continue;
             };
             let result = &self.results[comparison.query];
-            let pixel_size = result.pixel_size;
+            let pixel_size = self.pixel_sizes[comparison.query];
             let part_pose = part_pair.poses[0].unwrap_or(Pose::IDENTITY);
             let world_from_part = drawing.pose1 * part_pose;
             let zone = drawing.zone(part_pair);
@@ -242,8 +247,7 @@ impl Comparison {
             }
         }
         if mode.contains(TldiDebugRenderMode::MANIFOLDS) {
-            let pixel_sizes = self.results.iter().map(|result| result.pixel_size);
-            let largest = pixel_sizes.fold(0.0, f32::max);
+            let largest = self.pixel_sizes.iter().copied().fold(0.0, f32::max);
             drawing.draw_manifolds(&self.parts, &self.results, NORMAL_PIXELS * largest);
         }
     }

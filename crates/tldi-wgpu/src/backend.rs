@@ -29,10 +29,9 @@ const MAX_GROUPS: u32 = 65_535;
 /// Compares batches on a GPU.
 ///
 /// What it does not take is compared on the CPU meanwhile, with the same results: pairs with an
-/// exact surface, [`Variant::Paper`](tldi::Variant::Paper), perspective cameras; pairs so deep that
-/// larger pixels are enough ([`Params::depth_error`](tldi::Params::depth_error)), of which few points
-/// are looked at; and pairs of which a pixel has more than 1024 fragments. A batch costs one
-/// submission and one readback, whatever the number of pairs, and uploads of clouds with new content.
+/// exact surface, [`Variant::Paper`](tldi::Variant::Paper), perspective cameras; and pairs of
+/// which a pixel has more than 1024 fragments. A batch costs one submission and one readback,
+/// whatever the number of pairs, and uploads of clouds with new content.
 ///
 /// ```
 /// use tldi::{Backend, PairQuery, Params, PointCloud, Surface, View};
@@ -192,18 +191,12 @@ impl WgpuBackend {
                 left_to_cpu.push(pair);
             }
         }
-        self.upload.select(batch, &left_to_cpu);
+        self.upload.select(batch);
         if self.upload.points() < least_points {
             return Ok(false);
         }
-        let deep = self.cpu.compare_deep(batch, results);
-        if !deep.is_empty() {
-            left_to_cpu.retain(|pair| deep.binary_search(pair).is_err());
-            let mut left_out = [&left_to_cpu[..], &deep].concat();
-            left_out.sort_unstable();
-            self.upload.select(batch, &left_out);
-        }
-        self.pairs_on_cpu = deep.len();
+        results.resize_with(batch.len(), PairResult::default);
+        results.iter_mut().for_each(PairResult::clear);
         self.compare_on_device(batch, results, &mut left_to_cpu)?;
         Ok(true)
     }
@@ -216,6 +209,7 @@ impl WgpuBackend {
         left_to_cpu: &mut Vec<usize>,
     ) -> Result<(), BackendError> {
         self.gpu.check()?;
+        self.pairs_on_cpu = 0;
         if self.upload.points() == 0 {
             return self.compare_on_cpu(batch, results, left_to_cpu);
         }

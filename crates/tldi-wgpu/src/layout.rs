@@ -3,7 +3,6 @@
 use bytemuck::{Pod, Zeroable};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
 use tldi::plan::{DepthScale, PairPlan, SidePlan, ZoneGrid};
-use tldi::thinning::Thinning;
 use tldi::{CameraPolicy, PairQuery, Params, Projection, Radii, Surface, Variant, View, plan};
 
 /// Words of 32 bits, and bytes, of what only lives on the device.
@@ -187,7 +186,7 @@ pub(crate) struct SideData {
     flags: u32,
     first_point: u32,
     first_normal: u32,
-    thinned_area: f32,
+    radius_scale: f32,
     max_radius: f32,
     cell_dims: [u32; 3],
     pub(crate) cell_first: u32,
@@ -206,15 +205,15 @@ impl SideData {
         [first_point, first_normal]: [u32; 2],
         cell_first: u32,
     ) -> Self {
-        let thinning = Thinning::new(cloud.mean_radius, params);
+        let stride = plan::stride(cloud.mean_radius, params.pixel_size);
+        let radius_scale = (stride as f32).sqrt();
         let mut flags = 0;
         let mut set = |flag: u32, is_set: bool| flags |= flag * u32::from(is_set);
         set(HAS_NORMALS, cloud.has_normals);
         set(ORIENTED, cloud.has_normals && cloud.is_oriented);
         set(RADII_DIFFER, cloud.radii_differ);
         set(HAS_MIDDLE, side.middle.is_some());
-        let mean_radius = thinning.radius(cloud.mean_radius);
-        let cell = plan::SUPPORT * mean_radius;
+        let cell = plan::SUPPORT * radius_scale * cloud.mean_radius;
         let (cell, cell_dims) = match cloud.has_normals {
             true => (cell, [0; 3]),
             false => cells(side.region.overlap.extents(), cell, cloud.len),
@@ -223,19 +222,19 @@ impl SideData {
             frame_from_cloud: pose_rows(&side.frame_from_surface),
             other_from_frame: pose_rows(&side.region.other_from_frame),
             other_min: side.region.other_bounds.min.to_array(),
-            stride: thinning.stride as u32,
+            stride: stride as u32,
             other_max: side.region.other_bounds.max.to_array(),
             len: cloud.len as u32,
             middle: side.middle.unwrap_or(Vec3::ZERO).to_array(),
             flags,
             first_point,
             first_normal,
-            thinned_area: thinning.area,
-            max_radius: thinning.max_radius(cloud.max_radius),
+            radius_scale,
+            max_radius: cloud.max_radius,
             cell_dims,
             cell_first,
             cell_inv: 1.0 / cell,
-            mean_radius,
+            mean_radius: cloud.mean_radius,
             padding: [0; 2],
         }
     }
@@ -342,8 +341,7 @@ mod tests {
         assert_same_layout!("Params", Params, [
             pixel_size pixel_size, merge_gap merge_gap, prediction prediction,
             slope_damping slope_damping, rho rho, stack_segments stack_segments,
-            variant variant, depth_error depth_error,
-            points_per_pixel points_per_pixel,
+            variant variant, _padding padding,
         ]);
         assert_same_layout!("Batch", BatchData, [
             pairs pairs, items items, survivors survivors, tiles tiles, pixels pixels,
@@ -365,7 +363,7 @@ mod tests {
             frame_from_cloud frame_from_cloud_x, other_from_frame other_from_frame_x,
             other_min other_min, stride stride, other_max other_max, len len, middle middle,
             flags flags, first_point first_point, first_normal first_normal,
-            thinned_area thinned_area, max_radius max_radius, cell_dims cell_dims,
+            radius_scale radius_scale, max_radius max_radius, cell_dims cell_dims,
             cell_first cell_first, cell_inv cell_inv, mean_radius mean_radius,
         ]);
     }

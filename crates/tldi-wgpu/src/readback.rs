@@ -131,12 +131,6 @@ impl<'a> Readback<'a> {
         let words = &self.pairs[k];
         result.collides = words[COLLIDES] != 0;
         result.gap = (words[GAP] != 0).then(|| -unordered(words[GAP]));
-        let is_rejected = words[VIEWS] == 0;
-        result.pixel_size = if is_rejected {
-            0.0
-        } else {
-            query.params.pixel_size
-        };
         result.axes.clear();
         let axes = words[AXES..].as_chunks::<3>().0;
         let views = axes.iter().take(words[VIEWS] as usize);

@@ -1,6 +1,8 @@
 //! What a batch uploads: its pairs, their sides, and the blocks of points in reach.
 
-use crate::layout::{BatchData, COUNTERS, CloudFacts, PairData, SIDE_WORDS, SideData, VIEW_WORDS};
+use crate::layout::{
+    BatchData, COUNTERS, CloudFacts, PairData, SIDE_WORDS, SideData, VIEW_WORDS, is_for_device,
+};
 use crate::readback::Counters;
 use crate::resident::Resident;
 use crate::sources::Sources;
@@ -23,14 +25,14 @@ pub(crate) struct Upload {
 }
 
 impl Upload {
-    /// Selects the pairs whose bounds, and blocks, say that they may touch, but for those whose
-    /// indices are in `left_out`, ascending.
-    pub(crate) fn select(&mut self, batch: &[PairQuery<'_>], left_out: &[usize]) {
+    /// Selects the pairs that the device takes and whose bounds, and blocks, say that they may
+    /// touch.
+    pub(crate) fn select(&mut self, batch: &[PairQuery<'_>]) {
         self.pairs_of.clear();
         self.plans.clear();
         self.items.clear();
         for (pair, query) in batch.iter().enumerate() {
-            if left_out.binary_search(&pair).is_ok() {
+            if !is_for_device(query) {
                 continue;
             }
             let Some(plan) = PairPlan::new(query) else {

@@ -60,9 +60,6 @@ pub struct PairResult {
     pub gap: Option<f32>,
     /// Axes of the views, unit length, from `b` towards `a`; empty after an early rejection.
     pub axes: Vec<Vec3>,
-    /// Edge of the pixels in metres: that of the query, or larger where contacts are deep
-    /// ([`Params::depth_error`]); 0 after an early rejection.
-    pub pixel_size: f32,
     /// Pixels where the surfaces are within [`Params::prediction`] or penetrate.
     pub contacts: Vec<ContactPixel>,
     /// The contact pixels grouped and reduced to what a solver needs, deepest patch first.
@@ -75,7 +72,6 @@ impl PairResult {
         self.collides = false;
         self.gap = None;
         self.axes.clear();
-        self.pixel_size = 0.0;
         self.contacts.clear();
         self.patches.clear();
     }

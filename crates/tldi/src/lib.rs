@@ -13,7 +13,6 @@ mod camera_policy;
 mod cloud;
 mod contacts;
 mod cpu;
-mod deep;
 mod error;
 mod gap_fit;
 mod gather;
@@ -31,7 +30,6 @@ mod radii;
 mod supported;
 mod supports;
 mod surface;
-pub mod thinning;
 #[allow(clippy::module_inception, reason = "the image is the crate's namesake")]
 mod tldi;
 

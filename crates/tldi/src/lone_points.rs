@@ -6,7 +6,6 @@
 
 use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
 use crate::links::{Groups, Links};
-use crate::thinning::Thinning;
 use crate::{Aabb, BLOCK, ContactPixel, PairQuery, PairResult, PointCloud, Surface};
 use glamx::{Pose3, Vec3};
 
@@ -76,14 +75,7 @@ impl Surroundings {
             other_bounds: self.region,
         };
         let (scratch, around) = (&mut self.scratch, &mut self.around);
-        cull(
-            cloud,
-            &Pose3::IDENTITY,
-            &region,
-            Thinning::default(),
-            scratch,
-            around,
-        );
+        cull(cloud, &Pose3::IDENTITY, &region, 1, scratch, around);
         self.sort();
     }
 

@@ -22,7 +22,7 @@ pub enum Variant {
 /// use tldi::Params;
 /// let params = Params::for_radius(0.01);
 /// assert_eq!(params.pixel_size, 0.01);
-/// assert_eq!(bytemuck::bytes_of(&params).len(), 48);
+/// assert_eq!(bytemuck::bytes_of(&params).len(), 32);
 /// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -45,17 +45,8 @@ pub struct Params {
     pub stack_segments: u32,
     /// The [`Variant`]: 0 is `Paper`, 1 is `Oriented`.
     pub variant: u32,
-    /// Share of its depth by which a contact may err: pairs that [`View::Aim`](crate::View::Aim) looks
-    /// at, and that are so deep in each other that larger pixels than `pixel_size` err by no more, are
-    /// compared with those, at a fraction of the cost. Corners err by about a pixel, balls and faces
-    /// by a tenth. 0, the default, never takes larger pixels, which now and then take bodies for deep
-    /// whose limbs only touch.
-    pub depth_error: f32,
-    /// Points that are left per pixel of a cloud finer than the pixels ([`thinning`](crate::thinning)),
-    /// at least 1: more average noise, and cost as many times as much.
-    pub points_per_pixel: f32,
     /// Keeps the size a multiple of 16 bytes, as uniform buffers want it. Always 0.
-    pub _padding: [u32; 3],
+    pub _padding: u32,
 }
 
 impl Params {
@@ -69,9 +60,7 @@ impl Params {
             rho: 0.05,
             stack_segments: 128,
             variant: 1,
-            depth_error: 0.0,
-            points_per_pixel: 8.0,
-            _padding: [0; 3],
+            _padding: 0,
         }
     }
 

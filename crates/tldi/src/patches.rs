@@ -117,14 +117,8 @@ impl PatchScratch {
         if self.lone_points.drop(result, &self.links, query) {
             self.links.find(&result.contacts, &query.params);
         }
-        self.reduce_linked(result, &query.params, tells_inside(query));
-    }
-
-    /// [`reduce_pair`](Self::reduce_pair) of what is deep, beside which points that stand alone do not
-    /// matter: nothing but the contact pixels is looked at.
-    pub(crate) fn reduce_deep(&mut self, result: &mut PairResult, query: &PairQuery) {
-        self.link(result, &query.params);
-        self.reduce_linked(result, &query.params, tells_inside(query));
+        let tells_inside = query.a.is_oriented() || query.b.is_oriented();
+        self.reduce_linked(result, &query.params, tells_inside);
     }
 
     fn link(&mut self, result: &mut PairResult, params: &Params) {
@@ -242,10 +236,6 @@ impl PatchScratch {
             self.group[k as usize] = root(&mut self.group, k);
         }
     }
-}
-
-fn tells_inside(query: &PairQuery) -> bool {
-    query.a.is_oriented() || query.b.is_oriented()
 }
 
 /// Drops the contact pixels of faces that do not face each other and of which another view sees one

@@ -54,14 +54,7 @@ pub(crate) fn check_coordinates(
             }
             (0..x.len()).find(|&i| largest(i) > limit)
         }
-        Radii::PerPoint(r) => {
-            let is_too_large = |i: usize| largest(i) > COORDINATE_PER_RADIUS * r[i];
-            // All without a branch, several at a time, as hardly ever one is.
-            if !(0..x.len()).fold(false, |any, i| any | is_too_large(i)) {
-                return Ok(());
-            }
-            (0..x.len()).find(|&i| is_too_large(i))
-        }
+        Radii::PerPoint(r) => (0..x.len()).find(|&i| largest(i) > COORDINATE_PER_RADIUS * r[i]),
     };
     match too_large {
         None => Ok(()),

@@ -3,10 +3,10 @@
 //!
 //! One pass over the cloud, skipping blocks of [`BLOCK`] points whose bounds miss the overlap: the
 //! floor of the whole pipeline is this stage's reading of the coordinates. Of a cloud much finer
-//! than the pixels only some points are taken ([`Thinning`]).
+//! than the pixels only every n-th point is taken ([`stride`](crate::plan::stride)): more would not be seen.
 
 use super::lanes::multiversioned;
-use crate::thinning::Thinning;
+use crate::plan::first_taken;
 use crate::{Aabb, BLOCK, PointCloud, Radii};
 use glamx::{Mat3, Pose3, Vec3};
 use rayon::prelude::*;
@@ -19,8 +19,8 @@ pub(crate) struct Survivors {
     pub(crate) z: Vec<f32>,
     /// Indices into the cloud.
     pub(crate) index: Vec<u32>,
-    /// Which points of the cloud were taken.
-    thinning: Thinning,
+    /// Every how many points of the cloud were taken.
+    stride: usize,
 }
 
 impl Survivors {
@@ -90,12 +90,13 @@ fn bits(flags: &[u8; 64]) -> u64 {
     })
 }
 
-/// Radii in metres of the culled points, which cover the surface even where some are left out.
+/// Radii in metres of the culled points, scaled so that they cover the surface even where only
+/// every n-th point is left.
 #[derive(Clone, Copy)]
 pub(crate) struct PointRadii<'a> {
     radii: &'a Radii<'a>,
     index: &'a [u32],
-    thinning: Thinning,
+    scale: f32,
 }
 
 impl<'a> PointRadii<'a> {
@@ -103,33 +104,33 @@ impl<'a> PointRadii<'a> {
         Self {
             radii: cloud.radii(),
             index: &points.index,
-            thinning: points.thinning,
+            scale: (points.stride as f32).sqrt(),
         }
     }
 
     /// Mean over the culled points.
     pub(crate) fn mean(&self) -> f32 {
         match self.radii {
-            Radii::Global(r) => self.thinning.radius(*r),
-            Radii::PerPoint(_) => {
-                let sum: f32 = (0..self.index.len()).map(|i| self.of(i)).sum();
-                sum / self.index.len().max(1) as f32
+            Radii::Global(r) => self.scale * r,
+            Radii::PerPoint(r) => {
+                let sum: f32 = self.index.iter().map(|&i| r[i as usize]).sum();
+                self.scale * sum / self.index.len().max(1) as f32
             }
         }
     }
 
     /// At least the largest.
     pub(crate) fn limit(&self, cloud: &PointCloud) -> f32 {
-        self.thinning.max_radius(cloud.max_radius())
+        self.scale * cloud.max_radius()
     }
 
     /// Of the i-th culled point.
     #[inline(always)]
     pub(crate) fn of(&self, i: usize) -> f32 {
-        self.thinning.radius(match self.radii {
-            Radii::Global(r) => *r,
-            Radii::PerPoint(r) => r[self.index[i] as usize],
-        })
+        match self.radii {
+            Radii::Global(r) => self.scale * r,
+            Radii::PerPoint(r) => self.scale * r[self.index[i] as usize],
+        }
     }
 }
 
@@ -154,8 +155,7 @@ pub struct Region {
     pub other_bounds: Aabb,
 }
 
-/// Fills `out` with the points of `cloud` inside `region` that `thinning` leaves, in the order of the
-/// cloud.
+/// Fills `out` with every `stride`-th point of `cloud` inside `region`, in the order of the cloud.
 ///
 /// Cost: linear in the points of the blocks that meet the region; parallel over blocks where there
 /// are many. The result does not depend on the number of threads.
@@ -163,19 +163,19 @@ pub(crate) fn cull(
     cloud: &PointCloud,
     frame_from_cloud: &Pose3,
     region: &Region,
-    thinning: Thinning,
+    stride: usize,
     scratch: &mut CullScratch,
     out: &mut Survivors,
 ) {
     out.clear();
-    out.thinning = thinning;
+    out.stride = stride;
     if region.overlap.is_empty() {
         return;
     }
     let blocks = cloud.blocks().len();
     let tasks = blocks.div_ceil(TASK_BLOCKS);
     if tasks <= 1 {
-        cull_blocks(cloud, frame_from_cloud, region, thinning, 0..blocks, out);
+        cull_blocks(cloud, frame_from_cloud, region, stride, 0..blocks, out);
         return;
     }
     if scratch.tasks.len() < tasks {
@@ -187,10 +187,10 @@ pub(crate) fn cull(
         .for_each(|(task, part)| {
             part.clear();
             // At once for all that may come: which task has how many changes from pose to pose.
-            part.reserve(TASK_BLOCKS * BLOCK.div_ceil(thinning.stride));
+            part.reserve(TASK_BLOCKS * BLOCK.div_ceil(stride));
             let first = task * TASK_BLOCKS;
             let range = first..(first + TASK_BLOCKS).min(blocks);
-            cull_blocks(cloud, frame_from_cloud, region, thinning, range, part);
+            cull_blocks(cloud, frame_from_cloud, region, stride, range, part);
         });
     for part in &scratch.tasks[..tasks] {
         out.append(part);
@@ -201,14 +201,14 @@ fn cull_blocks(
     cloud: &PointCloud,
     frame_from_cloud: &Pose3,
     region: &Region,
-    thinning: Thinning,
+    stride: usize,
     blocks: std::ops::Range<usize>,
     out: &mut Survivors,
 ) {
     let kernel = Kernel::new(frame_from_cloud, region);
     let [x, y, z] = cloud.coordinates();
     let mut moved = Moved::default();
-    let mut strided = [[0.0; BLOCK]; 3];
+    let mut thinned = [[0.0; BLOCK]; 3];
     for block in blocks {
         if !cloud.blocks()[block]
             .transformed(frame_from_cloud)
@@ -217,32 +217,21 @@ fn cull_blocks(
             continue;
         }
         let end = ((block + 1) * BLOCK).min(x.len());
-        let (first, stride) = match cloud.radii() {
-            Radii::Global(_) => (thinning.first(block), thinning.stride),
-            Radii::PerPoint(_) => (0, 1),
-        };
-        let range = (block * BLOCK + first).min(end)..end;
+        let range = (block * BLOCK + first_taken(block, stride)).min(end)..end;
         if stride == 1 {
             let [x, y, z] = [x, y, z].map(|c| &c[range.clone()]);
             classify(&kernel, x, y, z, &mut moved);
         } else {
-            for (to, from) in strided.iter_mut().zip([x, y, z]) {
-                let taken = from[range.clone()].iter().step_by(stride);
+            let thin = |c: &[f32], to: &mut [f32; BLOCK]| {
+                let taken = c[range.clone()].iter().step_by(stride);
                 to.iter_mut().zip(taken).for_each(|(to, from)| *to = *from);
-            }
+            };
+            thin(x, &mut thinned[0]);
+            thin(y, &mut thinned[1]);
+            thin(z, &mut thinned[2]);
             let n = range.len().div_ceil(stride);
-            let [x, y, z] = strided.each_ref().map(|c| &c[..n]);
-            classify(&kernel, x, y, z, &mut moved);
-        }
-        if let Radii::PerPoint(radii) = cloud.radii()
-            && thinning.stride > 1
-        {
-            thin(
-                thinning,
-                range.start,
-                &radii[range.clone()],
-                &mut moved.inside,
-            );
+            let [x, y, z] = &thinned;
+            classify(&kernel, &x[..n], &y[..n], &z[..n], &mut moved);
         }
         out.extend(&mut moved, range.start, stride);
     }
@@ -330,30 +319,17 @@ fn classify(k: &Kernel, x: &[f32], y: &[f32], z: &[f32], moved: &mut Moved) {
 }
 }
 
-multiversioned! {
-/// Leaves out those of a block's points, from the one of index `first` on, that thinning does not leave.
-fn thin(thinning: Thinning, first: usize, radii: &[f32], inside: &mut [u8; BLOCK]) {
-    for ((radius, inside), index) in radii.iter().zip(inside).zip(first as u32..) {
-        *inside &= u8::from(thinning.is_left(index, *radius));
-    }
-}
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Params;
 
-    /// Pixels of this edge in metres, each with one point.
-    fn pixels(edge: f32) -> Params {
-        Params {
-            points_per_pixel: 1.0,
-            ..Params::for_radius(edge)
-        }
-    }
-
-    /// What thinning leaves of a whole cloud.
-    fn left_of(cloud: &PointCloud, thinning: Thinning) -> Survivors {
+    /// Of an image whose rows are two blocks long, every 16th point leaves points in all columns.
+    #[test]
+    fn thinned_rows_are_left_everywhere() {
+        let (width, rows, stride) = (2 * BLOCK, 64, 16);
+        let point = |k: usize| Vec3::new((k % width) as f32, (k / width) as f32, 0.0);
+        let points: Vec<Vec3> = (0..width * rows).map(point).collect();
+        let cloud = PointCloud::builder(points).radius(1.0).build().unwrap();
         let everything = cloud.bounds().loosened(1.0);
         let region = Region {
             overlap: everything,
@@ -362,20 +338,7 @@ mod tests {
         };
         let (mut left, mut scratch) = (Survivors::default(), CullScratch::default());
         let frame = Pose3::IDENTITY;
-        cull(cloud, &frame, &region, thinning, &mut scratch, &mut left);
-        left
-    }
-
-    /// Of an image whose rows are two blocks long, every 16th point leaves points in all columns.
-    #[test]
-    fn thinned_rows_are_left_everywhere() {
-        let (width, rows, stride) = (2 * BLOCK, 64, 16);
-        let thinning = Thinning::new(1.0, &pixels(4.2));
-        assert_eq!(thinning.stride, stride);
-        let point = |k: usize| Vec3::new((k % width) as f32, (k / width) as f32, 0.0);
-        let points: Vec<Vec3> = (0..width * rows).map(point).collect();
-        let cloud = PointCloud::builder(points).radius(1.0).build().unwrap();
-        let left = left_of(&cloud, thinning);
+        cull(&cloud, &frame, &region, stride, &mut scratch, &mut left);
         assert_eq!(left.len() * stride, cloud.len());
         let mut in_strip = vec![0; width / 8];
         for (k, &index) in left.index.iter().enumerate() {
@@ -384,32 +347,6 @@ mod tests {
         }
         // 64 rows × 8 columns / 16, five standard deviations of a binomial.
         assert!(in_strip.iter().all(|n| (5..60).contains(n)), "{in_strip:?}");
-    }
-
-    /// A fine part of a cloud among points that are far apart, in random order.
-    #[test]
-    fn what_is_far_apart_is_not_thinned() {
-        let mut rng = fastrand::Rng::with_seed(1);
-        let points: Vec<Vec3> = (0..3000).map(|_| Vec3::splat(rng.f32())).collect();
-        let radii: Vec<f32> = (0..3000)
-            .map(|_| if rng.u8(..50) == 0 { 0.5 } else { 0.05 })
-            .collect();
-        let far_apart = radii.iter().filter(|&&r| r == 0.5).count();
-        let cloud = PointCloud::builder(points).radii(radii).build().unwrap();
-        let thinning = Thinning::new(cloud.mean_radius(), &pixels(4.2 * cloud.mean_radius()));
-        let left = left_of(&cloud, thinning);
-        let radii = PointRadii::new(&cloud, &left);
-        let radii: Vec<f32> = (0..left.len()).map(|i| radii.of(i)).collect();
-        assert_eq!(radii.iter().filter(|&&r| r == 0.5).count(), far_apart);
-        // The others stand for as many as their new discs are larger.
-        let others: Vec<f32> = radii.into_iter().filter(|&r| r != 0.5).collect();
-        assert!(
-            others.iter().all(|r| *r == others[0] && *r > 0.1),
-            "{}",
-            others[0]
-        );
-        let stand_for = others.len() as f32 * (others[0] / 0.05).powi(2);
-        assert!((2000.0..4000.0).contains(&stand_for), "{stand_for}");
     }
 
     #[test]

@@ -12,8 +12,7 @@ use super::side::{CloudView, ExactView};
 use super::splat::splat_radius;
 use super::sweep::is_edge_on;
 use crate::lone_points::is_alone;
-use crate::plan::ring;
-use crate::thinning::Thinning;
+use crate::plan::{ring, stride};
 use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Params, Surface, Tldi, VirtualCamera};
 use glamx::{Pose3, Vec3};
 
@@ -202,12 +201,12 @@ impl Scratch {
                 other_from_frame: view_from_a,
                 other_bounds: region,
             };
-            let thinning = Thinning::new(cloud.mean_radius(), &query.params);
+            let stride = stride(cloud.mean_radius(), query.params.pixel_size);
             cull::cull(
                 cloud,
                 &frame,
                 &region,
-                thinning,
+                stride,
                 &mut side.cull,
                 &mut side.points,
             );

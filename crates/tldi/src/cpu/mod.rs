@@ -20,7 +20,6 @@ pub(crate) mod sweep;
 pub(crate) mod zone;
 
 use crate::supported::supported_surfaces;
-use crate::thinning::Thinning;
 use crate::{
     Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,
     Tldi, Variant, VirtualCamera, paper,
@@ -110,21 +109,6 @@ impl CpuBackend {
             .and_then(|()| query.params.check())
             .map_err(|reason| BackendError::Unsupported { pair: 0, reason })?;
         Ok(self.with_scratch(|scratch| scratch.impact(query)))
-    }
-
-    /// Compares those pairs of a batch that are so deep in each other that larger pixels are enough
-    /// ([`Params::depth_error`]), and returns their indices; empties the results of the others. For
-    /// backends that leave such pairs to the CPU, which looks at a few of their points.
-    pub fn compare_deep(&self, batch: &[PairQuery], results: &mut Vec<PairResult>) -> Vec<usize> {
-        results.resize_with(batch.len(), PairResult::default);
-        let is_settled: Vec<bool> = (batch.par_iter().zip(results.par_iter_mut()))
-            .map(|(query, result)| {
-                result.clear();
-                let compare = |scratch: &mut Scratch| scratch.compare_deep(query, result);
-                query.check().is_ok() && self.with_scratch(compare)
-            })
-            .collect();
-        (0..batch.len()).filter(|&pair| is_settled[pair]).collect()
     }
 
     fn with_scratch<R>(&self, run: impl FnOnce(&mut Scratch) -> R) -> R {
@@ -226,7 +210,7 @@ pub fn build(
         cloud,
         frame_from_cloud,
         &everything,
-        Thinning::default(),
+        1,
         &mut side.cull,
         &mut side.points,
     );

@@ -8,10 +8,8 @@ use super::side::{CloudView, ExactView, Side};
 use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneGrid, ZoneScratch};
 use crate::camera_policy::{MAX_VIEWS, ZoneNormals, aim, seen_from_behind};
-use crate::deep::compare_deep;
 use crate::patches::PatchScratch;
-use crate::plan::{PairPlan, SidePlan};
-use crate::thinning::Thinning;
+use crate::plan::{PairPlan, SidePlan, stride};
 use crate::{PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
@@ -32,22 +30,6 @@ pub(super) struct Scratch {
 
 impl Scratch {
     pub(super) fn compare(&mut self, query: &PairQuery, result: &mut PairResult) {
-        if !self.compare_deep(query, result) {
-            self.find_contacts(query, result);
-            self.patches.reduce_pair(result, query);
-        }
-    }
-
-    /// See [`CpuBackend::compare_deep`](super::CpuBackend::compare_deep).
-    pub(super) fn compare_deep(&mut self, query: &PairQuery, result: &mut PairResult) -> bool {
-        compare_deep(query, result, |query, result| {
-            self.find_contacts(query, result);
-            self.patches.reduce_deep(result, query);
-        })
-    }
-
-    /// Fills in what the pixels of the query tell.
-    fn find_contacts(&mut self, query: &PairQuery, result: &mut PairResult) {
         if query.params.variant() == Variant::Paper
             && let View::Fixed(camera) = query.view
         {
@@ -60,7 +42,6 @@ impl Scratch {
         if !self.cull(query, &plan) || !self.zone(query, &plan) {
             return;
         }
-        result.pixel_size = query.params.pixel_size;
         match query.view {
             View::Fixed(camera) => {
                 result.axes.push(camera.axis());
@@ -85,6 +66,7 @@ impl Scratch {
                 }
             }
         }
+        self.patches.reduce_pair(result, query);
     }
 
     fn compare_paper(
@@ -129,10 +111,10 @@ impl Scratch {
     fn cull(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
         let cull = |side: &mut Side, surface: Surface, plan: &SidePlan| {
             if let Surface::Cloud(cloud) = surface {
-                let thinning = Thinning::new(cloud.mean_radius(), &query.params);
+                let stride = stride(cloud.mean_radius(), query.params.pixel_size);
                 let frame = &plan.frame_from_surface;
                 let Side { cull, points, .. } = side;
-                cull::cull(cloud, frame, &plan.region, thinning, cull, points);
+                cull::cull(cloud, frame, &plan.region, stride, cull, points);
                 !points.is_empty()
             } else {
                 side.points.clear();
