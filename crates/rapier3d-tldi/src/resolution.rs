@@ -30,7 +30,7 @@ const LEFT: f32 = 0.4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Resolution {
     /// An edge of so many mean radii of the pair's coarser cloud, greater than 0. 1 resolves the
-    /// most that the points tell; 2 errs less where noise is as large as the radii.
+    /// most that the points tell.
     Radii(f32),
     /// An error budget: pixels of this edge in metres, greater than 0, as gaps err by about a pixel at
     /// the corners of what touches, and elsewhere by less; never smaller than a mean radius.
