@@ -89,17 +89,63 @@ fn crosses(look: ptr<function, Look>, a: Column, b: Column, a_next: Column, b_ne
     return false;
 }
 
-fn is_through(thick: u32, other: u32, rim: f32) -> bool {
-    let depth = layers[other].depth;
-    return layers[thick].near + rim < depth && depth < layers[thick].far - rim;
+// Where a pixel is in its image.
+struct Place {
+    at: vec2i,
+    size: vec2i,
+    // Of the image's first pixel.
+    first: u32,
 }
 
-// Whether a layer of one lies well within a thick layer of the other.
-fn pierces(a: Column, b: Column, merge_gap: f32) -> bool {
+// Whether layer `k` of side `s` goes on at `p`. Beyond the image it is taken to.
+fn goes_on(s: u32, k: u32, p: vec2i, place: Place, merge_gap: f32) -> bool {
+    if any(p < vec2i(0)) || any(p >= place.size) {
+        return true;
+    }
+    let next = column(s, place.first + u32(p.y * place.size.x + p.x));
+    let depth = layers[k].depth;
+    for (var n = next.begin; n < next.end; n++) {
+        if abs(layers[n].depth - depth) <= merge_gap
+            || (layers[n].near <= depth && depth <= layers[n].far) {
+            return true;
+        }
+    }
+    return false;
+}
+
+// Whether layer `k` of side `s` goes on in pixels on both sides of a line across `across`.
+fn is_on_both_sides(across: vec2f, s: u32, k: u32, place: Place, merge_gap: f32) -> bool {
+    let beside = BESIDE * length(across);
+    var there = vec2<bool>(false);
+    for (var dj = -1; dj <= 1; dj++) {
+        for (var di = -1; di <= 1; di++) {
+            if di == 0 && dj == 0 {
+                continue;
+            }
+            let along = dot(across, vec2f(f32(di), f32(dj)));
+            let side = vec2<bool>(along >= beside, -along >= beside);
+            if any(side) && goes_on(s, k, place.at + vec2i(di, dj), place, merge_gap) {
+                there = there | side;
+            }
+        }
+    }
+    return all(there);
+}
+
+// Whether layer `other` of side `s` lies well within the layer `wall` and goes on on both sides of it.
+fn is_through(wall: u32, other: u32, s: u32, place: Place, merge_gap: f32) -> bool {
     let rim = 0.5 * merge_gap;
+    let depth = layers[other].depth;
+    return layers[wall].near + rim < depth && depth < layers[wall].far - rim
+        && is_on_both_sides(layers[wall].normal.xy, s, other, place, merge_gap);
+}
+
+// Whether a layer of one lies well within a thick layer of the other, a wall seen edge-on, and goes
+// on on both sides of it.
+fn pierces(a: Column, b: Column, place: Place, merge_gap: f32) -> bool {
     for (var ka = a.begin; ka < a.end; ka++) {
         for (var kb = b.begin; kb < b.end; kb++) {
-            if is_through(ka, kb, rim) || is_through(kb, ka, rim) {
+            if is_through(ka, kb, 1u, place, merge_gap) || is_through(kb, ka, 0u, place, merge_gap) {
                 return true;
             }
         }
@@ -245,7 +291,8 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     let size = views[view].rect_size;
     let pixel = vec2u(in_image % size.x, in_image / size.x);
     if atomicLoad(&found[pair * PAIR_WORDS + COLLIDES]) == 0u {
-        var collides = pierces(a, b, look.params.merge_gap);
+        let place = Place(vec2i(pixel), vec2i(size), k - in_image);
+        var collides = pierces(a, b, place, look.params.merge_gap);
         if !collides && pixel.x + 1u < size.x {
             collides = crosses(&look, a, b, column(0u, k + 1u), column(1u, k + 1u));
         }

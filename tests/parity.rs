@@ -157,6 +157,42 @@ fn contacts_are_those_of_the_cpu() {
     assert!(found.other_contacts * 100 < found.contacts, "{found:?}");
 }
 
+/// Sheets that end beside a wall, whose last splats are in its pixels, or go on behind it.
+#[test]
+fn walls_are_pierced_by_what_goes_on_behind_them() {
+    let Some(mut gpu) = gpu_backend() else {
+        return;
+    };
+    let mut rng = fastrand::Rng::with_seed(12);
+    let sheet = sampled_plane(0.4, R, &mut rng).bare_cloud(R);
+    let upright = 0.5 * std::f32::consts::PI * Vec3::Z;
+    let beyond_edge: Vec<f32> = (0..60).map(|_| 4.0 * (rng.f32() - 0.5) * R).collect();
+    let query = |beyond: &f32| PairQuery {
+        view: View::Fixed(VirtualCamera::along(-Vec3::Y, R)),
+        ..aimed(
+            Surface::Cloud(&sheet),
+            Surface::Cloud(&sheet),
+            Pose3::new(Vec3::new(0.2 + beyond, 0.05, 0.0), upright),
+            Params::for_radius(R),
+        )
+    };
+    let batch: Vec<PairQuery> = beyond_edge.iter().map(query).collect();
+    let (cpu, gpu) = (on_cpu(&batch), compared(&mut gpu, &batch));
+    for (result, beyond) in cpu.iter().zip(beyond_edge) {
+        // In between, it depends on where the outermost samples are.
+        if beyond > 0.8 * R || beyond < -0.5 * R {
+            assert_eq!(result.collides, beyond < 0.0, "{beyond}");
+        }
+    }
+    let differ = cpu
+        .iter()
+        .zip(&gpu)
+        .filter(|(c, g)| c.collides != g.collides);
+    // Where a splat ends within rounding of a pixel's middle.
+    let differing = differ.count();
+    assert!(differing <= 5, "{differing}");
+}
+
 /// With given normals, one given view along an axis of the frame, and coordinates and pixels that
 /// are powers of two, nothing is rounded before the layers: pixels are equal, one by one.
 #[test]

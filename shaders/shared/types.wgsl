@@ -17,6 +17,7 @@ override DEPTH_BITS: u32;
 override MAX_DEPTH: f32;
 override LEAST_TILE: i32;
 override FACING: f32;
+override BESIDE: f32;
 override WELL_SEEN: f32;
 override SUPPORTED: f32;
 override LEAST_SHARE: f32;

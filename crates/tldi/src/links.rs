@@ -22,8 +22,8 @@ pub(crate) struct Links {
     pub(crate) pairs: Vec<(u32, u32)>,
     /// First contact pixel at each pixel of a view's rectangle.
     map: Vec<u32>,
-    /// Links of each contact pixel; then its new index, or [`NONE`]; then, at each root, whether any of
-    /// its component is shallow.
+    /// Links of each contact pixel; then its new index, or [`NONE`]; then, at each root, whether the
+    /// surfaces are apart anywhere in its component.
     counts: Vec<u32>,
     /// Where the neighbours of each contact pixel start in `neighbors`, and their end.
     starts: Vec<u32>,
@@ -93,8 +93,8 @@ impl Links {
     /// Cuts the penetrations of `result` to what neighbours confirm: contact pixels deeper than a
     /// layer are removed, with their links, others still touch. Those that are left decide on
     /// `collides` and `gap`: where an inside is known (`tells_inside`) all that are deep, elsewhere
-    /// those that continue others which are not. What is deep all over may be the space between two
-    /// limbs. `roots` is overwritten.
+    /// those that continue others at which the surfaces are apart. What is deep all over may be the space
+    /// between two limbs. `roots` is overwritten.
     pub(crate) fn confirm(
         &mut self,
         result: &mut PairResult,
@@ -138,26 +138,27 @@ impl Links {
         // where no view sees them well.
         if !result.collides && result.contacts.iter().any(is_deep) {
             let contacts = &result.contacts;
-            result.collides = tells_inside || self.deep_meets_shallow(contacts, is_deep, roots);
+            result.collides = tells_inside || self.deep_leads_out(contacts, is_deep, roots);
         }
     }
 
-    /// Whether some contact pixels that are deep continue others that are not.
-    fn deep_meets_shallow(
+    /// Whether some contact pixels that are deep continue others at which the surfaces are apart: from
+    /// within an overlap the gap passes through zero, the space between limbs ends where they meet.
+    fn deep_leads_out(
         &mut self,
         contacts: &[ContactPixel],
         is_deep: impl Fn(&ContactPixel) -> bool,
         roots: &mut Vec<u32>,
     ) -> bool {
         self.components(contacts.len(), roots);
-        let is_shallow = &mut self.counts;
-        is_shallow.clear();
-        is_shallow.resize(contacts.len(), 0);
+        let leads_out = &mut self.counts;
+        leads_out.clear();
+        leads_out.resize(contacts.len(), 0);
         let of_component = || contacts.iter().zip(roots.iter().map(|&root| root as usize));
-        for (_, root) in of_component().filter(|(contact, _)| !is_deep(contact)) {
-            is_shallow[root] = 1;
+        for (_, root) in of_component().filter(|(contact, _)| contact.gap > 0.0) {
+            leads_out[root] = 1;
         }
-        of_component().any(|(contact, root)| is_deep(contact) && is_shallow[root] == 1)
+        of_component().any(|(contact, root)| is_deep(contact) && leads_out[root] == 1)
     }
 
     /// Contact pixels linked with `k`.
@@ -300,22 +301,26 @@ mod tests {
         assert_eq!(result.gap, Some(-5.0 * PIXEL));
     }
 
-    /// Two limbs with space between them, which nothing tells from the inside of one body; and a body
-    /// on its corner.
+    /// Two limbs with space between them, which nothing tells from the inside of one body; such limbs that
+    /// meet; and a body on its corner.
     #[test]
-    fn without_an_inside_what_is_deep_all_over_does_not_collide() {
+    fn without_an_inside_what_is_deep_collides_where_it_leads_out() {
         let block: Vec<[i32; 2]> = (0..64).map(|k| [k % 8, k / 8]).collect();
         let apart = contacts(&block, 5.0 * PIXEL);
-        let mut sloping = apart.clone();
-        for contact in &mut sloping {
-            let depth = (6.0 - contact.pixel[0] as f32) * PIXEL;
-            contact.point_b = contact.point_a - depth * Vec3::Y;
-            contact.gap = -depth;
-        }
+        let sloping = |from: f32| {
+            let mut contacts = apart.clone();
+            for contact in &mut contacts {
+                let depth = (from - contact.pixel[0] as f32) * PIXEL;
+                contact.point_b = contact.point_a - depth * Vec3::Y;
+                contact.gap = -depth;
+            }
+            contacts
+        };
         for (contacts, tells_inside, collides) in [
             (&apart, false, false),
             (&apart, true, true),
-            (&sloping, false, true),
+            (&sloping(7.0), false, false),
+            (&sloping(6.0), false, true),
         ] {
             let result = confirmed(contacts.clone(), tells_inside);
             assert_eq!(result.collides, collides);

@@ -9,7 +9,7 @@ use super::sweep::is_edge_on;
 use crate::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera};
 use arrayvec::ArrayVec;
-use glamx::{Pose3, Vec3};
+use glamx::{Pose3, Vec2, Vec3};
 
 /// Depths of the middles of both bodies, where a body's size says that it is one.
 ///
@@ -60,7 +60,7 @@ pub(crate) fn compare(
             if !result.collides {
                 let crossing =
                     |k: usize| crosses(la, lb, a.layers_of(k), b.layers_of(k), &others, params);
-                result.collides = pierces(la, lb, params)
+                result.collides = pierces(a, b, [i, j], params)
                     || (i + 1 < width && crossing(k + 1))
                     || (j + 1 < height && crossing(k + width as usize));
             }
@@ -121,15 +121,50 @@ fn crosses(
     })
 }
 
-/// Whether a layer of one lies well within a thick layer of the other: a surface seen edge-on
-/// that the other one passes through.
-fn pierces(a: &[Layer], b: &[Layer], params: &Params) -> bool {
+/// Whether a layer of one lies well within a thick layer of the other, a wall seen edge-on, and goes on
+/// on both sides of it: of a surface that ends beside a wall, the last splats are in the wall's pixels.
+fn pierces(a: &Tldi, b: &Tldi, pixel: [u32; 2], params: &Params) -> bool {
     let rim = 0.5 * params.merge_gap;
-    let through = |thick: &Layer, other: &Layer| {
-        thick.near + rim < other.depth && other.depth < thick.far - rim
+    let through = |walls: &Tldi, other: &Tldi| {
+        let [i, j] = pixel;
+        walls.layers_at(i, j).iter().any(|wall| {
+            other.layers_at(i, j).iter().any(|layer| {
+                wall.near + rim < layer.depth
+                    && layer.depth < wall.far - rim
+                    && is_on_both_sides(wall.normal.truncate(), layer, other, pixel, params)
+            })
+        })
     };
-    a.iter()
-        .any(|la| b.iter().any(|lb| through(la, lb) || through(lb, la)))
+    through(a, b) || through(b, a)
+}
+
+/// Whether `layer` at `pixel` of `image` goes on in pixels on both sides of a line across `across`.
+/// Beyond the image nothing is known, and it is taken to.
+fn is_on_both_sides(
+    across: Vec2,
+    layer: &Layer,
+    image: &Tldi,
+    pixel: [u32; 2],
+    params: &Params,
+) -> bool {
+    let [width, height] = image.size;
+    let goes_on = |[di, dj]: [i32; 2]| {
+        let at = [0, 1].map(|axis| pixel[axis].checked_add_signed([di, dj][axis]));
+        let [Some(i), Some(j)] = at else { return true };
+        i >= width
+            || j >= height
+            || image.layers_at(i, j).iter().any(|next| {
+                (next.depth - layer.depth).abs() <= params.merge_gap
+                    || (next.near..=next.far).contains(&layer.depth)
+            })
+    };
+    let beside = BESIDE * across.length();
+    [across, -across].into_iter().all(|side| {
+        NEIGHBORS
+            .into_iter()
+            .filter(|&[di, dj]| side.dot(Vec2::new(di as f32, dj as f32)) >= beside)
+            .any(goes_on)
+    })
 }
 
 /// Where a pixel is.
@@ -225,8 +260,24 @@ fn contact_pixels([a, b]: [Column; 2], at: &PixelView, params: &Params, result: 
 /// body stands beside has points in the body's columns, but does not face its bottom.
 const FACING: f32 = 0.5;
 
+/// How far in pixels the middle of a neighbouring pixel is from a wall, at least, that it is beside.
+const BESIDE: f32 = 0.5;
+
 /// For [`stage_constants`](crate::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 1] = [("FACING", FACING as f64)];
+pub(crate) const CONSTANTS: [(&str, f64); 2] =
+    [("FACING", FACING as f64), ("BESIDE", BESIDE as f64)];
+
+/// From a pixel to those around it.
+const NEIGHBORS: [[i32; 2]; 8] = [
+    [-1, -1],
+    [0, -1],
+    [1, -1],
+    [-1, 0],
+    [1, 0],
+    [-1, 1],
+    [0, 1],
+    [1, 1],
+];
 
 /// Whether two layers face each other and the view, as surfaces do that push bodies apart.
 fn opposed(entry: &Layer, exit: &Layer) -> bool {
@@ -295,6 +346,48 @@ mod tests {
             facing,
             color: [0; 4],
         }
+    }
+
+    /// A wall seen edge-on in the middle of three columns, and a sheet in some of them.
+    #[test]
+    fn a_sheet_pierces_a_wall_that_it_goes_on_behind() {
+        let params = Params::for_radius(1.0);
+        let image = |columns: [Option<Layer>; 3]| {
+            let camera = VirtualCamera::along(Vec3::Z, 1.0);
+            let mut image = Tldi::default();
+            image.begin(&camera, [0, 0], [3, 3]);
+            for _row in 0..3 {
+                for column in columns {
+                    image.layers.extend(column);
+                    image.offsets.push(image.layers.len() as u32);
+                }
+            }
+            image
+        };
+        let wall = Layer {
+            near: 0.0,
+            far: 20.0,
+            normal: Vec3::X,
+            ..layer(10.0, Facing::Unknown)
+        };
+        let in_middle = image([None, Some(wall), None]);
+        let sheet = Some(layer(10.0, Facing::Unknown));
+        let apart = Some(layer(15.0, Facing::Unknown));
+        for (columns, expected) in [
+            ([sheet, sheet, sheet], true),
+            ([sheet, sheet, None], false),
+            ([None, sheet, sheet], false),
+            ([sheet, sheet, apart], false),
+        ] {
+            let sheet = image(columns);
+            for (a, b) in [(&in_middle, &sheet), (&sheet, &in_middle)] {
+                assert_eq!(pierces(a, b, [1, 1], &params), expected, "{columns:?}");
+            }
+        }
+        // What is beyond the image's edge is not known.
+        let at_edge = image([None, None, Some(wall)]);
+        let sheet = image([None, sheet, sheet]);
+        assert!(pierces(&at_edge, &sheet, [2, 1], &params));
     }
 
     /// Where a ray entered what it leaves last, and left what it enters first, for a merge gap of 2.
