@@ -110,8 +110,8 @@ fn main() -> anyhow::Result<()> {
 
 /// All settings, from the finest pixels on, then budgets.
 fn resolutions() -> Vec<(String, Resolution)> {
-    let radii = [0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6];
-    let error = [0.002, 0.004, 0.008];
+    let radii = [0.7, 1.0, 1.5, 2.0, 2.8, 4.0, 4.2, 5.6, 8.0];
+    let error = [0.002, 0.004, 0.008, 0.012];
     let time = [1.0, 2.0, 4.0];
     let radii = radii.map(|r| (format!("pixel {r} r"), Resolution::Radii(r)));
     let error = error.map(|e| (format!("error {} mm", 1e3 * e), Resolution::Error(e)));

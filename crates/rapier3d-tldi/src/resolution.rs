@@ -1,9 +1,14 @@
 //! How large the pixels are in which pairs are compared: a setting, or what a budget allows.
 
 use std::time::Duration;
+use tldi::plan::stride;
 
 /// By how much pixels grow at once under [`Resolution::Time`]: half as many pixels.
 const COARSER: f32 = std::f32::consts::SQRT_2;
+
+/// Greatest pixel, in mean radii, that saves anything while clouds are not thinned: larger ones reach
+/// farther from the contact and show more points (`cargo run --release --bin budgets`).
+const CHEAPEST: f32 = 1.5;
 
 /// Greatest pixel under [`Resolution::Time`], in mean radii: beyond, what does not depend on the pixels
 /// takes most of the time.
@@ -32,11 +37,13 @@ pub enum Resolution {
     /// An edge of so many mean radii of the pair's coarser cloud, greater than 0. 1 resolves the
     /// most that the points tell.
     Radii(f32),
-    /// An error budget: pixels of this edge in metres, greater than 0, as gaps err by about a pixel at
-    /// the corners of what touches, and elsewhere by less; never smaller than a mean radius.
+    /// An error budget in metres, greater than 0. Gaps err by about a pixel at the corners of what
+    /// touches, and elsewhere by less: pixels of this edge, but not smaller than a mean radius, nor
+    /// between 1.5 and the 4.1 radii from which on only a part of the points is looked at, which
+    /// cost more than 1.5.
     Error(f32),
     /// A time budget for the comparisons of a step, longer than zero: a mean radius, but coarser by
-    /// and by, up to 8, while they take longer. What a step costs beside its pixels, a pass over the
+    /// and by, up to 8 and not between 1.5 and 4.1, while they take longer. What a step costs beside its pixels, a pass over the
     /// points that are near, stays. Results then depend on the machine and its load: not for
     /// simulations that are to be repeated.
     Time(Duration),
@@ -64,6 +71,7 @@ impl Resolution {
     pub(crate) fn pixel_size(self, mean_radius: f32) -> f32 {
         match self {
             Self::Radii(radii) => radii * mean_radius,
+            Self::Error(error) if saves_nothing(error / mean_radius) => CHEAPEST * mean_radius,
             Self::Error(error) => mean_radius.max(error),
             Self::Time(_) => mean_radius,
         }
@@ -76,14 +84,25 @@ impl Resolution {
             return 1.0;
         };
         let share = (seconds / budget.as_secs_f64()) as f32;
+        let mut next = coarsening;
         if share > 1.0 {
-            (coarsening * COARSER).min(COARSEST)
+            next *= COARSER;
+            while saves_nothing(next) {
+                next *= COARSER;
+            }
         } else if share < LEFT {
-            (coarsening / COARSER).max(1.0)
-        } else {
-            coarsening
+            next /= COARSER;
+            while saves_nothing(next) {
+                next /= COARSER;
+            }
         }
+        next.clamp(1.0, COARSEST)
     }
+}
+
+/// Whether pixels of so many mean radii cost more than smaller ones.
+fn saves_nothing(radii: f32) -> bool {
+    radii > CHEAPEST && stride(1.0, radii) == 1
 }
 
 #[cfg(test)]
@@ -96,7 +115,9 @@ mod tests {
         assert_eq!(Resolution::Radii(2.0).pixel_size(radius), 0.02);
         // No finer than the points.
         assert_eq!(Resolution::Error(0.001).pixel_size(radius), radius);
-        assert_eq!(Resolution::Error(0.03).pixel_size(radius), 0.03);
+        assert_eq!(Resolution::Error(0.012).pixel_size(radius), 0.012);
+        assert_eq!(Resolution::Error(0.03).pixel_size(radius), 0.015);
+        assert_eq!(Resolution::Error(0.05).pixel_size(radius), 0.05);
     }
 
     /// A step that takes time in proportion to the number of pixels settles at the finest ones that
