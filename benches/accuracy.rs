@@ -12,7 +12,7 @@ use indicatif::ProgressBar;
 use std::path::PathBuf;
 use tldi::glamx::Vec3;
 use tldi::{CpuBackend, PointCloud};
-use tldi_benches::accuracy::{Contender, Copies, Truth, measure};
+use tldi_benches::accuracy::{Contender, Copies, TOLD, Truth, measure};
 use tldi_benches::args::{NameArgs, RunArgs};
 use tldi_benches::mesh_truth::ExactMesh;
 use tldi_benches::model::Model;
@@ -86,6 +86,8 @@ enum VariantChoice {
     Paper,
     /// Ours.
     Default,
+    /// Ours, told how large the noise is.
+    Told,
     /// What a user would pick instead, with every radius.
     Peers,
 }
@@ -124,7 +126,7 @@ fn main() -> anyhow::Result<()> {
             clouds: [&a, &b],
             noise,
         };
-        let mut contenders = contenders(&args, &model)?;
+        let mut contenders = contenders(&args, &model, a.noise())?;
         let progress = ProgressBar::new(all.len() as u64).with_message("cases");
         let measured = measure(&mut contenders, &copies, &mesh, &all, &truth, || {
             progress.inc(1);
@@ -177,13 +179,14 @@ fn noisy(points: &[Vec3], noise: f32, seed: u64) -> anyhow::Result<PointCloud<'s
         .iter()
         .map(|p| *p + Vec3::new(normal(), normal(), normal()))
         .collect();
-    Ok(PointCloud::builder(moved).knn_radii(7, 0.65).build()?)
+    let builder = PointCloud::builder(moved).knn_radii(7, 0.65);
+    Ok(builder.noise(sigma).build()?)
 }
 
-/// Every method with every of its settings.
-fn contenders(args: &Args, model: &Model) -> anyhow::Result<Vec<Contender>> {
+/// Every method with every of its settings; `noise` is the standard deviation that some are told, metres.
+fn contenders(args: &Args, model: &Model, noise: f32) -> anyhow::Result<Vec<Contender>> {
     let has = |choice| match args.variant.is_empty() {
-        true => choice != VariantChoice::Peers,
+        true => matches!(choice, VariantChoice::Paper | VariantChoice::Default),
         false => args.variant.contains(&choice),
     };
     let mut all = Vec::new();
@@ -205,13 +208,20 @@ fn contenders(args: &Args, model: &Model) -> anyhow::Result<Vec<Contender>> {
             }
         }
     }
-    if has(VariantChoice::Default) {
+    // Without noise there is nothing to tell.
+    let told = (noise > 0.0).then_some((VariantChoice::Told, TOLD, noise));
+    let untold = (VariantChoice::Default, "default", 0.0);
+    for (choice, variant, noise) in [untold].into_iter().chain(told) {
+        if !has(choice) {
+            continue;
+        }
         for &pixel_scale in &args.pixel_scale {
             for &scale in &args.radius_scale {
                 let method = Method::Default { pixel_scale };
+                let peer = TldiPeer::new(args.backend.open()?, method, 1)?;
                 all.push(Contender {
-                    variant: "default".to_owned(),
-                    peer: Box::new(TldiPeer::new(args.backend.open()?, method, 1)?),
+                    variant: variant.to_owned(),
+                    peer: Box::new(peer.with_noise(noise)),
                     radius_scale: Some(scale),
                     rho: None,
                     resolution: None,
@@ -245,7 +255,10 @@ fn contenders(args: &Args, model: &Model) -> anyhow::Result<Vec<Contender>> {
             );
         }
     }
-    ensure!(!all.is_empty(), "--only and --without leave no method");
+    ensure!(
+        !all.is_empty(),
+        "no method is left: of --variant, --only and --without, or no noise to tell"
+    );
     Ok(all)
 }
 

@@ -16,6 +16,9 @@ use std::collections::HashMap;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
 
+/// Name in the rows of the default, told how large the noise is.
+pub const TOLD: &str = "default, noise told";
+
 /// A method with its settings.
 pub struct Contender {
     /// Name in the rows.

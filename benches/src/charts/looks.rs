@@ -81,6 +81,14 @@ pub(super) fn resolution_color(index: usize) -> Color {
     [BLACK, BLUE, SKY, GREEN][index % 4]
 }
 
+/// Of ours where the noise is told, beside ours where it is not.
+pub(super) fn told_look(color: Color) -> Look {
+    Look {
+        mark: Mark::Disc,
+        ..default_look(color)
+    }
+}
+
 /// Of the paper's method where both methods have the colour of a model.
 pub(super) fn paper_look(color: Color) -> Look {
     Look {

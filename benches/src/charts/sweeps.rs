@@ -2,6 +2,7 @@
 
 use super::figure::{Axis, Curve, Entry, Figure, Level, Line, Look, Mark, Panel, Point};
 use super::{looks, origin};
+use crate::accuracy::TOLD;
 use crate::stored::{AccuracyRow, Provenance, Stored};
 
 type Run = Stored<AccuracyRow>;
@@ -72,6 +73,10 @@ fn best_of_models<'a, W: Ord>(
 
 fn is_paper(row: &AccuracyRow) -> bool {
     row.variant == "paper"
+}
+
+fn is_told(row: &AccuracyRow) -> bool {
+    row.variant == TOLD && row.pixel_scale == Some(1.0)
 }
 
 fn is_default(row: &AccuracyRow) -> bool {
@@ -250,6 +255,11 @@ fn both(
                 looks::default_look(color),
                 rows().filter(|r| is_plain_default(r)).collect::<Vec<_>>(),
                 "this project",
+            ),
+            (
+                looks::told_look(color),
+                rows().filter(|r| is_told(r)).collect(),
+                "this project, told how large the noise is",
             ),
         ] {
             if !rows.is_empty() {

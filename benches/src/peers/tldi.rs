@@ -64,6 +64,7 @@ pub struct TldiPeer {
     backend: Box<dyn Backend>,
     threads: rayon::ThreadPool,
     method: Method,
+    noise: f32,
     clouds: Option<[PointCloud<'static>; 2]>,
     results: Vec<PairResult>,
 }
@@ -81,9 +82,15 @@ impl TldiPeer {
                 .num_threads(threads)
                 .build()?,
             method,
+            noise: 0.0,
             clouds: None,
             results: Vec::new(),
         })
+    }
+
+    /// Told that all points have noise of this standard deviation, metres.
+    pub fn with_noise(self, noise: f32) -> Self {
+        Self { noise, ..self }
     }
 
     /// What was found in the last frame.
@@ -122,6 +129,7 @@ impl Peer for TldiPeer {
             backend,
             threads,
             method,
+            noise,
             clouds,
             results,
         } = self;
@@ -130,6 +138,7 @@ impl Peer for TldiPeer {
             let clouds = clouds.get_or_insert_with(|| {
                 [frame.a, frame.b].map(|points| {
                     let builder = PointCloud::builder(points.to_vec()).radius(frame.radius);
+                    let builder = builder.noise(*noise);
                     builder.build().expect("the points of a bench are finite")
                 })
             });

@@ -10,6 +10,10 @@ use tldi::{CameraPolicy, Params, Variant};
 /// own points are no finer.
 const LEAST_PIXELS: f32 = 8.0;
 
+/// Contacts are looked for up to this many standard deviations of told noise, so that the gaps of what
+/// just touches are fitted to what is around it on all sides.
+const FITTED: f32 = 3.0;
+
 /// Settings of a [`TldiPipeline`](crate::TldiPipeline), the same for all its pairs.
 ///
 /// ```
@@ -105,11 +109,13 @@ impl TldiConfig {
             Variant::Paper => Params::paper(coarsest),
             Variant::Oriented => Params::for_radius(coarsest),
         };
+        let noise = |part| cloud_of(part).map_or(0.0, |shape| shape.cloud().noise());
+        let fitted = FITTED * parts.into_iter().map(noise).fold(0.0, f32::max);
         let pixel_size = self.resolution.pixel_size(coarsest).min(to_resolve);
         Some(
             params
                 .with_pixel_size(pixel_size)
-                .with_prediction(prediction),
+                .with_prediction(prediction.max(fitted)),
         )
     }
 }

@@ -50,6 +50,7 @@ pub struct PointCloud<'a> {
     pub(crate) blocks: Vec<Aabb>,
     pub(crate) mean_radius: f32,
     pub(crate) max_radius: f32,
+    pub(crate) noise: f32,
     pub(crate) dropped: usize,
     pub(crate) non_finite: NonFinite,
     pub(crate) order: Option<Vec<u32>>,
@@ -123,6 +124,12 @@ impl<'a> PointCloud<'a> {
     /// Largest radius in metres.
     pub fn max_radius(&self) -> f32 {
         self.max_radius
+    }
+
+    /// Standard deviation of the points along the surface's normal in metres, as
+    /// [told](CloudBuilder::noise); 0 where it was not.
+    pub fn noise(&self) -> f32 {
+        self.noise
     }
 
     /// Unit normals, one for each point, where given or computed.
@@ -334,6 +341,7 @@ impl<'a> PointCloud<'a> {
             blocks: self.blocks,
             mean_radius: self.mean_radius,
             max_radius: self.max_radius,
+            noise: self.noise,
             dropped: self.dropped,
             non_finite: self.non_finite,
             order: self.order,

@@ -21,6 +21,7 @@ mod knn;
 mod links;
 mod lone_points;
 mod morton;
+mod noise;
 mod normals;
 pub mod paper;
 mod params;

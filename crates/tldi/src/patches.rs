@@ -8,6 +8,7 @@ use crate::cpu::sweep::SAME_FACE;
 use crate::gap_fit::fitted_gap;
 use crate::links::{Groups, Links, join, root};
 use crate::lone_points::LonePoints;
+use crate::noise::allow_for_noise;
 use crate::supports::{longest_axis, supports};
 use crate::{
     ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, PairQuery, PairResult, Params,
@@ -119,6 +120,8 @@ impl PatchScratch {
         }
         let tells_inside = query.a.is_oriented() || query.b.is_oriented();
         self.reduce_linked(result, &query.params, tells_inside);
+        let fitted = self.smooth.iter().map(|pixel| pixel.gap);
+        allow_for_noise(result, fitted.reduce(f32::min), query);
     }
 
     fn link(&mut self, result: &mut PairResult, params: &Params) {
@@ -132,6 +135,7 @@ impl PatchScratch {
             .confirm(result, params, tells_inside, &mut self.group);
         let (contacts, out) = (&result.contacts, &mut result.patches);
         out.clear();
+        self.smooth.clear();
         if contacts.is_empty() {
             return;
         }
@@ -202,7 +206,6 @@ impl PatchScratch {
     /// Averages normals over linked neighbours and fits the gaps to them: what is left of a sensor's
     /// noise is a third.
     fn smooth(&mut self, contacts: &[ContactPixel]) {
-        self.smooth.clear();
         for (k, contact) in contacts.iter().enumerate() {
             let (mut normal_a, mut normal_b) = (contact.normal_a, contact.normal_b);
             let neighbors = self.links.neighbors(k as u32);

@@ -77,6 +77,14 @@ impl Surface<'_> {
         }
     }
 
+    /// Standard deviation of the points along the surface's normal in metres; 0 where it is not told.
+    pub(crate) fn noise(&self) -> f32 {
+        match self {
+            Surface::Cloud(cloud) => cloud.noise(),
+            Surface::Exact(_) | Surface::Device(_) => 0.0,
+        }
+    }
+
     /// Mean point radius in metres; 0 for an exact surface.
     pub fn mean_radius(&self) -> f32 {
         match self {

@@ -1,0 +1,20 @@
+//! What the noise of points alone makes of a least gap, where a user tells how large it is.
+
+use crate::{PairQuery, PairResult};
+
+/// How much closer than the surfaces the least fitted gap is taken to be for noise with a standard deviation
+/// of a pixel, in pixels; of other noise its square decides. Measured, so that false and missed collisions
+/// are about as many: two copies of five scans and meshes, noise of 0.25 to 1.5 mean radii, pixels of 0.5 to 3.
+const CLOSER_PX: f32 = 0.5;
+
+/// Raises the gap of `result` by what noise makes of it, and takes back a collision that noise alone
+/// explains. `fitted` is the least gap of surfaces fitted to neighbouring contact pixels, if there are any.
+pub(crate) fn allow_for_noise(result: &mut PairResult, fitted: Option<f32>, query: &PairQuery) {
+    let noise = 0.5 * (query.a.noise().powi(2) + query.b.noise().powi(2));
+    if noise == 0.0 {
+        return;
+    }
+    let closer = CLOSER_PX * noise / query.params.pixel_size;
+    result.gap = fitted.or(result.gap).map(|gap| gap + closer);
+    result.collides &= fitted.is_some_and(|gap| gap + closer < 0.0);
+}
