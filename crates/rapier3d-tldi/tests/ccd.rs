@@ -98,3 +98,40 @@ fn fast_slides_go_on() -> TestResult {
     assert!((moved - 4.5).abs() < 0.05, "{moved}");
     Ok(())
 }
+
+/// A wall with new points in every step that gives way by more than rapier's prediction distance, but by
+/// less than its mean radius: a body that is faster does not keep its speed behind it.
+#[test]
+fn what_gives_way_slowly_stops_what_is_fast() -> TestResult {
+    const RADIUS: f32 = 0.1;
+    let (mut world, mut tldi) = attached();
+    world.gravity = Vector::ZERO;
+    let mut rng = fastrand::Rng::with_seed(1);
+    let mut wall_at = |x: f32| -> Vec<Vector> {
+        let mut jitter = || 0.5 * RADIUS * (rng.f32() - 0.5);
+        let grid = (0..441).map(|k| RADIUS * Vector::new(0.0, (k / 21) as f32, (k % 21) as f32));
+        let middle = RADIUS * Vector::new(0.0, 10.0, 10.0);
+        grid.map(|p| p - middle + Vector::new(x, jitter(), jitter()))
+            .collect()
+    };
+    let wall = PointCloud::builder(wall_at(1.0)).radius(RADIUS).build()?;
+    let wall = PointCloudShape::new(wall);
+    let (_, wall) = world.insert(RigidBodyBuilder::fixed(), cloud_collider(wall));
+    let flying = RigidBodyBuilder::dynamic().linvel(30.0 * Vector::X);
+    let (ball, _) = world.insert(flying, ColliderBuilder::ball(0.2));
+    let per_step = 0.05;
+    assert!(per_step > 2.0 * world.integration_parameters.prediction_distance());
+    for step in 1..=12 {
+        tldi.set_points(
+            &mut world,
+            wall,
+            &wall_at(1.0 + per_step * step as f32),
+            None,
+        )?;
+        tldi.step(&mut world)?;
+    }
+    let speed = world.bodies[ball].linvel().x;
+    let of_wall = per_step / world.integration_parameters.dt;
+    assert!(speed < 1.5 * of_wall, "{speed} m/s behind {of_wall} m/s");
+    Ok(())
+}
