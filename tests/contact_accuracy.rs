@@ -48,18 +48,10 @@ fn spheres() {
     check(is_sphere, NORMAL_LIMIT, SHALLOW_LIMIT, DEEP_LIMIT);
 }
 
+/// With normals and without: where those bend at the rim of a face the plane of all its gaps counts.
 #[test]
-fn box_faces_with_normals() {
-    let keep = |row: &AccuracyRow| is_box(row) && row.with_normals;
-    check(keep, NORMAL_LIMIT, SHALLOW_LIMIT, DEEP_LIMIT);
-}
-
-/// Estimated normals bend at the rim of the face, and the splats there reach too deep: 0.16 r̄ of a
-/// wanted 0.1 r̄.
-#[test]
-fn box_faces_without_normals_reach_too_deep_at_the_rim() {
-    let keep = |row: &AccuracyRow| is_box(row) && !row.with_normals;
-    check(keep, NORMAL_LIMIT, 0.2, DEEP_LIMIT);
+fn box_faces() {
+    check(is_box, NORMAL_LIMIT, SHALLOW_LIMIT, DEEP_LIMIT);
 }
 
 /// Pixels as large as the spacing round edges and corners off: these are seen too high, by 0.4 r̄ and

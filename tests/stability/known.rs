@@ -70,6 +70,13 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known("stack", "10 boxes, bare", FOUR_ITERATIONS),
     known("stack", "10 boxes, 12 solver iterations, bare", UNEVEN_GAPS)
         .no_worse_than("top_drift_mean_radii", 1.5),
+    known(
+        "slide",
+        "plane, 10 m/s",
+        "Gaps that change as a box slides push it, which adds friction: it stops 1.8 to 2.0 % short, one seed of \
+         four by more than the 2 %.",
+    )
+    .no_worse_than("hop_mean_radii", 0.5),
     known("slide", "noisy plane, 1 m/s", UNEVEN_GAPS).no_worse_than("heading_deg", 3.0),
     known("slide", "noisy plane, 5 m/s", UNEVEN_GAPS).no_worse_than("hop_mean_radii", 0.7),
     known("bounce", "box, restitution", SOLVER_SPINS)

@@ -375,9 +375,17 @@ impl Shape {
                 roughness,
             };
         }
+        // Chosen for being low, they are lower than the plane of a flat contact by its roughness, if that
+        // is no more than what measured gaps scatter by.
+        let scatter = if rises { 0.0 } else { supports.roughness };
+        let in_plane = |(k, above): (usize, f32)| {
+            let point = points[k];
+            self.point(point.middle(), point.gap - above.clamp(-scatter, scatter))
+        };
+        let chosen = supports.indices.into_iter().zip(supports.above_plane);
         let mut patch = ContactPatch {
             normal: self.normal,
-            points: supports.indices.into_iter().map(|k| points[k]).collect(),
+            points: chosen.map(in_plane).collect(),
             is_round: false,
             roughness,
         };

@@ -9,6 +9,8 @@ use glamx::{Vec2, Vec3};
 pub struct Supports {
     /// Indices of up to [`PATCH_POINTS`] of the points.
     pub indices: ArrayVec<usize, PATCH_POINTS>,
+    /// Their gaps about the plane that fits all gaps best, in metres.
+    pub above_plane: ArrayVec<f32, PATCH_POINTS>,
     /// Standard deviation, in metres, of the gaps about the plane that fits them best.
     pub roughness: f32,
     /// Standard deviation, in metres, of the gaps about the bowl that fits them best: a paraboloid
@@ -125,6 +127,10 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         }
     }
     Supports {
+        above_plane: indices
+            .iter()
+            .map(|&k: &usize| residual(&points[k]))
+            .collect(),
         indices,
         roughness,
         roughness_about_bowl: left.min(roughness),
