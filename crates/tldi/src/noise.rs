@@ -5,7 +5,7 @@ use crate::{PairQuery, PairResult};
 /// How much closer than the surfaces the least fitted gap is taken to be for noise with a standard deviation
 /// of a pixel, in pixels; of other noise its square decides. Measured, so that false and missed collisions
 /// are about as many: two copies of five scans and meshes, noise of 0.25 to 1.5 mean radii, pixels of 0.5 to 3.
-const CLOSER_PX: f32 = 0.5;
+const CLOSER_PX: f32 = 0.7;
 
 /// Raises the gap of `result` by what noise makes of it, and takes back a collision that noise alone
 /// explains. `fitted` is the least gap of surfaces fitted to neighbouring contact pixels, if there are any.
