@@ -68,8 +68,12 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known("rest", "ball, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.3),
     known("stack", "10 boxes, oriented", FOUR_ITERATIONS),
     known("stack", "10 boxes, bare", FOUR_ITERATIONS),
-    known("stack", "10 boxes, 12 solver iterations, bare", UNEVEN_GAPS)
-        .no_worse_than("top_drift_mean_radii", 1.5),
+    known(
+        "stack",
+        "10 boxes, 12 solver iterations",
+        "Of 24 stacks 20 stand within a radius and three fall. What a contact's gaps scatter by counts as touching, \
+         so that each box can lean by a hundredth of a degree; that this adds up to the fall is likely, not shown.",
+    ),
     known(
         "slide",
         "plane, 10 m/s",
