@@ -268,7 +268,9 @@ impl Shape for PointCloudShape {
         let cloud = self.cloud();
         let largest = scale.abs().max_element();
         let points: Vec<Vec3> = cloud.points().map(|p| p * scale).collect();
-        let mut builder = PointCloud::builder(points).non_finite(NonFinite::Refuse);
+        let mut builder = PointCloud::builder(points)
+            .noise(cloud.noise() * largest)
+            .non_finite(NonFinite::Refuse);
         builder = match cloud.radii() {
             Radii::Global(radius) => builder.radius(radius * largest),
             Radii::PerPoint(radii) => {

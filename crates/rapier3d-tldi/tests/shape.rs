@@ -285,6 +285,12 @@ fn scaling_keeps_the_cover_and_the_outside() {
         assert!(scaled.cloud().normals().unwrap()[i].distance(normal) < 1e-5);
     }
     assert!(scaled.cloud().normals_oriented());
+    let points: Vec<Vec3> = shape.cloud().points().collect();
+    let noisy = PointCloud::builder(points).radius(0.1).noise(0.01);
+    let noisy = PointCloudShape::new(noisy.build().unwrap());
+    let scaled = noisy.scale_dyn(scale, 0).unwrap();
+    let scaled = scaled.as_shape::<PointCloudShape>().unwrap();
+    assert_eq!(scaled.cloud().noise(), 0.02);
     assert!(shape.scale_dyn(Vec3::new(1.0, 0.0, 1.0), 0).is_none());
     assert!(shape.scale_dyn(Vec3::new(1.0, f32::NAN, 1.0), 0).is_none());
     let doubled = PointCloudShape::new(plane(5, true)).scale_dyn(Vec3::new(2.0, 1.0, 1.0), 0);
