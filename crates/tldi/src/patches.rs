@@ -375,9 +375,9 @@ impl Shape {
                 roughness,
             };
         }
-        // Chosen for being low, they are lower than the plane of a flat contact by its roughness, if that
-        // is no more than what measured gaps scatter by.
-        let scatter = if rises { 0.0 } else { supports.roughness };
+        // Chosen for being low, they are lower than the plane of a flat contact by what its gaps scatter by.
+        // What bends, or is rougher than that, is as low as it is.
+        let scatter = if rises { 0.0 } else { roughness };
         let in_plane = |(k, above): (usize, f32)| {
             let point = points[k];
             self.point(point.middle(), point.gap - above.clamp(-scatter, scatter))
