@@ -10,22 +10,15 @@ use tldi::{
     Surface, View, VirtualCamera,
 };
 use tldi_tests::{
-    HalfSpace, Samples, aimed, gpu_backend, random_pose, random_unit, sampled_box, sampled_plane,
-    sampled_sphere,
+    HalfSpace, Samples, aimed, compare_on, gpu_backend, random_pose, random_unit, sampled_box,
+    sampled_plane, sampled_sphere,
 };
 use tldi_wgpu::{AdapterChoice, AutoBackend, Gpu, WgpuBackend, wgpu};
 
 const R: f32 = 0.02;
 
 fn on_cpu(batch: &[PairQuery<'_>]) -> Vec<PairResult> {
-    compared(&mut CpuBackend::new(), batch)
-}
-
-fn compared(backend: &mut dyn Backend, batch: &[PairQuery<'_>]) -> Vec<PairResult> {
-    let mut results = Vec::new();
-    let outcome = backend.compare(batch, &mut results);
-    outcome.expect("the queries are supported");
-    results
+    compare_on(&mut CpuBackend::new(), batch)
 }
 
 /// A ball, a box or a sheet, with or without normals, with equal radii or not.
@@ -132,7 +125,7 @@ fn thinned_clouds_are_those_of_the_cpu() {
         // Every third point.
         query.params = Params::for_radius(5.5 * R);
     }
-    let all = Difference::between(&on_cpu(&batch), &compared(&mut gpu, &batch));
+    let all = Difference::between(&on_cpu(&batch), &compare_on(&mut gpu, &batch));
     assert!(all.answers == 0 && all.contacts > 200, "{all:?}");
     assert!(100 * all.other_contacts <= all.contacts, "{all:?}");
 }
@@ -145,7 +138,7 @@ fn contacts_are_those_of_the_cpu() {
     };
     let pairs = random_pairs(0..120);
     let batch = queries(&pairs);
-    let found = Difference::between(&on_cpu(&batch), &compared(&mut gpu, &batch));
+    let found = Difference::between(&on_cpu(&batch), &compare_on(&mut gpu, &batch));
     eprintln!("{found:?}");
     assert!(found.pairs == 120 && found.contacts > 10_000, "{found:?}");
     // A swap of two surfaces within rounding of each other may be seen by one only.
@@ -155,42 +148,6 @@ fn contacts_are_those_of_the_cpu() {
     assert!(found.axis < 2e-3, "{found:?}");
     assert!(found.gap < 0.05, "{found:?}");
     assert!(found.other_contacts * 100 < found.contacts, "{found:?}");
-}
-
-/// Sheets that end beside a wall, whose last splats are in its pixels, or go on behind it.
-#[test]
-fn walls_are_pierced_by_what_goes_on_behind_them() {
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
-    let mut rng = fastrand::Rng::with_seed(12);
-    let sheet = sampled_plane(0.4, R, &mut rng).bare_cloud(R);
-    let upright = 0.5 * std::f32::consts::PI * Vec3::Z;
-    let beyond_edge: Vec<f32> = (0..60).map(|_| 4.0 * (rng.f32() - 0.5) * R).collect();
-    let query = |beyond: &f32| PairQuery {
-        view: View::Fixed(VirtualCamera::along(-Vec3::Y, R)),
-        ..aimed(
-            Surface::Cloud(&sheet),
-            Surface::Cloud(&sheet),
-            Pose3::new(Vec3::new(0.2 + beyond, 0.05, 0.0), upright),
-            Params::for_radius(R),
-        )
-    };
-    let batch: Vec<PairQuery> = beyond_edge.iter().map(query).collect();
-    let (cpu, gpu) = (on_cpu(&batch), compared(&mut gpu, &batch));
-    for (result, beyond) in cpu.iter().zip(beyond_edge) {
-        // In between, it depends on where the outermost samples are.
-        if !(-0.5 * R..=0.8 * R).contains(&beyond) {
-            assert_eq!(result.collides, beyond < 0.0, "{beyond}");
-        }
-    }
-    let differ = cpu
-        .iter()
-        .zip(&gpu)
-        .filter(|(c, g)| c.collides != g.collides);
-    // Where a splat ends within rounding of a pixel's middle.
-    let differing = differ.count();
-    assert!(differing <= 5, "{differing}");
 }
 
 /// With given normals, one given view along an axis of the frame, and coordinates and pixels that
@@ -223,7 +180,7 @@ fn pixels_are_equal_where_nothing_is_rounded() {
                 Params::for_radius(pixel),
             )
         };
-        let (cpu, gpu) = (on_cpu(&[query]), compared(&mut gpu, &[query]));
+        let (cpu, gpu) = (on_cpu(&[query]), compare_on(&mut gpu, &[query]));
         let pixels = |result: &PairResult| -> Vec<_> {
             let contacts = result.contacts.iter();
             contacts.map(|c| (c.view, c.pixel)).collect()
@@ -264,7 +221,7 @@ fn policies_are_those_of_the_cpu() {
                 ..query
             })
             .collect();
-        let found = Difference::between(&on_cpu(&batch), &compared(&mut gpu, &batch));
+        let found = Difference::between(&on_cpu(&batch), &compare_on(&mut gpu, &batch));
         eprintln!("{policy:?} {found:?}");
         assert!(found.answers <= 1, "{policy:?} {found:?}");
         assert!(found.axis < 2e-3, "{policy:?} {found:?}");
@@ -284,10 +241,10 @@ fn results_are_the_same_every_time() {
     };
     let pairs = random_pairs(300..316);
     let batch = queries(&pairs);
-    let first = compared(&mut gpu, &batch);
-    assert_eq!(first, compared(&mut gpu, &batch));
+    let first = compare_on(&mut gpu, &batch);
+    assert_eq!(first, compare_on(&mut gpu, &batch));
     for (query, expected) in batch.iter().zip(&first) {
-        assert_eq!(expected, &compared(&mut gpu, &[*query])[0]);
+        assert_eq!(expected, &compare_on(&mut gpu, &[*query])[0]);
     }
 }
 
@@ -309,7 +266,7 @@ fn batches_that_outgrow_the_buffers_are_redone() {
     // Cold, with the least buffers: 62,500 points a side, as many pixels, three times the contacts
     // that fit at first.
     let mut cold = WgpuBackend::new(gpu.gpu().clone()).expect("there is a device");
-    let (cpu, gpu) = (on_cpu(&[query]), compared(&mut cold, &[query]));
+    let (cpu, gpu) = (on_cpu(&[query]), compare_on(&mut cold, &[query]));
     assert!(cpu[0].contacts.len() > 50_000, "{}", cpu[0].contacts.len());
     let missing = cpu[0].contacts.len().abs_diff(gpu[0].contacts.len());
     assert!(missing * 1000 < cpu[0].contacts.len(), "{missing}");
@@ -350,7 +307,7 @@ fn what_the_gpu_does_not_take_the_cpu_compares() {
     };
     let exact = above(Surface::Exact(&HalfSpace));
     let batch = [crowded, above(Surface::Cloud(&ball)), paper, exact];
-    let (cpu, gpu) = (on_cpu(&batch), compared(&mut backend, &batch));
+    let (cpu, gpu) = (on_cpu(&batch), compare_on(&mut backend, &batch));
     assert_eq!(backend.pairs_on_cpu(), 3);
     assert_eq!(cpu[0], gpu[0]);
     assert_eq!(cpu[2], gpu[2]);
@@ -378,7 +335,7 @@ fn clouds_follow_their_points() {
             Pose3::translation(0.0, height, 0.0),
             Params::for_radius(R),
         );
-        let found = Difference::between(&on_cpu(&[query]), &compared(&mut gpu, &[query]));
+        let found = Difference::between(&on_cpu(&[query]), &compare_on(&mut gpu, &[query]));
         assert!(found.answers == 0 && found.gap < 0.05, "{frame}: {found:?}");
     }
 }
@@ -395,7 +352,7 @@ fn a_lost_device_loses_nothing() {
     let batch = queries(&pairs);
     let open = || Gpu::open(AdapterChoice::Any).and_then(WgpuBackend::new);
     let mut alone = open().expect("there is a device");
-    let before = compared(&mut alone, &batch);
+    let before = compare_on(&mut alone, &batch);
     alone.gpu().device().destroy();
     let error = alone
         .compare(&batch, &mut Vec::new())
@@ -405,10 +362,10 @@ fn a_lost_device_loses_nothing() {
     let gpu = open().expect("there is a device");
     let device = gpu.gpu().device().clone();
     let mut auto = AutoBackend::with_gpu(gpu, 0);
-    assert_eq!(before, compared(&mut auto, &batch));
+    assert_eq!(before, compare_on(&mut auto, &batch));
     assert_eq!((auto.name(), auto.fallback()), ("gpu", None));
     device.destroy();
-    assert_eq!(on_cpu(&batch), compared(&mut auto, &batch));
+    assert_eq!(on_cpu(&batch), compare_on(&mut auto, &batch));
     assert_eq!((auto.name(), auto.adapter()), ("cpu", None));
     assert!(
         auto.fallback()
@@ -425,7 +382,7 @@ fn small_batches_stay_on_the_cpu() {
     let pairs = random_pairs(500..502);
     let batch = queries(&pairs);
     let mut auto = AutoBackend::with_gpu(gpu, 1_000_000);
-    assert_eq!(on_cpu(&batch), compared(&mut auto, &batch));
+    assert_eq!(on_cpu(&batch), compare_on(&mut auto, &batch));
     assert_eq!((auto.name(), auto.fallback()), ("cpu", None));
 }
 
@@ -460,7 +417,7 @@ fn views_along_the_axes_have_the_frames_of_the_cpu() {
                 Params::for_radius(R),
             )
         };
-        let found = Difference::between(&on_cpu(&[query]), &compared(&mut gpu, &[query]));
+        let found = Difference::between(&on_cpu(&[query]), &compare_on(&mut gpu, &[query]));
         assert!(
             found.answers == 0 && found.other_contacts <= 2,
             "{axis}: {found:?}"
@@ -500,7 +457,7 @@ fn a_device_without_room_loses_nothing() {
         .expect_err("there is no room");
     assert!(error.to_string().contains("1048576 are allowed"), "{error}");
     let mut auto = AutoBackend::with_gpu(open(), 0);
-    assert_eq!(on_cpu(&batch), compared(&mut auto, &batch));
+    assert_eq!(on_cpu(&batch), compare_on(&mut auto, &batch));
     assert!(
         auto.fallback()
             .is_some_and(|reason| reason.contains("allowed"))

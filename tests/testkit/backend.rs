@@ -14,13 +14,18 @@ pub fn compare_batch(batch: &[PairQuery<'_>]) -> Vec<PairResult> {
         static BACKEND: RefCell<Box<dyn Backend>> =
             RefCell::new(BackendChoice::Auto.open().expect("the backend is there"));
     }
-    BACKEND.with_borrow_mut(|backend| {
-        let mut results = Vec::new();
-        backend
-            .compare(batch, &mut results)
-            .expect("the queries are supported");
-        results
-    })
+    BACKEND.with_borrow_mut(|backend| compare_on(&mut **backend, batch))
+}
+
+/// Compares a batch on a backend.
+///
+/// # Panics
+/// If a query is not supported.
+pub fn compare_on(backend: &mut dyn Backend, batch: &[PairQuery<'_>]) -> Vec<PairResult> {
+    let mut results = Vec::new();
+    let outcome = backend.compare(batch, &mut results);
+    outcome.expect("the queries are supported");
+    results
 }
 
 /// A GPU backend, on a software driver where there is no GPU; `None` (said loudly) where there is

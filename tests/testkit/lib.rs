@@ -17,7 +17,7 @@ pub use accuracy::{
     ContactClouds, ContactPair, ContactShape, DEEP_LIMIT, NORMAL_LIMIT, Regime, SHALLOW_LIMIT,
     measure_accuracy,
 };
-pub use backend::{compare_batch, gpu_backend};
+pub use backend::{compare_batch, compare_on, gpu_backend};
 pub use data::{data_file, load_cloud};
 pub use half_space::HalfSpace;
 pub use host::Host;

@@ -1,20 +1,15 @@
 //! From candidate pairs to the entries of a batch.
 
 use crate::TldiConfig;
-use crate::candidates::{Candidate, effective_prediction, parent_of, pose_of};
+use crate::candidates::{Candidate, contact_reach, effective_prediction, parent_of, pose_of};
 use crate::exact::ExactShape;
 use crate::measured::Measured;
-use crate::parts::{Hint, ShapePair, append_part_pairs, clouds_of, within_reach};
+use crate::parts::{Hint, ShapePair, append_part_pairs, within_reach};
 use crate::prepared::{Batch, PairKey, PreparedPair};
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet};
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Contacts are looked for up to the way that bodies close in a step, but no farther than this many mean
-/// radii: rapier keeps those that are reached within it. A surface that is new in every step may be out of
-/// its prediction distance every time, while sweeps stop the body before it again and again.
-const AHEAD: f32 = 1.0;
 
 /// All that a batch is made from.
 pub(crate) struct Frame<'a> {
@@ -42,7 +37,7 @@ impl<'a> Frame<'a> {
         let pos12 = pose1.inv_mul(&pose_of(collider2, self.bodies));
         let prediction = effective_prediction(collider1, collider2, self.bodies, self.integration);
         let (shape1, shape2) = (collider1.shape(), collider2.shape());
-        let reach = prediction.max(self.look_ahead([collider1, collider2]));
+        let reach = contact_reach(collider1, collider2, self.bodies, self.integration);
         if !within_reach(shape1, shape2, &pos12, reach) {
             return;
         }
@@ -61,11 +56,11 @@ impl<'a> Frame<'a> {
             .filter(|measured| !is_measured_anew && measured.holds(&pos12, prediction));
         let first_part = batch.parts.len();
         if kept.is_none() {
-            let pair = ShapePair {
+            let within_reach = ShapePair {
                 prediction: reach,
                 ..pair
             };
-            self.push_parts(pair, candidate, &pose1, batch, sides);
+            self.push_parts(within_reach, candidate, &pose1, batch, sides);
         }
         batch.push(
             PairKey::new(shape1, shape2, &pos12),
@@ -80,21 +75,6 @@ impl<'a> Frame<'a> {
                 _shapes: [collider1, collider2].map(|c| c.shared_shape().clone()),
             },
         );
-    }
-
-    /// How far the two come nearer in the step at the most, metres, up to [`AHEAD`].
-    fn look_ahead(&self, colliders: [&Collider; 2]) -> f32 {
-        let [velocity1, velocity2] = colliders.map(|collider| {
-            let body = parent_of(collider, self.bodies);
-            body.map_or(Vector::ZERO, RigidBody::linvel)
-        });
-        let coarsest = colliders
-            .into_iter()
-            .flat_map(|collider| clouds_of(collider.shape()))
-            .map(|cloud| cloud.mean_radius())
-            .fold(0.0, f32::max);
-        let way = (velocity2 - velocity1).length() * self.integration.dt;
-        way.min(AHEAD * coarsest)
     }
 
     fn push_parts(

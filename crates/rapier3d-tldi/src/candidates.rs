@@ -4,7 +4,7 @@
 //! step, by the same rules: enabled colliders, parents, body types, groups, sleep, and bounds
 //! loosened like those in its broad phase. A pair that is missed here is compared on the spot.
 
-use crate::parts::has_cloud;
+use crate::parts::{clouds_of, has_cloud};
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet, RigidBodyType};
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
@@ -13,6 +13,11 @@ use rapier3d::math::{Pose, Vector};
 /// motions, in units of `length_unit`: twice `CHANGE_DETECTION_FACTOR` in rapier3d's
 /// `broad_phase_bvh/mod.rs`, since a collider may have moved by as much inside them.
 const BROAD_PHASE_SLACK: f32 = 2.0 * 0.04;
+
+/// How far contacts are looked for where bodies close fast, in mean radii of the coarser cloud: a surface that
+/// is new in every step may be out of rapier's prediction distance every time, while sweeps stop the body
+/// before it again and again.
+const AHEAD: f32 = 1.0;
 
 /// Two colliders whose loosened bounds overlap and of which at least one holds a cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -221,6 +226,26 @@ pub(crate) fn effective_prediction(
         })
     };
     base.max(dt * (velocity(body1) - velocity(body2)).length()) + skins
+}
+
+/// The gap up to which contacts are looked for, in metres: as far as rapier asks, or as the bodies close
+/// in the step, but then no farther than [`AHEAD`]. Rapier keeps what is reached within the step.
+pub(crate) fn contact_reach(
+    collider1: &Collider,
+    collider2: &Collider,
+    bodies: &RigidBodySet,
+    integration: &IntegrationParameters,
+) -> f32 {
+    let [velocity1, velocity2] = [collider1, collider2].map(|collider| {
+        let body = parent_of(collider, bodies);
+        body.map_or(Vector::ZERO, RigidBody::linvel)
+    });
+    let coarsest = clouds_of(collider1.shape())
+        .chain(clouds_of(collider2.shape()))
+        .map(|cloud| cloud.mean_radius())
+        .fold(0.0, f32::max);
+    let way = (velocity2 - velocity1).length() * integration.dt;
+    effective_prediction(collider1, collider2, bodies, integration).max(way.min(AHEAD * coarsest))
 }
 
 /// Whether rapier lets the two collide, joints and user hooks left aside.

@@ -1,6 +1,6 @@
 //! Pictures of what the pipeline sees, through rapier's debug renderer.
 
-use crate::candidates::{effective_prediction, pose_of};
+use crate::candidates::{contact_reach, pose_of};
 use crate::exact::ExactShape;
 use crate::manifolds;
 use crate::parts::{
@@ -24,7 +24,7 @@ bitflags::bitflags! {
         /// three lines where the cloud has no normals. At most [`DEBUG_POINT_LIMIT`] a cloud.
         const POINTS = 1 << 0;
         /// For each pair of parts the region in which contacts are sought: where the bounds of the
-        /// first, grown by the prediction distance, and those of the second meet. A box along the
+        /// first, grown by how far contacts are looked for, and those of the second meet. A box along the
         /// axes of the first part.
         const CONTACT_ZONE = 1 << 1;
         /// For each view of a pair its axis, as long as four pixels, and the rectangle of the
@@ -165,7 +165,7 @@ impl TldiPipeline {
                 shape1: collider1.shape(),
                 shape2: collider2.shape(),
                 pos12: pose1.inv_mul(&pose_of(collider2, bodies)),
-                prediction: effective_prediction(collider1, collider2, bodies, integration),
+                prediction: contact_reach(collider1, collider2, bodies, integration),
             };
             comparison.compare(self, pair, &shapes)?;
             let mut drawing = Drawing {

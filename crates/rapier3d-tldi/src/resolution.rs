@@ -84,17 +84,14 @@ impl Resolution {
             return 1.0;
         };
         let share = (seconds / budget.as_secs_f64()) as f32;
-        let mut next = coarsening;
-        if share > 1.0 {
-            next *= COARSER;
-            while saves_nothing(next) {
-                next *= COARSER;
-            }
-        } else if share < LEFT {
-            next /= COARSER;
-            while saves_nothing(next) {
-                next /= COARSER;
-            }
+        let step = match share {
+            _ if share > 1.0 => COARSER,
+            _ if share < LEFT => COARSER.recip(),
+            _ => return coarsening,
+        };
+        let mut next = step * coarsening;
+        while saves_nothing(next) {
+            next *= step;
         }
         next.clamp(1.0, COARSEST)
     }

@@ -3,8 +3,9 @@
 use crate::{PairQuery, PairResult};
 
 /// How much closer than the surfaces the least fitted gap is taken to be for noise with a standard deviation
-/// of a pixel, in pixels; of other noise its square decides. Measured, so that false and missed collisions
-/// are about as many: two copies of five scans and meshes, noise of 0.25 to 1.5 mean radii, pixels of 0.5 to 3.
+/// of a pixel, in pixels; of other noise its square decides. Measured with `accuracy --variant told`, noise of
+/// 0.25 to 1.5 mean radii and pixels of 0.5 to 3: more makes for fewer false collisions of scans, but misses
+/// contacts of meshes of 1,000 points.
 const CLOSER_PX: f32 = 0.7;
 
 /// Raises the gap of `result` by what noise makes of it, and takes back a collision that noise alone
