@@ -371,8 +371,9 @@ fn the_panda_reaches_into_the_kitchen() {
     assert!(number(&report["contact_steps"]) > 0.0);
     assert_eq!(report["pairs_missed"], 0);
     for link in report["links"].as_array().unwrap() {
-        // Its strongest motors have 87 N·m: 870 N at 10 cm, and a blow may double it.
-        assert!(number(&link["max_force"]) < 1800.0, "{link}");
+        // Its strongest motors have 87 N·m: 1450 N at 6 cm, half of its thinnest arm, where a wedge between
+        // two walls may hold it; and a blow may double it.
+        assert!(number(&link["max_force"]) < 2900.0, "{link}");
     }
     // Half of its thinnest arm, of 12 cm: no link is half through.
     assert!(number(&report["max_penetration"]) < 0.06, "{report}");

@@ -47,8 +47,6 @@ const fn known(
 }
 
 /// Several rows fail for each of these.
-const UNEVEN_GAPS: &str = "The gaps of one flat contact differ by up to 0.2 r̄ from point to point, \
-                           and so do the times at which its points touch.";
 const RESAMPLED: &str =
     "New samples bring new gaps in every frame, which push although nothing moved.";
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
@@ -58,32 +56,15 @@ const DEEP_IN_WAVES: &str = "Four of 1,000 hits: a wave that rises faster than r
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
                             it spins off, as the primitive does, with a little less height, and may land \
                             again with up to 10 % more energy.";
-const FOUR_ITERATIONS: &str = "Rapier's default of 4 solver iterations does not bear ten boxes whose faces are \
-                              not known exactly: of its own hulls with corners off by 0.1 r̄ three of five \
-                              stacks fall, exact ones lean, and meshes fall; with 12 iterations clouds \
-                              stand.";
+const SOFT_COLUMN: &str = "Of 600 stacks 15 drift by up to 1.2 r̄ and one falls with rapier's default of 4 solver iterations, \
+                           in which its own cuboids lean by 0.5 r̄; with 12 all of 600 stand within 0.8 r̄.";
 
 /// All of them.
 pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known("rest", "ball, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.3),
-    known("stack", "10 boxes, oriented", FOUR_ITERATIONS),
-    known("stack", "10 boxes, bare", FOUR_ITERATIONS),
-    known(
-        "stack",
-        "10 boxes, 12 solver iterations",
-        "Of 24 stacks 19 stand within a radius and four fall: they lean from the first second on, each contact a \
-         little more, as a soft column buckles; also without what counts as touching. Why columns of rapier's \
-         own boxes do not is not known.",
-    ),
-    known(
-        "slide",
-        "plane, 10 m/s",
-        "Gaps that change as a box slides push it, which adds friction: it stops 1.7 to 2.1 % short, two seeds \
-         of twelve by more than the 2 %.",
-    )
-    .no_worse_than("hop_mean_radii", 0.5),
-    known("slide", "noisy plane, 1 m/s", UNEVEN_GAPS).no_worse_than("heading_deg", 3.0),
-    known("slide", "noisy plane, 5 m/s", UNEVEN_GAPS).no_worse_than("hop_mean_radii", 0.7),
+    known("rest", "bunny, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.012),
+    known("stack", "10 boxes, oriented", SOFT_COLUMN).no_worse_than("top_drift_mean_radii", 1.3),
+    known("stack", "10 boxes, bare", SOFT_COLUMN),
     known("bounce", "box, restitution", SOLVER_SPINS)
         .no_worse_than("most_energy_over_initial", 1.11),
     known("thin-sheet", "box on each of two sheets, bare", ONE_LAYER),
@@ -109,7 +90,13 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
          at one angle of one seed in five a depth of 10 r̄ is made up.",
     )
     .no_worse_than("worst_gap_error_mean_radii", 10.0),
-    known("scale-shift", "box of 100 m", UNEVEN_GAPS).no_worse_than("shift_mean_radii", 0.2),
+    known(
+        "grazing",
+        "ball in a groove, oriented",
+        "At one angle of one seed in 40 the ball's contact with one side is so rough that a depth of 0.2 r̄ counts \
+         as scatter.",
+    )
+    .no_worse_than("worst_gap_error_mean_radii", 0.31),
 ];
 
 /// The declared cause of a failure, if there is one.

@@ -170,9 +170,14 @@ fn deforming_floors_carry_what_stands_on_them() -> TestResult {
         ] {
             let [behind, slower] = carried(velocity, floor_first, true)?;
             let case = format!("{velocity}, floor first {floor_first}: {behind} m, {slower} m/s");
-            // Where new corners bear the cube in every step it rocks a little. Friction of 0.5 brings
-            // it to the speed within 0.1 s and 25 mm.
-            assert!(behind.length() < 1.5 * SPACING, "{case}");
+            // Friction of 0.5 brings it to the speed within 0.1 s and 25 mm. A floor that rises by 0.2 r̄ in
+            // every step lifts it corner by corner: it rocks, and walks by up to a fifth of the way.
+            let aside = 0.025 + 0.2 * velocity.y;
+            assert!(
+                behind.with_y(0.0).length() < aside + 0.5 * SPACING,
+                "{case}"
+            );
+            assert!(behind.y.abs() < 0.25 * SPACING, "{case}");
             assert!(slower.with_y(0.0).length() < 0.2, "{case}");
         }
     }

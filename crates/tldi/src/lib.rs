@@ -20,6 +20,7 @@ mod impact;
 mod knn;
 mod links;
 mod lone_points;
+mod main_plane;
 mod morton;
 mod noise;
 mod normals;

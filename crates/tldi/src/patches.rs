@@ -59,9 +59,14 @@ const DEEPER: f32 = 0.4;
 /// of a small face whose rim is blurred by estimated normals by 0.1.
 const LEAST_RISE: f32 = 0.15;
 
-/// Variance (1 − mean length) that a surface's normals are taken to have at least: keeps the
-/// weights of two perfectly flat surfaces finite.
-const LEAST_VARIANCE: f32 = 0.01;
+/// Most that a point of a flat contact may be off its plane to be moved onto it, in pixels: what estimated
+/// normals make of the rims of two faces. What is lower still is a body of its own.
+const OFF_PLANE: f32 = 0.3;
+
+/// Variance (1 − mean length) that a surface's normals are taken to have at least, 1.4°: keeps the weights
+/// of two perfectly flat surfaces finite. Were it 0.01, a box's sides, which a moving view sees as
+/// well, would tilt the normal by 0.6°, and a floor brake what slides over it by 2 % more.
+const LEAST_VARIANCE: f32 = 3e-4;
 
 /// A contact pixel after averaging over its linked neighbours.
 #[derive(Clone, Copy, Debug)]
@@ -378,6 +383,8 @@ impl Shape {
         // Chosen for being low, they are lower than the plane of a flat contact by what its gaps scatter by.
         // What bends, or is rougher than that, is as low as it is.
         let scatter = if rises { 0.0 } else { roughness };
+        let off_plane = (OFF_PLANE * params.pixel_size - scatter).max(0.0);
+        let scatter = scatter + supports.flatness * off_plane;
         let in_plane = |(k, above): (usize, f32)| {
             let point = points[k];
             self.point(point.middle(), point.gap - above.clamp(-scatter, scatter))
@@ -391,7 +398,9 @@ impl Shape {
         };
         patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
         let deepest = self.deepest(points, params);
-        if rises && deepest.gap < patch.points[0].gap - DEEPER * supports.roughness {
+        let deeper =
+            DEEPER * supports.roughness + supports.flatness * SUPPORT_BAND * params.pixel_size;
+        if rises && deepest.gap < patch.points[0].gap - deeper {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
         }
