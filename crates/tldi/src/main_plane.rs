@@ -5,6 +5,10 @@ use glamx::{Mat3, Vec2, Vec3};
 /// Fewer heights tell nothing of a plane.
 const LEAST_HEIGHTS: usize = 12;
 
+/// Of more heights every second, third and so on is enough: they tell a plane to a twentieth of their
+/// deviation.
+const MOST_HEIGHTS: usize = 384;
+
 /// Rounds of the fit, and by how much the deviation that counts shrinks in each: from all that there
 /// are to `near`, a factor of 20.
 const ROUNDS: i32 = 6;
@@ -39,17 +43,19 @@ impl Plane {
     ///
     /// Least squares, weighted anew in each round with ever narrower Geman–McClure weights (Blake and
     /// Zisserman's graduated non-convexity, doi 10.7551/mitpress/7132.001.0001). Places should have about
-    /// unit variance. Cost: seven passes.
+    /// unit variance. Cost: seven passes over at most 384 heights.
     pub(crate) fn of_most(
         self,
         heights: impl ExactSizeIterator<Item = (Vec2, f32)> + Clone,
         spread: f32,
         near: f32,
     ) -> (Self, f32) {
-        let count = heights.len();
-        if count < LEAST_HEIGHTS {
+        if heights.len() < LEAST_HEIGHTS {
             return (self, 0.0);
         }
+        let stride = heights.len().div_ceil(MOST_HEIGHTS);
+        let heights = heights.step_by(stride);
+        let count = heights.len();
         let mut plane = self;
         for round in 1..=ROUNDS {
             let scale = (spread * NARROWER.powi(round)).max(near);
