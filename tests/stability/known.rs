@@ -72,7 +72,7 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "tunnelling",
         "scan",
-        "Eight of 10,000 hits: of a small body that is deep in a rough scan without normals a further \
+        "Six of 10,000 hits: of a small body that is deep in a rough scan without normals a further \
          view takes the wrong side.",
     )
     .no_worse_than("passed_share", 0.03),
