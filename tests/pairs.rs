@@ -184,6 +184,40 @@ fn a_box_deep_in_a_floor() {
 
 /// A box in a corner touches floor and wall, each with its own normal: a cube, which one view
 /// between both sees, and a slab, whose narrow side takes a view of its own.
+/// A bump under a face is no error of its rim: the face is supported there.
+#[test]
+fn a_face_on_a_bump() {
+    let mut rng = fastrand::Rng::with_seed(8);
+    for height in [0.6 * R, 0.8 * R] {
+        let mut floor = sampled_plane(0.4, R, &mut rng);
+        let top = Vec3::new(0.02, 0.0, -0.01);
+        for (point, normal) in floor.points.iter_mut().zip(&mut floor.normals) {
+            let off = *point - top;
+            // A sphere's cap, 2.5 r̄ wide on each side.
+            let radius = (6.25 * R * R + height * height) / (2.0 * height);
+            let rise = (radius * radius - off.length_squared()).max(0.0).sqrt() - radius + height;
+            if off.length() < 2.5 * R && rise > 0.0 {
+                *point += rise * Vec3::Y;
+                *normal = (off + (radius - height + rise) * Vec3::Y).normalize();
+            }
+        }
+        let body = sampled_box(Vec3::splat(0.06), R, &mut rng);
+        for [floor, body] in [
+            [floor.cloud(R), body.cloud(R)],
+            [floor.bare_cloud(R), body.bare_cloud(R)],
+        ] {
+            let result = clouds(&floor, &body, Pose3::translation(0.0, 0.06, 0.0));
+            let (gap, middle) = deepest_point(&result).expect("touches");
+            // Pixels and fits blunt it, as they blunt edges.
+            assert!(
+                (-height - 0.1 * R..-0.4 * height).contains(&gap),
+                "{height}: {gap}"
+            );
+            assert!(middle.with_y(0.0).distance(top) < 1.5 * R, "{middle}");
+        }
+    }
+}
+
 #[test]
 fn corner() {
     for seed in 0..40 {

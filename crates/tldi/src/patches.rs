@@ -60,7 +60,7 @@ const DEEPER: f32 = 0.4;
 const LEAST_RISE: f32 = 0.15;
 
 /// Most that a point of a flat contact may be off its plane to be moved onto it, in pixels: what estimated
-/// normals make of the rims of two faces. What is lower still is a body of its own.
+/// normals make of the rims of two faces. What is lower still is a bump under the face.
 const OFF_PLANE: f32 = 0.3;
 
 /// Variance (1 − mean length) that a surface's normals are taken to have at least, 1.4°: keeps the weights
@@ -381,10 +381,10 @@ impl Shape {
             };
         }
         // Chosen for being low, they are lower than the plane of a flat contact by what its gaps scatter by.
-        // What bends, or is rougher than that, is as low as it is.
+        // What bends, or is rougher than that, is as low as it is, but for the rim of a flat contact.
         let scatter = if rises { 0.0 } else { roughness };
-        let off_plane = (OFF_PLANE * params.pixel_size - scatter).max(0.0);
-        let scatter = scatter + supports.flatness * off_plane;
+        let off_plane = OFF_PLANE * params.pixel_size;
+        let scatter = scatter + supports.flatness * (off_plane - scatter).max(0.0);
         let in_plane = |(k, above): (usize, f32)| {
             let point = points[k];
             self.point(point.middle(), point.gap - above.clamp(-scatter, scatter))
@@ -398,9 +398,10 @@ impl Shape {
         };
         patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
         let deepest = self.deepest(points, params);
-        let deeper =
-            DEEPER * supports.roughness + supports.flatness * SUPPORT_BAND * params.pixel_size;
-        if rises && deepest.gap < patch.points[0].gap - deeper {
+        // Where the gaps do not rise only a bump under the face counts.
+        let of_rims = if rises { supports.flatness } else { 1.0 } * off_plane;
+        let deeper = DEEPER * supports.roughness + of_rims;
+        if deepest.gap < patch.points[0].gap - deeper {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
         }

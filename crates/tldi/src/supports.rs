@@ -98,7 +98,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         .sum::<Vec2>()
         / count;
     let plane = Plane::new(mean_gap, slope);
-    let residual = |p: &ContactPoint| plane.below((place(p), p.gap));
+    let residual = |p: &ContactPoint| plane.residual((place(p), p.gap));
     let squares = points.iter().map(|p| residual(p).powi(2)).sum::<f32>();
     // A perfectly flat patch has none, by which nothing can be divided.
     let least = least_roughness.max(f32::MIN_POSITIVE);
@@ -137,7 +137,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     let mut best = [(f32::NEG_INFINITY, 0); PATCH_POINTS];
     for (k, point) in points.iter().enumerate() {
         let place = place(point);
-        let low = -main_plane.below((place, point.gap)) / roughness.max(least);
+        let low = -main_plane.residual((place, point.gap)) / roughness.max(least);
         let low = low.min((1.0 - flatness) * LOWEST);
         for (best, corner) in best.iter_mut().zip(corners) {
             let score = corner.dot(place) + low;
@@ -155,7 +155,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     Supports {
         above_plane: indices
             .iter()
-            .map(|&k: &usize| main_plane.below((place(&points[k]), points[k].gap)))
+            .map(|&k: &usize| main_plane.residual((place(&points[k]), points[k].gap)))
             .collect(),
         flatness,
         indices,
