@@ -129,6 +129,8 @@ mod tests {
                 let seconds = seconds_at_one / f64::from(coarsening).powi(2);
                 last = [last[1], seconds];
                 coarsening = time.coarsened(coarsening, seconds);
+                // Larger pixels without fewer points: they cost more.
+                assert!(coarsening <= CHEAPEST || stride(1.0, coarsening) > 1);
             }
             (last, coarsening)
         };

@@ -61,7 +61,7 @@ const LEAST_RISE: f32 = 0.15;
 
 /// Most that a point of a flat contact may be off its plane to be moved onto it, in pixels: what estimated
 /// normals make of the rims of two faces. What is lower still is a bump under the face.
-const OFF_PLANE: f32 = 0.3;
+const OFF_PLANE: f32 = 0.4;
 
 /// Variance (1 − mean length) that a surface's normals are taken to have at least, 1.4°: keeps the weights
 /// of two perfectly flat surfaces finite. Were it 0.01, a box's sides, which a moving view sees as
