@@ -56,11 +56,11 @@ impl<'a> Frame<'a> {
             .filter(|measured| !is_measured_anew && measured.holds(&pos12, prediction));
         let first_part = batch.parts.len();
         if kept.is_none() {
-            let within_reach = ShapePair {
+            let looked_for = ShapePair {
                 prediction: reach,
                 ..pair
             };
-            self.push_parts(within_reach, candidate, &pose1, batch, sides);
+            self.push_parts(looked_for, candidate, &pose1, batch, sides);
         }
         batch.push(
             PairKey::new(shape1, shape2, &pos12),
