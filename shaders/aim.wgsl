@@ -238,7 +238,7 @@ fn is_worthwhile(pair: u32) -> bool {
 // Takes the proposed view, if it tells something.
 fn decide(pair: u32, turn: u32) {
     let policy = pairs[pair].policy;
-    let is_zone = policy == CONTACT_ZONE
+    let is_zone = policy == CONTACT_ZONE || policy == ALL_DIRECTIONS
         || (policy == LAST_NORMAL && pairs[pair].has_last == 0u);
     if turn > 0u && (!is_zone || !is_worthwhile(pair)) {
         is_done = true;
@@ -268,25 +268,42 @@ fn decide(pair: u32, turn: u32) {
     is_done = !is_zone || is_forced;
 }
 
-// `VirtualCamera::along(axis, ..)`.
-fn push_view(pair: u32, sign: f32) {
+// `VirtualCamera::along(z, ..)`.
+fn view_along(z: vec3f) -> View {
     var view = View();
+    // The sign of a negative zero is negative.
+    let side = select(1.0, -1.0, bitcast<u32>(z.z) >= 0x80000000u);
+    let a = -1.0 / (side + z.z);
+    let b = z.x * z.y * a;
+    view.view_x = vec4f(1.0 + side * z.x * z.x * a, side * b, -side * z.x, 0.0);
+    view.view_y = vec4f(b, side + z.y * z.y * a, -z.y, 0.0);
+    view.view_z = vec4f(z, 0.0);
+    view.axis = z;
+    view.exists = 1u;
+    return view;
+}
+
+// Views across those there are, until axes span all directions: `further_axes`.
+fn push_further_views(pair: u32) {
+    let first = pair * MAX_VIEWS;
+    if view_count == 1u {
+        views[first + 1u] = view_along(views[first].view_x.xyz);
+        views[first + 2u] = view_along(views[first].view_y.xyz);
+    } else {
+        views[first + 2u] = view_along(unit_or(cross(seen[0], seen[1]), views[first].view_x.xyz));
+    }
+    for (var v = view_count; v < MAX_VIEWS; v++) {
+        views[first + v].flags = IS_FURTHER;
+    }
+}
+
+fn push_view(pair: u32, sign: f32) {
+    var view = view_along(axis);
     if pairs[pair].policy == FIXED_VIEW {
         view.view_x = pairs[pair].view_x;
         view.view_y = pairs[pair].view_y;
         view.view_z = pairs[pair].view_z;
-    } else {
-        let z = axis;
-        // The sign of a negative zero is negative.
-        let side = select(1.0, -1.0, bitcast<u32>(z.z) >= 0x80000000u);
-        let a = -1.0 / (side + z.z);
-        let b = z.x * z.y * a;
-        view.view_x = vec4f(1.0 + side * z.x * z.x * a, side * b, -side * z.x, 0.0);
-        view.view_y = vec4f(b, side + z.y * z.y * a, -z.y, 0.0);
-        view.view_z = vec4f(z, 0.0);
     }
-    view.axis = axis;
-    view.exists = 1u;
     for (var s = 0u; s < 2u; s++) {
         let side = 2u * pair + s;
         let middle = dot(view.view_z.xyz, sides[side].middle) + view.view_z.w;
@@ -377,6 +394,9 @@ fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lan
                 decide(pair, turn);
             }
         }
+    }
+    if lane == 0u && pairs[pair].policy == ALL_DIRECTIONS && 0u < view_count && view_count < MAX_VIEWS {
+        push_further_views(pair);
     }
 }
 

@@ -62,7 +62,7 @@ fn continued(from_layer: u32, c: Column, merge_gap: f32) -> f32 {
 }
 
 // Whether a layer of `a` and one of `b` swap their order between two neighbouring pixels.
-fn crosses(look: ptr<function, Look>, a: Column, b: Column, a_next: Column, b_next: Column) -> bool {
+fn swaps(look: ptr<function, Look>, a: Column, b: Column, a_next: Column, b_next: Column) -> bool {
     let merge_gap = (*look).params.merge_gap;
     for (var ka = a.begin; ka < a.end; ka++) {
         if is_edge_on(layers[ka].normal) {
@@ -136,12 +136,13 @@ fn is_on_both_sides(across: vec2f, s: u32, k: u32, place: Place, merge_gap: f32)
 fn is_through(wall: u32, other: u32, s: u32, place: Place, merge_gap: f32) -> bool {
     let rim = 0.5 * merge_gap;
     let depth = layers[other].depth;
-    return layers[wall].near + rim < depth && depth < layers[wall].far - rim
+    return abs(dot(layers[wall].normal, layers[other].normal)) < SAME_FACE
+        && layers[wall].near + rim < depth && depth < layers[wall].far - rim
         && is_on_both_sides(layers[wall].normal.xy, s, other, place, merge_gap);
 }
 
-// Whether a layer of one lies well within a thick layer of the other, a wall seen edge-on, and goes
-// on on both sides of it.
+// Whether a layer of one lies well within a thick layer of the other, a wall seen edge-on, to which it
+// is not parallel, and goes on on both sides of it.
 fn pierces(a: Column, b: Column, place: Place, merge_gap: f32) -> bool {
     for (var ka = a.begin; ka < a.end; ka++) {
         for (var kb = b.begin; kb < b.end; kb++) {
@@ -281,7 +282,8 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     look.middle_b = select(INFINITE, views[view].middles.y, (flags & (MIDDLE_KNOWN << 1u)) != 0u);
     for (var v = 0u; v < MAX_VIEWS; v++) {
         let other = pair * MAX_VIEWS + v;
-        if other != view && views[other].exists != 0u {
+        let is_counted = (flags & IS_FURTHER) != 0u || (views[other].flags & IS_FURTHER) == 0u;
+        if other != view && views[other].exists != 0u && is_counted {
             let axis = views[other].axis;
             look.others[look.other_count] =
                 turned(views[view].view_x, views[view].view_y, views[view].view_z, axis);
@@ -290,18 +292,23 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     }
     let size = views[view].rect_size;
     let pixel = vec2u(in_image % size.x, in_image / size.x);
-    if atomicLoad(&found[pair * PAIR_WORDS + COLLIDES]) == 0u {
+    if atomicLoad(&found[pair * PAIR_WORDS + CROSSINGS]) < CROSSED {
         let place = Place(vec2i(pixel), vec2i(size), k - in_image);
-        var collides = pierces(a, b, place, look.params.merge_gap);
-        if !collides && pixel.x + 1u < size.x {
-            collides = crosses(&look, a, b, column(0u, k + 1u), column(1u, k + 1u));
+        var crossings = PIERCED * u32(pierces(a, b, place, look.params.merge_gap));
+        if pixel.x + 1u < size.x {
+            crossings += SWAPPED
+                * u32(swaps(&look, a, b, column(0u, k + 1u), column(1u, k + 1u)));
         }
-        if !collides && pixel.y + 1u < size.y {
-            collides = crosses(&look, a, b, column(0u, k + size.x), column(1u, k + size.x));
+        if pixel.y + 1u < size.y {
+            crossings += SWAPPED
+                * u32(swaps(&look, a, b, column(0u, k + size.x), column(1u, k + size.x)));
         }
-        if collides {
-            atomicStore(&found[pair * PAIR_WORDS + COLLIDES], 1u);
+        if crossings > 0u {
+            atomicAdd(&found[pair * PAIR_WORDS + CROSSINGS], crossings);
         }
+    }
+    if (flags & IS_FURTHER) != 0u {
+        return;
     }
     let turned_a = turned_from(a, ENTRY, (flags & FROM_BEHIND) != 0u);
     let turned_b = turned_from(b, EXIT, (flags & (FROM_BEHIND << 1u)) != 0u);

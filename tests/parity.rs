@@ -204,6 +204,7 @@ fn policies_are_those_of_the_cpu() {
     let pairs = random_pairs(200..230);
     for policy in [
         CameraPolicy::ContactZone,
+        CameraPolicy::AllDirections,
         CameraPolicy::Motion,
         CameraPolicy::Covariance,
         CameraPolicy::SmallestExtent,

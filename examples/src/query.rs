@@ -101,7 +101,7 @@ impl CloudQuery {
             b: Surface::Cloud(&self.b),
             a_from_b: self.a_from_b,
             view: View::Aim {
-                policy: CameraPolicy::default(),
+                policy: CameraPolicy::AllDirections,
                 motion: self.velocity * FRAME_SECONDS,
                 last_axis: None,
             },

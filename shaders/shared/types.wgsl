@@ -18,6 +18,9 @@ override MAX_DEPTH: f32;
 override LEAST_TILE: i32;
 override FACING: f32;
 override BESIDE: f32;
+override SWAPPED: u32;
+override PIERCED: u32;
+override CROSSED: u32;
 override WELL_SEEN: f32;
 override SUPPORTED: f32;
 override LEAST_SHARE: f32;
@@ -126,11 +129,12 @@ struct Pair {
 
 // Values of `Pair.policy`.
 const CONTACT_ZONE: u32 = 0u;
-const MOTION: u32 = 1u;
-const COVARIANCE: u32 = 2u;
-const SMALLEST_EXTENT: u32 = 3u;
-const LAST_NORMAL: u32 = 4u;
-const FIXED_VIEW: u32 = 5u;
+const ALL_DIRECTIONS: u32 = 1u;
+const MOTION: u32 = 2u;
+const COVARIANCE: u32 = 3u;
+const SMALLEST_EXTENT: u32 = 4u;
+const LAST_NORMAL: u32 = 5u;
+const FIXED_VIEW: u32 = 6u;
 
 struct Side {
     frame_from_cloud_x: vec4f,
@@ -203,6 +207,8 @@ struct View {
 // Bits of `View.flags`: for `a`, then for `b`.
 const MIDDLE_KNOWN: u32 = 1u;
 const FROM_BEHIND: u32 = 4u;
+// This view only looks for crossings.
+const IS_FURTHER: u32 = 16u;
 
 // One oriented disc; see the CPU's `Splat`. Pixels are relative to the image.
 struct Splat {
@@ -269,7 +275,7 @@ const PLACE_STEPS: f32 = 65535.0;
 // Words of a pair in what is read back, and of a contact.
 const PAIR_WORDS: u32 = 16u;
 const CONTACT_WORDS: u32 = 16u;
-const COLLIDES: u32 = 0u;
+const CROSSINGS: u32 = 0u;
 const GAP: u32 = 1u;
 const CROWDED: u32 = 2u;
 const VIEWS: u32 = 3u;

@@ -30,7 +30,7 @@ impl Method {
     fn view(self, motion: Vec3) -> View {
         match self {
             Self::Default { .. } => View::Aim {
-                policy: CameraPolicy::default(),
+                policy: CameraPolicy::AllDirections,
                 motion,
                 last_axis: None,
             },

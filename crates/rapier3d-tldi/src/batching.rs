@@ -87,9 +87,13 @@ impl<'a> Frame<'a> {
     ) {
         let colliders = [candidate.collider1, candidate.collider2];
         let [collider1, collider2] = colliders.map(|handle| &self.colliders[handle]);
+        let config = match collider1.is_sensor() || collider2.is_sensor() {
+            true => self.config.for_intersection(),
+            false => *self.config,
+        };
         append_part_pairs(
             pair,
-            self.config,
+            &config,
             &mut batch.parts,
             sides,
             |parts, part1, middle| {

@@ -27,7 +27,8 @@ const FITTED: f32 = 3.0;
 pub struct TldiConfig {
     /// Which construction and comparison of the layers to use.
     pub variant: Variant,
-    /// From where pairs are looked at.
+    /// From where pairs are looked at; sensors, by default, from [all
+    /// directions](CameraPolicy::AllDirections).
     pub camera_policy: CameraPolicy,
     /// How large pixels are: a number of radii, or what an error or time budget allows.
     pub resolution: Resolution,
@@ -52,6 +53,19 @@ impl Default for TldiConfig {
 }
 
 impl TldiConfig {
+    /// The settings for what only asks whether surfaces meet: by default they are looked at from all
+    /// directions.
+    pub(crate) fn for_intersection(self) -> Self {
+        let camera_policy = match self.camera_policy {
+            CameraPolicy::ContactZone => CameraPolicy::AllDirections,
+            policy => policy,
+        };
+        Self {
+            camera_policy,
+            ..self
+        }
+    }
+
     /// Refuses values that no comparison can use.
     pub(crate) fn validated(self) -> Result<Self, TldiError> {
         let check = |setting, value: f32, is_valid: bool, expected| {

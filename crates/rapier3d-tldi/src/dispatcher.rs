@@ -138,11 +138,14 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for TldiDispatc
             return Ok(());
         }
         drop(batch);
-        let measured = Measured::new(&pair, &self.shared.config());
-        let filled = self.shared.compare_on_the_spot(pair, |parts, results| {
-            let measured = measured.filter(|_| !rolls(parts, results));
-            manifolds::fill(&pair, measured, parts, results, manifolds, workspace);
-        });
+        let config = self.shared.config();
+        let measured = Measured::new(&pair, &config);
+        let filled = self
+            .shared
+            .compare_on_the_spot(pair, &config, |parts, results| {
+                let measured = measured.filter(|_| !rolls(parts, results));
+                manifolds::fill(&pair, measured, parts, results, manifolds, workspace);
+            });
         if filled.is_none() {
             manifolds::fill(&pair, None, &[], &[], manifolds, workspace);
         }
@@ -201,8 +204,9 @@ impl QueryDispatcher for TldiDispatcher {
             first_crossing(&batch.parts[prepared.parts.clone()], &batch.results)
         } else {
             drop(batch);
+            let config = self.shared.config().for_intersection();
             self.shared
-                .compare_on_the_spot(pair, first_crossing)
+                .compare_on_the_spot(pair, &config, first_crossing)
                 .flatten()
         };
         Ok(match crossing {

@@ -218,6 +218,7 @@ impl Shared {
     pub(crate) fn compare_on_the_spot<R>(
         &self,
         pair: ShapePair<'_>,
+        config: &TldiConfig,
         read: impl FnOnce(&[PartPair], &[PairResult]) -> R,
     ) -> Option<R> {
         if !within_reach(pair.shape1, pair.shape2, &pair.pos12, pair.prediction) {
@@ -225,7 +226,7 @@ impl Shared {
         }
         self.spot_pairs.fetch_add(1, Ordering::Relaxed);
         self.on_the_spot(|spot| {
-            spot.compare(pair, &self.config())?;
+            spot.compare(pair, config)?;
             let pixels = count_pixels(&spot.parts, &spot.results);
             self.spot_pixels.fetch_add(pixels, Ordering::Relaxed);
             Ok(read(&spot.parts, &spot.results))

@@ -146,7 +146,11 @@ pub(crate) fn contact(
         return Ok(None);
     };
     let measured = (found.distance <= 0.0)
-        .then(|| shared.compare_on_the_spot(pair, |parts, results| deepest(&pair, parts, results)))
+        .then(|| {
+            shared.compare_on_the_spot(pair, &shared.config(), |parts, results| {
+                deepest(&pair, parts, results)
+            })
+        })
         .flatten()
         .flatten();
     Ok(Some(measured.unwrap_or_else(|| {

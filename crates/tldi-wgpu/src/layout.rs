@@ -22,7 +22,7 @@ pub(crate) const COUNTERS: u32 = 16;
 /// Threads of a workgroup.
 pub(crate) const GROUP: u32 = 256;
 
-const FIXED_VIEW: u32 = 5;
+const FIXED_VIEW: u32 = 6;
 const HAS_NORMALS: u32 = 1;
 const ORIENTED: u32 = 2;
 const RADII_DIFFER: u32 = 4;
@@ -262,10 +262,11 @@ fn cells(extents: Vec3, cell: f32, points: usize) -> (f32, [u32; 3]) {
 fn policy_number(policy: CameraPolicy) -> u32 {
     match policy {
         CameraPolicy::ContactZone => 0,
-        CameraPolicy::Motion => 1,
-        CameraPolicy::Covariance => 2,
-        CameraPolicy::SmallestExtent => 3,
-        CameraPolicy::LastNormal => 4,
+        CameraPolicy::AllDirections => 1,
+        CameraPolicy::Motion => 2,
+        CameraPolicy::Covariance => 3,
+        CameraPolicy::SmallestExtent => 4,
+        CameraPolicy::LastNormal => 5,
     }
 }
 

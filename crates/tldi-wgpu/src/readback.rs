@@ -7,7 +7,7 @@ use crate::layout::{
 use crate::upload::Upload;
 use bytemuck::{Pod, Zeroable};
 use tldi::glamx::Vec3;
-use tldi::{ContactPixel, PairQuery, PairResult, View, VirtualCamera};
+use tldi::{ContactPixel, PairQuery, PairResult, View, VirtualCamera, plan};
 
 /// Elements that a batch needs of each buffer whose size is not known before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -99,7 +99,7 @@ pub(crate) struct Readback<'a> {
     contacts: &'a [[u32; CONTACT_WORDS as usize]],
 }
 
-const COLLIDES: usize = 0;
+const CROSSINGS: usize = 0;
 const GAP: usize = 1;
 const CROWDED: usize = 2;
 const VIEWS: usize = 3;
@@ -129,7 +129,7 @@ impl<'a> Readback<'a> {
     /// Fills all but the contacts of the `k`-th pair on the device.
     pub(crate) fn fill(&self, k: usize, query: &PairQuery, result: &mut PairResult) {
         let words = &self.pairs[k];
-        result.collides = words[COLLIDES] != 0;
+        result.collides = words[CROSSINGS] >= plan::CROSSED;
         result.gap = (words[GAP] != 0).then(|| -unordered(words[GAP]));
         result.axes.clear();
         let axes = words[AXES..].as_chunks::<3>().0;

@@ -24,10 +24,11 @@ pub enum View {
 }
 
 impl View {
-    /// Aimed by the default policy, without motion or memory.
+    /// Aimed at the contact zone, and where it shows no crossing, in all directions; without motion or
+    /// memory.
     pub fn aimed() -> Self {
         Self::Aim {
-            policy: CameraPolicy::default(),
+            policy: CameraPolicy::AllDirections,
             motion: Vec3::ZERO,
             last_axis: None,
         }
@@ -52,8 +53,9 @@ pub struct PairQuery<'a> {
 /// What the comparison of one pair found. All vectors are in the frame of the first surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PairResult {
-    /// Whether the surfaces intersect, or the solids overlap where normals tell inside from
-    /// outside.
+    /// Whether the views show that the surfaces cross, in more than one place, or that the solids
+    /// overlap where normals tell inside from outside. Walls that cross where all views see them
+    /// edge-on are missed: [`CameraPolicy::AllDirections`] leaves no such walls.
     pub collides: bool,
     /// Least signed gap in metres over all pixels that both surfaces cover (negative:
     /// penetration), or `None` where no pixel is shared within reach.

@@ -12,6 +12,7 @@
 use crate::AXIS_HYSTERESIS;
 use crate::approach::Approach;
 use crate::normals::least_variance_axis;
+use arrayvec::ArrayVec;
 use glamx::{DMat3, DVec3, Mat3, Vec3};
 
 /// How the axes of a pair's views are chosen.
@@ -24,6 +25,11 @@ pub enum CameraPolicy {
     /// [`AXIS_HYSTERESIS`]; up to three views.
     #[default]
     ContactZone,
+    /// As [`ContactZone`](Self::ContactZone), whose views all contacts come from. Where these show no
+    /// crossing, further views look for one, until three axes span all directions: what asks
+    /// whether surfaces meet should not miss walls that cross where the others see them edge-on. Up to
+    /// two more views.
+    AllDirections,
     /// One view against the motion of `b` relative to `a`; without motion, by the bounds.
     Motion,
     /// One view by the normals of the contact zone, anew in every frame.
@@ -89,7 +95,7 @@ pub(crate) fn aim(
 ) {
     axes.clear();
     let single = match policy {
-        CameraPolicy::ContactZone => None,
+        CameraPolicy::ContactZone | CameraPolicy::AllDirections => None,
         CameraPolicy::Motion => Some(-approach.toward_b()),
         CameraPolicy::Covariance => top_eigenvector(&zone_covariance(&sides, &Some)),
         CameraPolicy::SmallestExtent => {
@@ -108,6 +114,17 @@ pub(crate) fn aim(
         let fallback = approach.last_axis.unwrap_or(-approach.toward_b());
         axes.push(fallback.try_normalize().unwrap_or(Vec3::Z));
     }
+}
+
+/// Unit vectors across `axes` and each other, which are themselves (nearly) so: together with them three.
+pub(crate) fn further_axes(axes: &[Vec3]) -> ArrayVec<Vec3, MAX_VIEWS> {
+    let mut further = ArrayVec::new();
+    match axes {
+        [axis] => further.extend(<[Vec3; 2]>::from(axis.any_orthonormal_pair())),
+        [first, second] => further.extend(first.cross(*second).try_normalize()),
+        _ => (),
+    }
+    further
 }
 
 fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec3>) {
@@ -292,6 +309,22 @@ mod tests {
         );
         let floor = vec![Vec3::Y; 50];
         assert_eq!(zone_axes([zone(&floor, true), edges], &above), [-Vec3::Y]);
+    }
+
+    #[test]
+    fn further_axes_span_what_is_left() {
+        let first = Vec3::new(0.6, 0.0, 0.8);
+        let second = first.any_orthonormal_vector();
+        for axes in [
+            vec![first],
+            vec![first, second],
+            vec![first, second, first.cross(second)],
+        ] {
+            let all: Vec<Vec3> = axes.iter().copied().chain(further_axes(&axes)).collect();
+            assert_eq!(all.len(), 3);
+            let volume = all[0].dot(all[1].cross(all[2]));
+            assert!((volume.abs() - 1.0).abs() < 1e-5, "{all:?}");
+        }
     }
 
     /// A ball's normals around a flat contact are no second face.

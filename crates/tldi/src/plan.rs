@@ -7,6 +7,7 @@ use crate::{approach, camera_policy};
 use glamx::{Pose3, Vec3};
 
 pub use crate::approach::{Approach, Body};
+pub use crate::cpu::compare::CROSSED;
 pub use crate::cpu::cull::Region;
 pub use crate::cpu::normals::SUPPORT;
 pub use crate::cpu::splat::DepthScale;

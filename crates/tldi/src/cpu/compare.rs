@@ -5,7 +5,7 @@
 //! no closed surface. Contact pixels pair a layer through which rays leave the second body with
 //! one through which they enter the first.
 
-use super::sweep::is_edge_on;
+use super::sweep::{SAME_FACE, is_edge_on};
 use crate::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera};
 use arrayvec::ArrayVec;
@@ -22,31 +22,54 @@ pub(crate) struct Middles {
     pub(crate) b: Option<f32>,
 }
 
-/// What is known of both surfaces beside their layers.
+/// Two layers that swap their order between two neighbouring pixels, in [`Crossings`].
+const SWAPPED: u32 = 2;
+
+/// A pixel in which a layer pierces a wall, in [`Crossings`]: where a wall is, edge-on, is less sure.
+const PIERCED: u32 = 1;
+
+/// [`Crossings`] from which surfaces cross. A single swap may be the overhang of a splat beside an edge.
+pub const CROSSED: u32 = 4;
+
+/// How much of a crossing all views of a pair have seen, in the units of [`CROSSED`]. Those that are
+/// enough need not all be counted.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct Seen {
+pub(crate) struct Crossings(u32);
+
+impl Crossings {
+    pub(crate) fn are_enough(self) -> bool {
+        self.0 >= CROSSED
+    }
+}
+
+/// What is known of a view beside its images.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Seen<'a> {
+    /// Of this view and of all that it shares the surfaces with, unit vectors from `b` to `a`.
+    pub(crate) axes: &'a [Vec3],
+    /// Index of this view's axis.
+    pub(crate) view: usize,
     pub(crate) middles: Middles,
     /// Whether the outward normals of `a`, and of `b`, say that the view looks at it from behind.
     pub(crate) from_behind: [bool; 2],
 }
 
-/// Adds what the view `view` (index into `axes`, unit vectors from `b` to `a`) sees to `result`.
-/// Both images have the same camera and rectangle.
+/// Adds what a view sees of crossings to `crossings`, and of contacts, if it is one of the result's
+/// views, to `result`. Both images have the same camera and rectangle.
 pub(crate) fn compare(
     a: &Tldi,
     b: &Tldi,
-    axes: &[Vec3],
-    view: usize,
     seen: &Seen,
     params: &Params,
+    crossings: &mut Crossings,
     result: &mut PairResult,
 ) {
     debug_assert_eq!((a.origin, a.size), (b.origin, b.size));
     let [width, height] = a.size;
     let frame_from_view = a.camera.view_from_frame.inverse();
     let mut others = ArrayVec::<Vec3, MAX_VIEWS>::new();
-    for (k, axis) in axes.iter().enumerate() {
-        if k != view {
+    for (k, axis) in seen.axes.iter().enumerate() {
+        if k != seen.view {
             others.push(a.camera.view_from_frame.rotation * *axis);
         }
     }
@@ -57,18 +80,21 @@ pub(crate) fn compare(
             if la.is_empty() || lb.is_empty() {
                 continue;
             }
-            if !result.collides {
-                let crossing =
-                    |k: usize| crosses(la, lb, a.layers_of(k), b.layers_of(k), &others, params);
-                result.collides = pierces(a, b, [i, j], params)
-                    || (i + 1 < width && crossing(k + 1))
-                    || (j + 1 < height && crossing(k + width as usize));
+            if !crossings.are_enough() {
+                let swap =
+                    |k: usize| swaps(la, lb, a.layers_of(k), b.layers_of(k), &others, params);
+                crossings.0 += PIERCED * u32::from(pierces(a, b, [i, j], params))
+                    + SWAPPED * u32::from(i + 1 < width && swap(k + 1))
+                    + SWAPPED * u32::from(j + 1 < height && swap(k + width as usize));
+            }
+            if seen.view >= result.axes.len() {
+                continue;
             }
             let at = PixelView {
                 pixel: [a.origin[0] + i as i32, a.origin[1] + j as i32],
                 camera: &a.camera,
                 frame_from_view: &frame_from_view,
-                view,
+                view: seen.view,
                 others: &others,
                 middles: &seen.middles,
             };
@@ -90,7 +116,7 @@ fn best_seen(normal: Vec3, others: &[Vec3]) -> bool {
 }
 
 /// Whether a layer of `a` and one of `b` swap their order between two neighbouring pixels.
-fn crosses(
+fn swaps(
     a: &[Layer],
     b: &[Layer],
     a_next: &[Layer],
@@ -121,15 +147,16 @@ fn crosses(
     })
 }
 
-/// Whether a layer of one lies well within a thick layer of the other, a wall seen edge-on, and goes on
-/// on both sides of it: of a surface that ends beside a wall, the last splats are in the wall's pixels.
+/// Whether a layer of one lies well within a thick layer of the other, a wall seen edge-on to which it is
+/// not parallel, and goes on on both sides of it: of a surface that ends beside a wall, the last splats are in the wall's pixels.
 fn pierces(a: &Tldi, b: &Tldi, pixel: [u32; 2], params: &Params) -> bool {
     let rim = 0.5 * params.merge_gap;
     let through = |walls: &Tldi, other: &Tldi| {
         let [i, j] = pixel;
         walls.layers_at(i, j).iter().any(|wall| {
             other.layers_at(i, j).iter().any(|layer| {
-                wall.near + rim < layer.depth
+                wall.normal.dot(layer.normal).abs() < SAME_FACE
+                    && wall.near + rim < layer.depth
                     && layer.depth < wall.far - rim
                     && is_on_both_sides(wall.normal.truncate(), layer, other, pixel, params)
             })
@@ -264,8 +291,13 @@ const FACING: f32 = 0.5;
 const BESIDE: f32 = 0.5;
 
 /// For [`stage_constants`](crate::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 2] =
-    [("FACING", FACING as f64), ("BESIDE", BESIDE as f64)];
+pub(crate) const CONSTANTS: [(&str, f64); 5] = [
+    ("FACING", FACING as f64),
+    ("BESIDE", BESIDE as f64),
+    ("SWAPPED", SWAPPED as f64),
+    ("PIERCED", PIERCED as f64),
+    ("CROSSED", CROSSED as f64),
+];
 
 /// From a pixel to those around it.
 const NEIGHBORS: [[i32; 2]; 8] = [
@@ -348,22 +380,61 @@ mod tests {
         }
     }
 
+    /// So many equal rows of three pixels.
+    fn image_of(rows: u32, columns: [Option<Layer>; 3]) -> Tldi {
+        let camera = VirtualCamera::along(Vec3::Z, 1.0);
+        let mut image = Tldi::default();
+        image.begin(&camera, [0, 0], [3, rows]);
+        for column in (0..rows).flat_map(|_| columns) {
+            image.layers.extend(column);
+            image.offsets.push(image.layers.len() as u32);
+        }
+        image
+    }
+
+    /// A sheet that falls through a level one from the first column to the second.
+    #[test]
+    fn surfaces_cross_where_they_swap_in_more_than_one_place() {
+        let params = Params::for_radius(1.0);
+        let sheet = |depths: [f32; 3]| depths.map(|depth| Some(layer(depth, Facing::Unknown)));
+        for (rows, enough) in [(1, false), (2, true)] {
+            let level = image_of(rows, sheet([10.0; 3]));
+            let falling = image_of(rows, sheet([9.0, 10.5, 11.0]));
+            let seen = Seen {
+                axes: &[Vec3::Z],
+                ..Seen::default()
+            };
+            let mut crossings = Crossings::default();
+            // A view that is none of the result's sees no contacts.
+            let mut result = PairResult::default();
+            compare(
+                &level,
+                &falling,
+                &seen,
+                &params,
+                &mut crossings,
+                &mut result,
+            );
+            assert_eq!(crossings.are_enough(), enough, "{rows}");
+            assert_eq!(result, PairResult::default());
+            result.axes.push(Vec3::Z);
+            compare(
+                &level,
+                &falling,
+                &seen,
+                &params,
+                &mut crossings,
+                &mut result,
+            );
+            assert!(!result.contacts.is_empty());
+        }
+    }
+
     /// A wall seen edge-on in the middle of three columns, and a sheet in some of them.
     #[test]
     fn a_sheet_pierces_a_wall_that_it_goes_on_behind() {
         let params = Params::for_radius(1.0);
-        let image = |columns: [Option<Layer>; 3]| {
-            let camera = VirtualCamera::along(Vec3::Z, 1.0);
-            let mut image = Tldi::default();
-            image.begin(&camera, [0, 0], [3, 3]);
-            for _row in 0..3 {
-                for column in columns {
-                    image.layers.extend(column);
-                    image.offsets.push(image.layers.len() as u32);
-                }
-            }
-            image
-        };
+        let image = |columns| image_of(3, columns);
         let wall = Layer {
             near: 0.0,
             far: 20.0,
@@ -384,6 +455,14 @@ mod tests {
                 assert_eq!(pierces(a, b, [1, 1], &params), expected, "{columns:?}");
             }
         }
+        // Another wall beside it does not.
+        let beside = Some(Layer {
+            near: 5.0,
+            far: 15.0,
+            ..wall
+        });
+        let beside = image([beside, beside, beside]);
+        assert!(!pierces(&in_middle, &beside, [1, 1], &params));
         // What is beyond the image's edge is not known.
         let at_edge = image([None, None, Some(wall)]);
         let sheet = image([None, sheet, sheet]);

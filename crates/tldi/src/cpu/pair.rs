@@ -1,16 +1,18 @@
 //! The stages of one pair, in order.
 
 use super::columns::{Tiles, Touching};
-use super::compare::{self, Middles, Seen};
+use super::compare::{self, Crossings, Middles, Seen};
 use super::cull;
 use super::impact::{CoreScratch, Meeting};
 use super::side::{CloudView, ExactView, Side};
 use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneGrid, ZoneScratch};
-use crate::camera_policy::{MAX_VIEWS, ZoneNormals, aim, seen_from_behind};
+use crate::camera_policy::{MAX_VIEWS, ZoneNormals, aim, further_axes, seen_from_behind};
 use crate::patches::PatchScratch;
 use crate::plan::{PairPlan, SidePlan, stride};
-use crate::{PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper};
+use crate::{
+    CameraPolicy, PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper,
+};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
 
@@ -24,6 +26,7 @@ pub(super) struct Scratch {
     pub(super) meetings: Vec<Meeting>,
     zone: ZoneScratch,
     touching: Touching,
+    crossings: Crossings,
     paper: [paper::Scratch; 2],
     patches: PatchScratch,
 }
@@ -42,10 +45,11 @@ impl Scratch {
         if !self.cull(query, &plan) || !self.zone(query, &plan) {
             return;
         }
+        self.crossings = Crossings::default();
         match query.view {
             View::Fixed(camera) => {
                 result.axes.push(camera.axis());
-                self.look(query, &plan, &camera, 0, result);
+                self.look(query, &plan, &camera, &[camera.axis()], 0, result);
             }
             View::Aim { policy, .. } => {
                 let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| {
@@ -60,12 +64,19 @@ impl Scratch {
                     self.compare_paper(query, &camera, result);
                     return;
                 }
-                for view in 0..result.axes.len() {
-                    let camera = VirtualCamera::along(result.axes[view], query.params.pixel_size);
-                    self.look(query, &plan, &camera, view, result);
+                let mut axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
+                for view in 0..axes.len() {
+                    self.look_along(query, &plan, &axes, view, result);
+                }
+                if policy == CameraPolicy::AllDirections && !self.crossings.are_enough() {
+                    axes.extend(further_axes(&result.axes));
+                    for view in result.axes.len()..axes.len() {
+                        self.look_along(query, &plan, &axes, view, result);
+                    }
                 }
             }
         }
+        result.collides = self.crossings.are_enough();
         self.patches.reduce_pair(result, query);
     }
 
@@ -174,12 +185,25 @@ impl Scratch {
         })
     }
 
-    /// Builds both images for one camera and compares them.
+    fn look_along(
+        &mut self,
+        query: &PairQuery,
+        plan: &PairPlan,
+        axes: &[Vec3],
+        view: usize,
+        result: &mut PairResult,
+    ) {
+        let camera = VirtualCamera::along(axes[view], query.params.pixel_size);
+        self.look(query, plan, &camera, axes, view, result);
+    }
+
+    /// Builds both images for the camera of `axes[view]` and compares them.
     fn look(
         &mut self,
         query: &PairQuery,
         plan: &PairPlan,
         camera: &VirtualCamera,
+        axes: &[Vec3],
         view: usize,
         result: &mut PairResult,
     ) {
@@ -220,20 +244,21 @@ impl Scratch {
             return;
         }
         let depth = |side: &SidePlan| side.middle.map(|middle| camera.view_from_point(middle).z);
-        let axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
+        let from_behind = seen_from_behind(camera.axis(), &self.zone_normals(query));
         compare::compare(
             &self.a.image,
             &self.b.image,
-            &axes,
-            view,
             &Seen {
+                axes,
+                view,
                 middles: Middles {
                     a: depth(&plan.sides[0]),
                     b: depth(&plan.sides[1]),
                 },
-                from_behind: seen_from_behind(camera.axis(), &self.zone_normals(query)),
+                from_behind,
             },
             &query.params,
+            &mut self.crossings,
             result,
         );
     }
