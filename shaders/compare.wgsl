@@ -61,7 +61,7 @@ fn continued(from_layer: u32, c: Column, merge_gap: f32) -> f32 {
     return select(INFINITE, best, nearest <= merge_gap);
 }
 
-// Whether a layer of `a` and one of `b` swap their order between two neighbouring pixels.
+// Whether a layer of `a` and one of `b` swap their order between two neighbouring pixels, or coincide.
 fn swaps(look: ptr<function, Look>, a: Column, b: Column, a_next: Column, b_next: Column) -> bool {
     let merge_gap = (*look).params.merge_gap;
     for (var ka = a.begin; ka < a.end; ka++) {
@@ -81,7 +81,7 @@ fn swaps(look: ptr<function, Look>, a: Column, b: Column, a_next: Column, b_next
                 continue;
             }
             let next_b = continued(kb, b_next, merge_gap);
-            if next_b != INFINITE && apart * (next_a - next_b) < 0.0 {
+            if next_b != INFINITE && apart * (next_a - next_b) <= 0.0 {
                 return true;
             }
         }

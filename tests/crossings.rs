@@ -133,3 +133,14 @@ fn plates_that_cross_are_found_at_every_angle() {
         check(&mut gpu);
     }
 }
+
+#[test]
+fn a_surface_meets_its_own_copy() {
+    let cloud = Jack::new(&mut fastrand::Rng::with_seed(0)).cloud;
+    let copies = [Surface::Cloud(&cloud); 2];
+    let query = aimed(copies[0], copies[1], Pose3::IDENTITY, Params::for_radius(R));
+    assert!(compare_on(&mut CpuBackend::new(), &[query])[0].collides);
+    if let Some(mut gpu) = gpu_backend() {
+        assert!(compare_on(&mut gpu, &[query])[0].collides);
+    }
+}

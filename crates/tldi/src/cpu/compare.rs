@@ -115,7 +115,7 @@ fn best_seen(normal: Vec3, others: &[Vec3]) -> bool {
         .all(|axis| axis.dot(normal).abs() <= normal.z.abs())
 }
 
-/// Whether a layer of `a` and one of `b` swap their order between two neighbouring pixels.
+/// Whether a layer of `a` and one of `b` swap their order between two neighbouring pixels, or coincide.
 fn swaps(
     a: &[Layer],
     b: &[Layer],
@@ -141,7 +141,7 @@ fn swaps(
                 (la.depth - lb.depth).abs() <= 2.0 * params.merge_gap
                     && (best_seen(la.normal, others) || best_seen(lb.normal, others))
                     && continuous(lb, b_next)
-                        .is_some_and(|nb| (la.depth - lb.depth) * (na - nb) < 0.0)
+                        .is_some_and(|nb| (la.depth - lb.depth) * (na - nb) <= 0.0)
             })
         })
     })
@@ -392,14 +392,20 @@ mod tests {
         image
     }
 
-    /// A sheet that falls through a level one from the first column to the second.
+    /// A sheet that falls through a level one from the first column to the second, or is where it is.
     #[test]
     fn surfaces_cross_where_they_swap_in_more_than_one_place() {
         let params = Params::for_radius(1.0);
         let sheet = |depths: [f32; 3]| depths.map(|depth| Some(layer(depth, Facing::Unknown)));
-        for (rows, enough) in [(1, false), (2, true)] {
+        let falling = [9.0, 10.5, 11.0];
+        for (rows, other, enough) in [
+            (1, falling, false),
+            (2, falling, true),
+            (1, [10.0; 3], true),
+            (2, [10.1; 3], false),
+        ] {
             let level = image_of(rows, sheet([10.0; 3]));
-            let falling = image_of(rows, sheet([9.0, 10.5, 11.0]));
+            let other = image_of(rows, sheet(other));
             let seen = Seen {
                 axes: &[Vec3::Z],
                 ..Seen::default()
@@ -407,25 +413,11 @@ mod tests {
             let mut crossings = Crossings::default();
             // A view that is none of the result's sees no contacts.
             let mut result = PairResult::default();
-            compare(
-                &level,
-                &falling,
-                &seen,
-                &params,
-                &mut crossings,
-                &mut result,
-            );
+            compare(&level, &other, &seen, &params, &mut crossings, &mut result);
             assert_eq!(crossings.are_enough(), enough, "{rows}");
             assert_eq!(result, PairResult::default());
             result.axes.push(Vec3::Z);
-            compare(
-                &level,
-                &falling,
-                &seen,
-                &params,
-                &mut crossings,
-                &mut result,
-            );
+            compare(&level, &other, &seen, &params, &mut crossings, &mut result);
             assert!(!result.contacts.is_empty());
         }
     }
