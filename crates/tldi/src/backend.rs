@@ -60,7 +60,8 @@ pub struct PairResult {
     /// Least signed gap in metres over all pixels that both surfaces cover (negative:
     /// penetration), or `None` where no pixel is shared within reach.
     pub gap: Option<f32>,
-    /// Axes of the views, unit length, from `b` towards `a`; empty after an early rejection.
+    /// Axes of the views that contacts are from, unit length, from `b` towards `a`; empty after an early
+    /// rejection.
     pub axes: Vec<Vec3>,
     /// Pixels where the surfaces are within [`Params::prediction`] or penetrate.
     pub contacts: Vec<ContactPixel>,
