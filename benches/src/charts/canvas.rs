@@ -70,11 +70,14 @@ where
         Ok(())
     }
 
-    /// A line through points; `opacity` from 0 to 1.
+    /// A line through points; `opacity` from 0 to 1. Segment by segment: a sharp bend of one path has its
+    /// outer corner far away.
     pub(super) fn path(&self, points: &[At], color: Color, opacity: f64, width: i32) -> Outcome {
-        let pixels: Vec<At> = points.iter().map(|at| self.pixel(*at)).collect();
         let style = self.style(color, opacity, width);
-        self.area.draw(&PathElement::new(pixels, style))?;
+        for segment in points.windows(2) {
+            let pixels: Vec<At> = segment.iter().map(|at| self.pixel(*at)).collect();
+            self.area.draw(&PathElement::new(pixels, style))?;
+        }
         Ok(())
     }
 

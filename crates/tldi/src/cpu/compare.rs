@@ -28,7 +28,9 @@ const SWAPPED: u32 = 2;
 /// A pixel in which a layer pierces a wall, in [`Crossings`]: where a wall is, edge-on, is less sure.
 const PIERCED: u32 = 1;
 
-/// [`Crossings`] from which surfaces cross. A single swap may be the overhang of a splat beside an edge.
+/// What all views together see of a crossing from which on surfaces cross, two for a swap of layers between
+/// pixels, one for a pixel in which a wall is pierced. A single swap may be the overhang of a splat beside
+/// an edge.
 pub const CROSSED: u32 = 4;
 
 /// How much of a crossing all views of a pair have seen, in the units of [`CROSSED`]. Those that are
