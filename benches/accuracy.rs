@@ -29,6 +29,9 @@ struct Args {
     /// A mesh, PLY with faces, also gzipped (a bumpy ball is generated without)
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
+    /// Split every face into four, so many times: the same surface with as many more points
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    subdivide: u32,
     /// An even sample of this many of the 27,900 cases
     #[arg(long, value_name = "N", default_value_t = 930)]
     cases: usize,
@@ -115,6 +118,7 @@ fn main() -> anyhow::Result<()> {
     progress.finish_and_clear();
     kept.save()
         .with_context(|| format!("cannot keep the truth in {}", args.truth.display()))?;
+    let model = model.subdivided(args.subdivide);
     print_head(&model, all.len());
     let mut rows = Vec::new();
     let mut provenance = Provenance::now(None);
