@@ -1,6 +1,8 @@
 //! Thin plates that cross at every angle, each edge-on to views that see others: held against the exact
 //! answer of their rectangles, on the CPU and the GPU.
 
+use rapier3d::parry::query::QueryDispatcher;
+use rapier3d_tldi::{PointCloudShape, TldiConfig, TldiPipeline};
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Backend, CpuBackend, PairQuery, Params, PointCloud, Surface};
 use tldi_tests::{aimed, compare_on, gpu_backend, random_pose, random_unit, sampled_plane};
@@ -131,6 +133,25 @@ fn plates_that_cross_are_found_at_every_angle() {
     check(&mut CpuBackend::new());
     if let Some(mut gpu) = gpu_backend() {
         check(&mut gpu);
+    }
+}
+
+/// As rapier asks, of sensors for one.
+#[test]
+fn intersection_tests_look_from_all_directions() {
+    let pipeline = TldiPipeline::new(TldiConfig::default()).expect("valid settings");
+    let dispatcher = pipeline.dispatcher();
+    for (seed, scene) in scenes().into_iter().enumerate() {
+        let Some(crosses) = scene.crosses else {
+            continue;
+        };
+        let [a, b] = scene.jacks.map(|jack| PointCloudShape::new(jack.cloud));
+        let answer = dispatcher.intersection_test(&scene.a_from_b, &a, &b);
+        assert_eq!(
+            answer.expect("both are clouds").intersecting,
+            crosses,
+            "{seed}"
+        );
     }
 }
 
