@@ -29,7 +29,7 @@ struct Args {
     /// A mesh, PLY with faces, also gzipped (a bumpy ball is generated without)
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Split every face into four, so many times: the same surface with as many more points
+    /// Split every face into four, so many times (at most 5): the same surface with four times the points each
     #[arg(long, value_name = "N", default_value_t = 0)]
     subdivide: u32,
     /// An even sample of this many of the 27,900 cases
@@ -150,6 +150,10 @@ fn main() -> anyhow::Result<()> {
 fn check(args: &Args) -> anyhow::Result<()> {
     let are_positive = |all: &[f32]| all.iter().all(|s| s.is_finite() && *s > 0.0);
     ensure!(args.cases > 0, "at least one case is needed");
+    ensure!(
+        args.subdivide <= 5,
+        "--subdivide is at most 5: every time there are four times as many points"
+    );
     ensure!(
         args.noise.iter().all(|s| s.is_finite() && *s >= 0.0),
         "noise is a standard deviation: it must be finite and not negative"

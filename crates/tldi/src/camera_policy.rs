@@ -17,8 +17,9 @@ use glamx::{DMat3, DVec3, Mat3, Vec3};
 
 /// How the axes of a pair's views are chosen.
 ///
-/// All but the default are there to be compared with it: see the chart of contact errors against
-/// the angle of motion, and the stability suite.
+/// The first is for contacts, the second for questions whether surfaces meet. All others are there to be
+/// compared with the first: see the chart of contact errors against the angle of motion, and the
+/// stability suite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum CameraPolicy {
     /// By the normals of the contact zone; kept from frame to frame while they agree with it within

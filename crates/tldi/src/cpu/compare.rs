@@ -150,7 +150,8 @@ fn swaps(
 }
 
 /// Whether a layer of one lies well within a thick layer of the other, a wall seen edge-on to which it is
-/// not parallel, and goes on on both sides of it: of a surface that ends beside a wall, the last splats are in the wall's pixels.
+/// not parallel, and goes on on both sides of it: of a surface that ends beside a wall, the last splats
+/// are in the wall's pixels.
 fn pierces(a: &Tldi, b: &Tldi, pixel: [u32; 2], params: &Params) -> bool {
     let rim = 0.5 * params.merge_gap;
     let through = |walls: &Tldi, other: &Tldi| {
