@@ -22,7 +22,7 @@ pub const MAX_PATCHES: usize = 32;
 /// Linked pixels belong to one group if their smoothed normals are within 30°.
 const SAME_GROUP: f32 = 0.866;
 
-/// A patch whose unit normals have a mean shorter than this (a spread of about 14°) is split.
+/// A part whose pixels' unit normals have a mean shorter than this (a spread of about 14°) is split.
 const FLAT: f32 = 0.97;
 
 /// Patches of fewer pixels are not split.
@@ -40,7 +40,8 @@ pub const SAME_PLANE: f32 = 0.985;
 /// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal.
 const NORMAL_BAND: f32 = 2.0;
 
-/// Band whose pixels can be support points and decide where a part is split.
+/// Band whose pixels can be support points and decide where a part is split. What penetrates can up to
+/// [`NORMAL_BAND`]: a body that lies deeper on one side must not sink in on the other.
 const SUPPORT_BAND: f32 = 1.0;
 
 /// The gaps of a patch are taken to be at least this rough, in pixels: below, extent alone chooses
@@ -301,6 +302,8 @@ struct Shape {
     /// Length of the mean of the contact pixels' unit normals: 1 where they agree.
     normal_length: f32,
     least_gap: f32,
+    /// Greatest gap of a support point.
+    support_gap: f32,
     centre: Vec3,
     /// Across the normal: the direction of largest extent.
     longest: Vec3,
@@ -310,29 +313,33 @@ impl Shape {
     fn of(members: &[u32], contacts: &[ContactPixel], smooth: &[Smooth], params: &Params) -> Self {
         let least_gap = least_gap(members, smooth);
         let (mut mean_a, mut mean_b, mut mean) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-        let mut total = 0.0;
+        let (mut total, mut sum) = (0.0, Vec3::ZERO);
+        let normal_band = NORMAL_BAND * params.pixel_size;
         for s in members.iter().map(|&m| &smooth[m as usize]) {
-            let w = falloff(s.gap - least_gap, NORMAL_BAND * params.pixel_size);
+            let w = falloff(s.gap - least_gap, normal_band);
             mean_a += w * s.normal_a;
             mean_b += w * s.normal_b;
             mean += w * s.normal;
             total += w;
+            sum += s.normal;
         }
         let normal = common_normal(mean_a / total, mean_b / total)
             .or_else(|| mean.try_normalize())
             .unwrap_or(smooth[members[0] as usize].normal);
-        let band = SUPPORT_BAND * params.pixel_size;
+        let support_band = SUPPORT_BAND * params.pixel_size;
+        let support_gap = least_gap + (-least_gap).clamp(support_band, normal_band);
         let in_band = || {
             members
                 .iter()
-                .filter(move |&&m| smooth[m as usize].gap - least_gap <= band)
+                .filter(move |&&m| smooth[m as usize].gap <= support_gap)
                 .map(|&m| contacts[m as usize].middle())
         };
         let centre = in_band().sum::<Vec3>() / in_band().count() as f32;
         Self {
             normal,
-            normal_length: mean.length() / total,
+            normal_length: sum.length() / members.len() as f32,
             least_gap,
+            support_gap,
             centre,
             longest: longest_axis(in_band(), centre, normal),
         }
@@ -358,13 +365,12 @@ impl Shape {
         points: &mut Vec<ContactPoint>,
         params: &Params,
     ) -> ContactPatch {
-        let limit = self.least_gap + SUPPORT_BAND * params.pixel_size;
         points.clear();
         points.extend(
             members
                 .iter()
                 .map(|&m| m as usize)
-                .filter(|&m| smooth[m].gap <= limit)
+                .filter(|&m| smooth[m].gap <= self.support_gap)
                 .map(|m| self.point(contacts[m].middle(), smooth[m].gap)),
         );
         let supports = supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);

@@ -85,6 +85,8 @@ const MOST_STEPS: usize = 90;
 const WAVE_FREQUENCY: f32 = 2.0;
 const WAVE_AMPLITUDE: f32 = 2.0;
 const WAVE_LENGTH: f32 = 14.0;
+/// Places on a step's way through the waves at which a body's height over them is looked at.
+const WAY_SAMPLES: u32 = 256;
 
 fn between(low: f32, high: f32, rng: &mut Rng) -> f32 {
     low + (high - low) * rng.f32()
@@ -246,6 +248,18 @@ pub(super) fn run_drop(
     Ok((outcome, plan.describe()))
 }
 
+/// Places on the straight way between two, in order, where the waves may be as high.
+fn way_through_waves(from: Vec3, to: Vec3, plan: &Plan) -> impl Iterator<Item = Vec3> {
+    let highest = WAVE_AMPLITUDE * plan.radius;
+    let shares = match to.y - from.y {
+        0.0 => [0.0, 1.0],
+        fall => [highest, -highest].map(|y| ((y - from.y) / fall).clamp(0.0, 1.0)),
+    };
+    let [start, end] = [shares[0].min(shares[1]), shares[0].max(shares[1])];
+    (0..=WAY_SAMPLES)
+        .map(move |k| from.lerp(to, start + (end - start) * k as f32 / WAY_SAMPLES as f32))
+}
+
 /// Steps until the body has passed, has left the sheet, or time is up.
 fn watch(
     arena: &mut Arena,
@@ -274,8 +288,9 @@ fn watch(
         let at = arena.position(body);
         let height = height_at(at, seconds);
         if height < 0.0 && last_height >= 0.0 {
-            let share = last_height / (last_height - height);
-            return Ok(if is_within(last.lerp(at, share)) {
+            let is_under = |p: &Vec3| height_at(*p, seconds) < 0.0;
+            let crossing = way_through_waves(last, at, plan).find(is_under);
+            return Ok(if is_within(crossing.unwrap_or(at)) {
                 Outcome::Passed
             } else {
                 outcome

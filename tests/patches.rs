@@ -1,0 +1,92 @@
+//! What penetrates anywhere is pushed out there: one deep place must not hide the others.
+
+use std::f32::consts::TAU;
+use tldi::glamx::{Pose3, Quat, Vec3};
+use tldi::{ContactPixel, PairResult, Params, PatchScratch};
+use tldi_tests::{compare_clouds, sampled_box, sampled_plane};
+
+const R: f32 = 0.012;
+
+/// A box that lies half a radius deep on one side, and two on the other, has support points near all four
+/// lower corners.
+#[test]
+fn a_box_that_lies_deeper_on_one_side_is_held_on_both() {
+    let half = R * Vec3::new(5.0, 3.0, 4.0);
+    let [shallow, deep] = [0.5 * R, 2.0 * R];
+    let tilt = Quat::from_rotation_z(((deep - shallow) / (2.0 * half.x)).asin());
+    let mut distances = Vec::new();
+    for seed in 0..20 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let floor = sampled_plane(40.0 * R, R, &mut rng).cloud(R);
+        let body = sampled_box(half, R, &mut rng).cloud(R);
+        let turn = Quat::from_rotation_y(TAU * rng.f32()) * tilt;
+        let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]
+            .map(|[x, z]| turn * (half * Vec3::new(x, -1.0, z)));
+        let lowest = corners.map(|c| c.y).into_iter().fold(0.0, f32::min);
+        let place = Vec3::new(3.0 * R * rng.f32(), -deep - lowest, 3.0 * R * rng.f32());
+        let found = compare_clouds(&floor, &body, Pose3::from_parts(place, turn), R);
+        let points = || found.patches.iter().flat_map(|patch| &patch.points);
+        distances.extend(corners.map(|corner| {
+            let from_corner = points().map(|p| p.point_b.distance(place + corner));
+            from_corner.fold(f32::INFINITY, f32::min)
+        }));
+    }
+    // A pixel's diagonal. If only what is as deep as the deepest but for a radius supported the box, this
+    // were 2.8 R.
+    let mean = distances.iter().sum::<f32>() / distances.len() as f32;
+    assert!(mean < 1.42 * R, "{} radii from the corners", mean / R);
+}
+
+/// A ball in a trough that is hardly wider, deep in one of its sides: wherever it is in it, a patch pushes
+/// along the normal there.
+#[test]
+fn a_ball_in_a_trough_is_pushed_from_all_sides() {
+    let (ball, trough, off) = (2.2 * R, 2.5 * R, 1.5 * R);
+    for degrees in [0.0_f32, 20.0, 35.0, 50.0] {
+        let towards = degrees.to_radians();
+        let mut contacts = Vec::new();
+        for (i, j) in (-4..=4).flat_map(|i| (-2..=2).map(move |j| (i, j))) {
+            let sin = (i as f32 + 0.5) * 0.5 * R / trough;
+            if sin.abs() >= 0.95 {
+                continue;
+            }
+            // Of a slice of the ball and the trough, by the angle from below.
+            let angle = sin.asin();
+            let along = Vec3::new(sin, -angle.cos(), 0.0);
+            let gap = trough - ball - off * (angle - towards).cos();
+            if gap > R {
+                continue;
+            }
+            let place = 0.5 * R * j as f32 * Vec3::Z;
+            contacts.push(ContactPixel {
+                pixel: [i, j],
+                view: 0,
+                point_a: place + trough * along,
+                point_b: place + (trough - gap) * along,
+                normal_a: -along,
+                normal_b: along,
+                gap,
+            });
+        }
+        let mut found = PairResult {
+            axes: [-Vec3::Y].into_iter().collect(),
+            contacts: contacts.clone(),
+            ..PairResult::default()
+        };
+        PatchScratch::default().reduce(&mut found, &Params::for_radius(0.5 * R));
+        for contact in contacts.iter().filter(|contact| contact.gap < 0.0) {
+            let best = found
+                .patches
+                .iter()
+                .map(|patch| patch.normal.dot(contact.normal_a))
+                .fold(f32::NEG_INFINITY, f32::max);
+            // 30°, within which linked pixels belong to one group, and half of the 14° that its normals may bend.
+            assert!(
+                best > 0.8,
+                "{degrees}°: none pushes at {} within {}°",
+                contact.point_a / R,
+                best.acos().to_degrees()
+            );
+        }
+    }
+}
