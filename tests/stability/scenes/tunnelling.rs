@@ -1,6 +1,7 @@
 //! Fast, small, spinning bodies against sheets, scans and waves: nothing may pass through.
 
 mod drops;
+mod ground;
 
 use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
 use drops::{Outcome, SizeClass, Target, run_drop};

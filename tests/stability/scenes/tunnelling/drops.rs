@@ -1,5 +1,6 @@
 //! One drop: its random parameters, its run, and whether the body passed.
 
+use super::ground::{Ground, WAVE_AMPLITUDE};
 use crate::suite::arena::{Arena, DT, GRAVITY, Material, Placed, SamePoints};
 use crate::suite::case::{Setup, Stop};
 use crate::suite::scan_spots::spots;
@@ -81,12 +82,6 @@ const TOP_SPIN: f32 = 50.0;
 /// Steps that are watched after the time of impact, and steps of a drop at most.
 const STEPS_AFTER: usize = 12;
 const MOST_STEPS: usize = 90;
-/// Frequency of waves in Hz; amplitude and wavelength in mean radii of the sheet.
-const WAVE_FREQUENCY: f32 = 2.0;
-const WAVE_AMPLITUDE: f32 = 2.0;
-const WAVE_LENGTH: f32 = 14.0;
-/// Places on a step's way through the waves at which a body's height over them is looked at.
-const WAY_SAMPLES: u32 = 256;
 
 fn between(low: f32, high: f32, rng: &mut Rng) -> f32 {
     low + (high - low) * rng.f32()
@@ -165,16 +160,16 @@ impl Plan {
         }
     }
 
-    /// Height of the wave at a place (x, z) in metres and a time in seconds.
-    fn wave(&self, at: Vec2, seconds: f32) -> f32 {
-        let number = TAU / (WAVE_LENGTH * self.radius);
-        let phase = self.wave_phase + TAU * WAVE_FREQUENCY * seconds;
-        WAVE_AMPLITUDE * self.radius * (number * at.x + phase).sin() * (number * at.y).cos()
+    fn wave(&self) -> Ground {
+        Ground::Waves {
+            radius: self.radius,
+            phase: self.wave_phase,
+        }
     }
 
     fn waves(&self, seconds: f32, rng: &mut Rng) -> Surface {
         let size = Vec2::splat(self.extent);
-        Surface::terrain(size, self.radius, rng, |at| self.wave(at, seconds))
+        Surface::terrain(size, self.radius, rng, |at| self.wave().height(at, seconds))
             .with_normals(self.normals())
     }
 
@@ -243,53 +238,43 @@ pub(super) fn run_drop(
         .angvel(plan.spin)
         .ccd_enabled(true);
     let body = arena.insert(body, &plan.body(&mut rng), Material::default())?;
-    let waves = (target == Target::Waves).then_some(&floor);
-    let outcome = watch(&mut arena, &plan, waves, &body, &mut rng)?;
-    Ok((outcome, plan.describe()))
-}
-
-/// Places on the straight way between two, in order, where the waves may be as high.
-fn way_through_waves(from: Vec3, to: Vec3, plan: &Plan) -> impl Iterator<Item = Vec3> {
-    let highest = WAVE_AMPLITUDE * plan.radius;
-    let shares = match to.y - from.y {
-        0.0 => [0.0, 1.0],
-        fall => [highest, -highest].map(|y| ((y - from.y) / fall).clamp(0.0, 1.0)),
+    let ground = match target {
+        Target::Sheet => Ground::Flat,
+        Target::Waves => plan.wave(),
+        Target::Scan => Ground::Scan {
+            radius: plan.radius,
+            points: surface.samples.points,
+        },
     };
-    let [start, end] = [shares[0].min(shares[1]), shares[0].max(shares[1])];
-    (0..=WAY_SAMPLES)
-        .map(move |k| from.lerp(to, start + (end - start) * k as f32 / WAY_SAMPLES as f32))
+    let outcome = watch(&mut arena, &plan, &ground, [&floor, &body], &mut rng)?;
+    Ok((outcome, plan.describe()))
 }
 
 /// Steps until the body has passed, has left the sheet, or time is up.
 fn watch(
     arena: &mut Arena,
     plan: &Plan,
-    waves: Option<&Placed>,
-    body: &Placed,
+    ground: &Ground,
+    [floor, body]: [&Placed; 2],
     rng: &mut Rng,
 ) -> Result<Outcome, Stop> {
     // Where a body's middle may be so that all of the body is over the sheet.
     let within = 0.5 * plan.extent - 0.87 * plan.size.min(0.25 * plan.extent);
     let is_within = |at: Vec3| at.x.abs().max(at.z.abs()) < within;
-    let height_at = |at: Vec3, seconds: f32| match waves {
-        Some(_) => at.y - plan.wave(Vec2::new(at.x, at.z), seconds),
-        None => at.y,
-    };
     let mut seconds = 0.0;
     let mut last = plan.start;
-    let mut last_height = height_at(last, seconds);
+    let mut last_height = ground.over(last, seconds);
     let mut outcome = Outcome::Missed;
     for _ in 0..(plan.steps_to_impact() + STEPS_AFTER).min(MOST_STEPS) {
         seconds += DT;
-        if let Some(waves) = waves {
-            arena.reshape(waves, &plan.waves(seconds, rng), SamePoints::No)?;
+        if matches!(ground, Ground::Waves { .. }) {
+            arena.reshape(floor, &plan.waves(seconds, rng), SamePoints::No)?;
         }
         arena.step()?;
         let at = arena.position(body);
-        let height = height_at(at, seconds);
+        let height = ground.over(at, seconds);
         if height < 0.0 && last_height >= 0.0 {
-            let is_under = |p: &Vec3| height_at(*p, seconds) < 0.0;
-            let crossing = way_through_waves(last, at, plan).find(is_under);
+            let crossing = ground.crossing(last, at, seconds);
             return Ok(if is_within(crossing.unwrap_or(at)) {
                 Outcome::Passed
             } else {
