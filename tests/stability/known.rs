@@ -51,8 +51,9 @@ const RESAMPLED: &str =
     "New samples bring new gaps in every frame, which push although nothing moved.";
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
                          mean depth.";
-const DEEP_IN_WAVES: &str = "Four of 1,000 hits: a wave that rises faster than rapier undoes penetrations, too \
-                             bent and too slow for its speed to be told from the noise of its samples.";
+const DEEP_IN_WAVES: &str = "One of 1,000 hits: of small bodies in troughs hardly wider than they are, where a wave rises \
+                             faster than rapier undoes penetrations, or sweeps stop at a crest that contacts, deep \
+                             below it, do not face.";
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
                             it spins off, as the primitive does, with a little less height, and may land \
                             again with up to 10 % more energy.";
@@ -72,11 +73,11 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "tunnelling",
         "scan",
-        "Six of 10,000 hits: of a small body that is deep in a rough scan without normals a further \
+        "One of 10,000 hits: of a small spinning body that is deep in a rough scan without normals a further \
          view takes the wrong side.",
     )
     .no_worse_than("passed_share", 0.03),
-    known("tunnelling", "waves", DEEP_IN_WAVES).no_worse_than("passed_share", 0.06),
+    known("tunnelling", "waves", DEEP_IN_WAVES).no_worse_than("passed_share", 0.04),
     known(
         "density",
         "1 % flying pixels",

@@ -25,6 +25,10 @@ const SAME_GROUP: f32 = 0.866;
 /// A part whose pixels' unit normals have a mean shorter than this (a spread of about 14°) is split.
 const FLAT: f32 = 0.97;
 
+/// A surface's normal averaged over linked neighbours that is shorter than this (a spread of 26°) is a mean
+/// over a crease, which says nothing of a bend.
+const CREASED: f32 = 0.9;
+
 /// Patches of fewer pixels are not split.
 const LEAST_SPLIT: usize = 12;
 
@@ -299,7 +303,7 @@ fn least_gap(members: &[u32], smooth: &[Smooth]) -> f32 {
 /// Normal and main direction of a part.
 struct Shape {
     normal: Vec3,
-    /// Length of the mean of the contact pixels' unit normals: 1 where they agree.
+    /// Length of the mean of the unit normals of the contact pixels beside creases: 1 where they agree.
     normal_length: f32,
     least_gap: f32,
     /// Greatest gap of a support point.
@@ -313,7 +317,7 @@ impl Shape {
     fn of(members: &[u32], contacts: &[ContactPixel], smooth: &[Smooth], params: &Params) -> Self {
         let least_gap = least_gap(members, smooth);
         let (mut mean_a, mut mean_b, mut mean) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-        let (mut total, mut sum) = (0.0, Vec3::ZERO);
+        let (mut total, mut sum, mut uncreased) = (0.0, Vec3::ZERO, 0.0_f32);
         let normal_band = NORMAL_BAND * params.pixel_size;
         for s in members.iter().map(|&m| &smooth[m as usize]) {
             let w = falloff(s.gap - least_gap, normal_band);
@@ -321,7 +325,10 @@ impl Shape {
             mean_b += w * s.normal_b;
             mean += w * s.normal;
             total += w;
-            sum += s.normal;
+            if s.normal_a.length().min(s.normal_b.length()) >= CREASED {
+                sum += s.normal;
+                uncreased += 1.0;
+            }
         }
         let normal = common_normal(mean_a / total, mean_b / total)
             .or_else(|| mean.try_normalize())
@@ -337,7 +344,11 @@ impl Shape {
         let centre = in_band().sum::<Vec3>() / in_band().count() as f32;
         Self {
             normal,
-            normal_length: sum.length() / members.len() as f32,
+            normal_length: if uncreased > 0.0 {
+                sum.length() / uncreased
+            } else {
+                1.0
+            },
             least_gap,
             support_gap,
             centre,
