@@ -51,7 +51,7 @@ const RESAMPLED: &str =
     "New samples bring new gaps in every frame, which push although nothing moved.";
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
                          mean depth.";
-const DEEP_IN_WAVES: &str = "One of 1,000 hits: of small bodies in troughs hardly wider than they are, where a wave rises \
+const DEEP_IN_WAVES: &str = "Fourteen of 10,000 hits: of small bodies in troughs hardly wider than they are, where a wave rises \
                              faster than rapier undoes penetrations, or sweeps stop at a crest that contacts, deep \
                              below it, do not face.";
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
@@ -73,10 +73,16 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "tunnelling",
         "scan",
-        "One of 10,000 hits: of a small spinning body that is deep in a rough scan without normals a further \
+        "Seven of 100,000 hits: of a small spinning body that is deep in a rough scan without normals a further \
          view takes the wrong side.",
     )
     .no_worse_than("passed_share", 0.03),
+    known(
+        "tunnelling",
+        "sheet",
+        "One of 57,000 hits: a spinning box that slides at 16 m/s turns its middle 0.01 r̄ under the sheet.",
+    )
+    .no_worse_than("passed_share", 0.002),
     known("tunnelling", "waves", DEEP_IN_WAVES).no_worse_than("passed_share", 0.04),
     known(
         "density",
