@@ -51,9 +51,9 @@ const RESAMPLED: &str =
     "New samples bring new gaps in every frame, which push although nothing moved.";
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
                          mean depth.";
-const DEEP_IN_WAVES: &str = "Fourteen of 10,000 hits: of small bodies in troughs hardly wider than they are, where a wave rises \
-                             faster than rapier undoes penetrations, or sweeps stop at a crest that contacts, deep \
-                             below it, do not face.";
+const DEEP_IN_WAVES: &str = "Fourteen of 10,000 hits: of small bodies in troughs hardly wider than they are, \
+                             where a wave rises faster than rapier undoes penetrations, or sweeps stop at a \
+                             crest that contacts, deep below it, do not face.";
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
                             it spins off, as the primitive does, with a little less height, and may land \
                             again with up to 10 % more energy.";
@@ -73,30 +73,31 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "tunnelling",
         "scan",
-        "Seven of 100,000 hits: of a small spinning body that is deep in a rough scan without normals a further \
-         view takes the wrong side.",
+        "Seven of 100,000 hits: of a small spinning body that is deep in a rough scan without normals a \
+         further view takes the wrong side.",
     )
     .no_worse_than("passed_share", 0.03),
     known(
         "tunnelling",
         "sheet",
-        "One of 57,000 hits: a spinning box that slides at 16 m/s turns its middle 0.01 r̄ under the sheet.",
+        "One of 57,000 hits: a spinning box that slides at 16 m/s turns its middle 0.01 r̄ under the \
+         sheet.",
     )
     .no_worse_than("passed_share", 0.002),
     known("tunnelling", "waves", DEEP_IN_WAVES).no_worse_than("passed_share", 0.04),
     known(
         "density",
         "1 % flying pixels",
-        "Of twenty seeds four fail: points up to three radii above the floor, or some near each other, are \
+        "Of twenty seeds five fail: points up to three radii above the floor, or some near each other, are \
          not told from a surface.",
     ),
     known(
         "grazing",
         "ball in a groove, bare",
-        "Near the bottom of a groove without normals, the estimated ones are means of both sides; \
-         at one angle of one seed in five a depth of 10 r̄ is made up.",
+        "Near the bottom of a groove without normals, the estimated ones are means of both sides: at one \
+         angle of thirteen seeds in twenty a normal is 15° off, of two a gap by 0.3 r̄.",
     )
-    .no_worse_than("worst_gap_error_mean_radii", 10.0),
+    .no_worse_than("worst_gap_error_mean_radii", 0.5),
     known(
         "grazing",
         "ball in a groove, oriented",

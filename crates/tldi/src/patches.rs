@@ -300,10 +300,24 @@ fn least_gap(members: &[u32], smooth: &[Smooth]) -> f32 {
         .fold(f32::INFINITY, |g, &m| g.min(smooth[m as usize].gap))
 }
 
+/// Length of the mean of the unit normals of the members that are at no crease: 1 where they agree, or where
+/// there is none.
+fn normal_length(members: &[u32], smooth: &[Smooth]) -> f32 {
+    let (sum, count) = members
+        .iter()
+        .map(|&m| &smooth[m as usize])
+        .filter(|s| s.normal_a.length().min(s.normal_b.length()) >= CREASED)
+        .fold((Vec3::ZERO, 0), |(sum, n), s| (sum + s.normal, n + 1));
+    match count {
+        0 => 1.0,
+        _ => sum.length() / count as f32,
+    }
+}
+
 /// Normal and main direction of a part.
 struct Shape {
     normal: Vec3,
-    /// Length of the mean of the unit normals of the contact pixels beside creases: 1 where they agree.
+    /// See [`normal_length`].
     normal_length: f32,
     least_gap: f32,
     /// Greatest gap of a support point.
@@ -317,7 +331,7 @@ impl Shape {
     fn of(members: &[u32], contacts: &[ContactPixel], smooth: &[Smooth], params: &Params) -> Self {
         let least_gap = least_gap(members, smooth);
         let (mut mean_a, mut mean_b, mut mean) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-        let (mut total, mut sum, mut uncreased) = (0.0, Vec3::ZERO, 0.0_f32);
+        let mut total = 0.0;
         let normal_band = NORMAL_BAND * params.pixel_size;
         for s in members.iter().map(|&m| &smooth[m as usize]) {
             let w = falloff(s.gap - least_gap, normal_band);
@@ -325,10 +339,6 @@ impl Shape {
             mean_b += w * s.normal_b;
             mean += w * s.normal;
             total += w;
-            if s.normal_a.length().min(s.normal_b.length()) >= CREASED {
-                sum += s.normal;
-                uncreased += 1.0;
-            }
         }
         let normal = common_normal(mean_a / total, mean_b / total)
             .or_else(|| mean.try_normalize())
@@ -344,11 +354,7 @@ impl Shape {
         let centre = in_band().sum::<Vec3>() / in_band().count() as f32;
         Self {
             normal,
-            normal_length: if uncreased > 0.0 {
-                sum.length() / uncreased
-            } else {
-                1.0
-            },
+            normal_length: normal_length(members, smooth),
             least_gap,
             support_gap,
             centre,

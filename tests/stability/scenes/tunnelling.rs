@@ -12,7 +12,8 @@ pub(crate) const SCENE: Scene = Scene {
     about: "Boxes and balls of 2 mm to 1 m, of a few hundred points each, at 0 to 200 m/s, 0 to \
             75° off the normal, spinning up to 50 rad/s, with `ccd_enabled`, onto a sheet, a spot \
             of a scan (scaled to the body) and a sheet that waves (new points each frame).",
-    rule: "No body's middle passes through the surface (of a scan: the mean height of its points within 2 r̄).",
+    rule: "No body's middle passes through the surface (of a scan: the mean height of its points \
+           within 2 r̄).",
     cases,
 };
 

@@ -275,7 +275,7 @@ fn watch(
         let height = ground.over(at, seconds);
         if height < 0.0 && last_height >= 0.0 {
             let crossing = ground.crossing(last, at, seconds);
-            return Ok(if is_within(crossing.unwrap_or(at)) {
+            return Ok(if crossing.is_some_and(is_within) {
                 Outcome::Passed
             } else {
                 outcome
