@@ -1,9 +1,11 @@
 //! Clouds against surfaces known exactly, which are seen by rays.
 
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{Aabb, Backend, BackendError, CpuBackend, Params, RayHit, RaySurface, Surface};
+use tldi::{
+    Aabb, Backend, BackendError, CpuBackend, Params, PointCloud, RayHit, RaySurface, Surface,
+};
 use tldi_tests::{
-    HalfSpace, aimed, compare, deepest_point, random_pose, random_unit, sampled_sphere,
+    HalfSpace, aimed, compare, deepest_point, random_pose, random_unit, sampled_box, sampled_sphere,
 };
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
@@ -60,6 +62,40 @@ fn clouds_deep_inside_exact_solids() {
         assert!(result.patches[0].normal.y > 0.99, "{:?}", result.patches);
         let gap = deepest_point(&result).expect("there is a patch").0;
         assert!((gap + 0.3 + radius).abs() < 0.45 * R, "{gap}");
+    }
+}
+
+/// The corner of a cube of 60,000 points is found on a half-space, in whatever order the points are: a few of them
+/// are near.
+#[test]
+fn few_points_among_many_are_found() {
+    let mut rng = fastrand::Rng::with_seed(8);
+    let half = 0.5;
+    let mut points = sampled_box(Vec3::splat(half), R, &mut rng).points;
+    for shuffled in [false, true] {
+        if shuffled {
+            rng.shuffle(&mut points);
+        }
+        let cloud = PointCloud::builder(&points)
+            .radius(R)
+            .build()
+            .expect("a valid cloud");
+        for _ in 0..6 {
+            let turn = random_pose(&mut rng, 0.0).rotation;
+            let lowest = (0..8)
+                .map(|k| [1, 2, 4].map(|bit| if k & bit == 0 { half } else { -half }))
+                .map(|corner| (turn * Vec3::from(corner)).y)
+                .fold(f32::INFINITY, f32::min);
+            // Bare corners are felt up to a radius too low.
+            let pose = Pose3::from_parts((-lowest - 2.0 * R) * Vec3::Y, turn);
+            let result = compare(
+                Surface::Exact(&HalfSpace),
+                Surface::Cloud(&cloud),
+                pose,
+                Params::for_radius(R),
+            );
+            assert!(!result.patches.is_empty(), "{pose:?}");
+        }
     }
 }
 

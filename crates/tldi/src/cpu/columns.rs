@@ -11,6 +11,7 @@ use super::rect::{Footprint, Rect};
 use super::splat::splat_radius;
 use crate::{Projection, VirtualCamera};
 use glamx::{Mat3, Vec3};
+use std::f32::consts::FRAC_1_SQRT_2;
 
 /// Least edge of a tile in pixels: smaller ones cost more than they leave out.
 const LEAST_TILE: i32 = 2;
@@ -34,6 +35,8 @@ pub(crate) struct Columns {
     pub(crate) tile: Vec<u32>,
     /// For each tile the least depth (of `a`) or the greatest (of `b`) of what may be seen in it.
     depths: Vec<f32>,
+    /// The negative of the greatest ones, where both are of interest.
+    greatest: Vec<f32>,
     spare: Vec<f32>,
 }
 
@@ -162,6 +165,26 @@ impl Columns {
         });
     }
 
+    /// Whether in a tile a point lies less than `reach` metres behind one of `b`, or before it. After
+    /// [`reduce`](Self::reduce) with the signs 1 and, for `b`, -1.
+    pub(crate) fn meet(&self, b: &Self, tile: usize, reach: f32) -> bool {
+        self.depths[tile] + b.depths[tile] <= reach
+    }
+
+    /// Finds each tile's least and greatest depth, metres, that a splat of it or of its neighbours may have,
+    /// `margin` beyond its point.
+    pub(crate) fn reduce_both(&mut self, tiles: &Tiles, margin: f32) {
+        self.reduce(tiles, -1.0, margin);
+        std::mem::swap(&mut self.depths, &mut self.greatest);
+        self.reduce(tiles, 1.0, margin);
+    }
+
+    /// Least and greatest depth in a tile, metres; in this order where it holds something. After
+    /// [`reduce_both`](Self::reduce_both).
+    pub(crate) fn depths(&self, tile: usize) -> [f32; 2] {
+        [self.depths[tile], -self.greatest[tile]]
+    }
+
     /// Fills `out` with the indices of all points that are in view.
     pub(crate) fn in_view(&self, out: &mut Vec<u32>) {
         let all = 0..self.tile.len() as u32;
@@ -219,6 +242,17 @@ impl Tiles {
         first * self.dims[0]..end.min(self.dims[1]) * self.dims[0]
     }
 
+    /// Half the diagonal of a tile, pixels.
+    pub(crate) fn half_diagonal(&self) -> f32 {
+        FRAC_1_SQRT_2 * self.edge as f32
+    }
+
+    /// Pixel coordinates of the middle of a tile.
+    pub(crate) fn middle(&self, tile: usize) -> [f32; 2] {
+        let place = [tile % self.dims[0], tile / self.dims[0]];
+        [0, 1].map(|k| self.origin[k] as f32 + (place[k] as f32 + 0.5) * self.edge as f32)
+    }
+
     fn of(&self, pixel: [f32; 2]) -> u32 {
         let [x, y] = [0, 1].map(|k| (pixel[k].floor() - self.origin[k] as f32) / self.edge as f32);
         let [w, h] = self.dims.map(|d| d as f32);
@@ -231,18 +265,15 @@ impl Tiles {
 }
 
 impl Touching {
-    /// Marks the tiles in which a point of `a` lies less than `reach` metres behind one of `b`, or
-    /// before it, and those from which splats reach into them; the neighbours of their points are
-    /// within `support_px` pixels. Returns the pixels of `rect` in the former tiles, or `None` where
-    /// there is no such tile.
+    /// Marks the tiles in which the surfaces can `meet`, and those from which splats reach into them; the
+    /// neighbours of their points are within `support_px` pixels. Returns the pixels of `rect` in the
+    /// former tiles, or `None` where there is no such tile.
     pub(crate) fn mark(
         &mut self,
-        a: &Columns,
-        b: &Columns,
         tiles: &Tiles,
         rect: &Rect,
-        reach: f32,
         support_px: f32,
+        meet: impl Fn(usize) -> bool,
     ) -> Option<Rect> {
         let [width, height] = tiles.dims;
         self.modelled.clear();
@@ -251,8 +282,7 @@ impl Touching {
         for y in 1..height - 1 {
             for x in 1..width - 1 {
                 let k = y * width + x;
-                // `b` holds the negative of the greatest depth.
-                if a.depths[k] + b.depths[k] <= reach {
+                if meet(k) {
                     self.modelled[k] = 1;
                     lo = [lo[0].min(x), lo[1].min(y)];
                     hi = [hi[0].max(x), hi[1].max(y)];
@@ -401,7 +431,8 @@ mod tests {
             columns_b.sort(&tiles, &camera);
             columns_b.reduce(&tiles, -1.0, 0.0);
             let mut touching = Touching::default();
-            touching.mark(&columns_a, &columns_b, &tiles, &rect, REACH, 0.0);
+            let meet = |tile: usize| columns_a.meet(&columns_b, tile, REACH);
+            touching.mark(&tiles, &rect, 0.0, meet);
             let meet = |i: usize, j: usize, apart: f32| {
                 (a.x[i] - b.x[j]).abs() <= apart
                     && (a.y[i] - b.y[j]).abs() <= apart

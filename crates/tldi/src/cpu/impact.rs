@@ -8,7 +8,7 @@
 use super::columns::{Columns, dilate};
 use super::cull::{self, PointRadii, Region};
 use super::pair::Scratch;
-use super::side::{CloudView, ExactView};
+use super::side::{CloudView, ExactView, Scope};
 use super::splat::splat_radius;
 use super::sweep::is_edge_on;
 use crate::lone_points::is_alone;
@@ -232,7 +232,7 @@ impl Scratch {
             params,
         };
         let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
-        let hits = &mut self.hits;
+        let (hits, touching) = (&mut self.hits, &mut self.touching);
         match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
                 let reach = length + query.params.merge_gap;
@@ -243,22 +243,22 @@ impl Scratch {
                     surface,
                     frame_from_surface: a_from_a,
                     reach: length,
-                    everywhere: false,
+                    scope: Scope::Cloud,
                 };
                 let image = &mut self.a.image;
                 self.b
-                    .look_with(&view_of(cloud, a_from_b), &exact, hits, image)
+                    .look_with(&view_of(cloud, a_from_b), &exact, touching, hits, image)
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
                 let exact = ExactView {
                     surface,
                     frame_from_surface: a_from_b,
                     reach: length,
-                    everywhere: true, // its rim is not that of the cloud
+                    scope: Scope::Everywhere, // its rim is not that of the cloud
                 };
                 let image = &mut self.b.image;
                 self.a
-                    .look_with(&view_of(cloud, a_from_a), &exact, hits, image)
+                    .look_with(&view_of(cloud, a_from_a), &exact, touching, hits, image)
             }
             _ => None, // refused
         }

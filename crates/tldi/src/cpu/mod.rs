@@ -11,6 +11,7 @@ pub(crate) mod compare;
 pub(crate) mod cull;
 mod impact;
 mod lanes;
+mod near_exact;
 pub(crate) mod normals;
 mod pair;
 mod rect;

@@ -4,7 +4,8 @@ use super::columns::{Tiles, Touching};
 use super::compare::{self, Crossings, Middles, Seen};
 use super::cull;
 use super::impact::{CoreScratch, Meeting};
-use super::side::{CloudView, ExactView, Side};
+use super::near_exact::Placed;
+use super::side::{CloudView, ExactView, Scope, Side};
 use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneGrid, ZoneScratch};
 use crate::camera_policy::{MAX_VIEWS, ZoneNormals, aim, further_axes, seen_from_behind};
@@ -25,7 +26,7 @@ pub(super) struct Scratch {
     pub(super) core: CoreScratch,
     pub(super) meetings: Vec<Meeting>,
     zone: ZoneScratch,
-    touching: Touching,
+    pub(super) touching: Touching,
     crossings: Crossings,
     paper: [paper::Scratch; 2],
     patches: PatchScratch,
@@ -163,16 +164,22 @@ impl Scratch {
                 true
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
-                let frame = Pose3::IDENTITY;
                 let near = &mut self.b.near_normals;
+                let exact = Placed {
+                    surface,
+                    frame_from_surface: &query.a_from_b,
+                };
                 self.a
-                    .near_exact(cloud, &frame, surface, &query.a_from_b, reach, near)
+                    .near_exact(cloud, &Pose3::IDENTITY, &exact, reach, near)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
-                let frame = Pose3::IDENTITY;
                 let near = &mut self.a.near_normals;
+                let exact = Placed {
+                    surface,
+                    frame_from_surface: &Pose3::IDENTITY,
+                };
                 self.b
-                    .near_exact(cloud, &query.a_from_b, surface, &frame, reach, near)
+                    .near_exact(cloud, &query.a_from_b, &exact, reach, near)
             }
             _ => false, // refused
         }
@@ -219,10 +226,10 @@ impl Scratch {
             surface,
             frame_from_surface,
             reach: 2.0 * deepest,
-            everywhere: false,
+            scope: Scope::Near(plan.column_reach),
         };
         let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
-        let hits = &mut self.hits;
+        let (hits, touching) = (&mut self.hits, &mut self.touching);
         let looked = match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
                 let (a, b) = (view_of(a, a_from_a), view_of(b, a_from_b));
@@ -231,12 +238,12 @@ impl Scratch {
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
                 let exact = exact_view(surface, a_from_b, self.a.deepest);
                 let (cloud, image) = (view_of(cloud, a_from_a), &mut self.b.image);
-                self.a.look_with(&cloud, &exact, hits, image)
+                self.a.look_with(&cloud, &exact, touching, hits, image)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
                 let exact = exact_view(surface, a_from_a, self.b.deepest);
                 let (cloud, image) = (view_of(cloud, a_from_b), &mut self.a.image);
-                self.b.look_with(&cloud, &exact, hits, image)
+                self.b.look_with(&cloud, &exact, touching, hits, image)
             }
             _ => None, // refused
         };
@@ -290,7 +297,8 @@ impl Scratch {
         let support_px = support / seen_a.pixel_size.min(seen_b.pixel_size);
         let touching = &mut self.touching;
         let (columns_a, columns_b) = (&side_a.columns, &side_b.columns);
-        let rect = touching.mark(columns_a, columns_b, &tiles, &rect, reach, support_px)?;
+        let meet = |tile: usize| columns_a.meet(columns_b, tile, reach);
+        let rect = touching.mark(&tiles, &rect, support_px, meet)?;
         let imaging = Imaging {
             camera,
             params,

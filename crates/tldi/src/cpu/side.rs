@@ -4,8 +4,9 @@ use super::cast::{self, Rays};
 use super::columns::{Columns, Tiles, Touching};
 use super::cull::{CullScratch, PointRadii, Survivors};
 use super::impact::BORDER;
+use super::near_exact::{CellDistances, Placed};
 use super::normals::{self, NormalScratch};
-use super::rect::Footprint;
+use super::rect::{Footprint, Rect};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
 use super::sweep;
 use crate::plan::{AIM_SAMPLES, is_aim_sample};
@@ -23,12 +24,13 @@ pub(super) struct Side {
     /// Normals of some of the near points, in the frame of the query.
     pub(super) near_normals: Vec<Vec3>,
     /// Indices of the points that are modelled, and their normals in the view frame.
-    kept: Vec<u32>,
+    pub(super) kept: Vec<u32>,
     kept_normals: Vec<Vec3>,
     /// Indices of the points whose positions decide those normals.
-    support: Vec<u32>,
-    normals: NormalScratch,
+    pub(super) support: Vec<u32>,
+    pub(super) normals: NormalScratch,
     fragments: Fragments,
+    pub(super) cell_distances: CellDistances,
     /// Greatest depth of a sampled point inside an exact surface, metres.
     pub(super) deepest: f32,
     pub(super) image: Tldi,
@@ -50,8 +52,18 @@ pub(super) struct ExactView<'a> {
     pub(super) frame_from_surface: &'a Pose3,
     /// How far beyond the cloud the surface is of interest, metres.
     pub(super) reach: f32,
-    /// Whether it is looked at where the cloud is not, and around.
-    pub(super) everywhere: bool,
+    pub(super) scope: Scope,
+}
+
+/// Where an exact surface is looked at.
+#[derive(Clone, Copy)]
+pub(super) enum Scope {
+    /// Where the cloud is, in columns in which it is within so many metres of it.
+    Near(f32),
+    /// Where the cloud is.
+    Cloud,
+    /// Where the cloud is not, too, and around.
+    Everywhere,
 }
 
 impl CloudView<'_> {
@@ -77,7 +89,7 @@ impl Side {
             &self.near,
             |i| self.points.point(i as usize),
             |k| is_aim_sample(self.points.index[self.near[k] as usize], step),
-            normals::SUPPORT * PointRadii::new(cloud, &self.points).mean(),
+            normals::SUPPORT * self.mean_radius(cloud),
             &mut self.normals,
             &mut self.kept,
             &mut self.near_normals,
@@ -90,50 +102,9 @@ impl Side {
         (near.map(|p| p.as_dvec3()).sum::<DVec3>() / self.near.len() as f64).as_vec3()
     }
 
-    /// Samples the culled points near an exact surface; its normals at the nearest points go to
-    /// `surface_normals`. `false` where none is near.
-    pub(super) fn near_exact(
-        &mut self,
-        cloud: &PointCloud,
-        frame_from_cloud: &Pose3,
-        surface: &dyn RaySurface,
-        frame_from_surface: &Pose3,
-        reach: f32,
-        surface_normals: &mut Vec<Vec3>,
-    ) -> bool {
-        surface_normals.clear();
-        self.near.clear();
-        self.deepest = 0.0;
-        let step = self.points.len().div_ceil(AIM_SAMPLES).max(1);
-        for i in (0..self.points.len()).step_by(step) {
-            let point = frame_from_surface.inverse_transform_point(self.points.point(i));
-            let (distance, normal) = surface.project(point);
-            self.deepest = self.deepest.max(-distance);
-            if distance <= reach {
-                self.near.push(i as u32);
-                surface_normals.push(frame_from_surface.rotation * normal);
-            }
-        }
-        if self.near.is_empty() {
-            return false;
-        }
-        if cloud.normals().is_some() {
-            self.sample_normals(cloud, frame_from_cloud);
-        } else {
-            // Neighbours are not among the samples.
-            self.support.clear();
-            self.support.extend(0..self.points.len() as u32);
-            normals::estimate(
-                &self.support,
-                |i| self.points.point(i as usize),
-                |k| self.near.binary_search(&(k as u32)).is_ok(),
-                normals::SUPPORT * PointRadii::new(cloud, &self.points).mean(),
-                &mut self.normals,
-                &mut self.kept,
-                &mut self.near_normals,
-            );
-        }
-        true
+    /// Mean radius of the culled points, metres.
+    pub(super) fn mean_radius(&self, cloud: &PointCloud) -> f32 {
+        PointRadii::new(cloud, &self.points).mean()
     }
 
     /// Moves the culled points into the view and returns what they cover.
@@ -146,7 +117,7 @@ impl Side {
     pub(super) fn support(&self, view: &CloudView) -> f32 {
         match view.cloud.normals() {
             Some(_) => 0.0,
-            None => normals::SUPPORT * PointRadii::new(view.cloud, &self.points).mean(),
+            None => normals::SUPPORT * self.mean_radius(view.cloud),
         }
     }
 
@@ -161,6 +132,38 @@ impl Side {
         };
         self.columns.sort(&imaging.tiles, view.camera);
         self.image(view, &imaging, None);
+    }
+
+    /// The image of the points that were projected in the columns in which they are within `reach` metres of an
+    /// exact surface. Returns its pixels; `None` where it is nowhere.
+    fn image_near(
+        &mut self,
+        view: &CloudView,
+        seen: &Footprint,
+        exact: &Placed,
+        reach: f32,
+        touching: &mut Touching,
+    ) -> Option<Rect> {
+        let tiles = Tiles::new(&seen.rect, seen.reach);
+        self.columns.sort(&tiles, view.camera);
+        let margin = view.params.slope_damping * seen.radius;
+        self.columns.reduce_both(&tiles, margin);
+        let support_px = self.support(view) / seen.pixel_size;
+        let reach = reach + tiles.half_diagonal() * seen.pixel_size;
+        let meets = |tile: usize| {
+            let depths = self.columns.depths(tile);
+            exact.meets(view.camera, tiles.middle(tile), depths, reach)
+        };
+        let rect = touching.mark(&tiles, &seen.rect, support_px, meets)?;
+        let imaging = Imaging {
+            camera: view.camera,
+            params: view.params,
+            rect,
+            tiles,
+            scale: DepthScale::new(seen.near, view.params),
+        };
+        self.image(view, &imaging, Some(touching));
+        Some(rect)
     }
 
     /// The image of the points that were sorted into tiles: all in view, or those in the tiles of
@@ -223,7 +226,7 @@ impl Side {
             support,
             |i| self.columns.view(i as usize),
             wanted,
-            normals::SUPPORT * PointRadii::new(view.cloud, &self.points).mean(),
+            normals::SUPPORT * self.mean_radius(view.cloud),
             &mut self.normals,
             &mut self.kept,
             &mut self.kept_normals,
@@ -236,14 +239,25 @@ impl Side {
         &mut self,
         view: &CloudView,
         exact: &ExactView,
+        touching: &mut Touching,
         hits: &mut Vec<RayHit>,
         image: &mut Tldi,
     ) -> Option<()> {
         let mut seen = self.project(view)?;
-        if exact.everywhere {
-            seen.rect = seen.rect.grown(BORDER);
+        match exact.scope {
+            Scope::Near(reach) => {
+                let placed = Placed {
+                    surface: exact.surface,
+                    frame_from_surface: exact.frame_from_surface,
+                };
+                seen.rect = self.image_near(view, &seen, &placed, reach, touching)?;
+            }
+            Scope::Cloud => self.whole_image(view, &seen),
+            Scope::Everywhere => {
+                seen.rect = seen.rect.grown(BORDER);
+                self.whole_image(view, &seen);
+            }
         }
-        self.whole_image(view, &seen);
         // Rays must pass through all of the surface, or what is deepest would be missed.
         let extent = exact.surface.bounds().extents().length();
         let through = if extent.is_finite() { extent } else { 0.0 };
@@ -253,7 +267,7 @@ impl Side {
             rect: seen.rect,
             near: seen.near - margin,
             far: seen.far + margin,
-            cover: (!exact.everywhere).then_some(&self.image),
+            cover: (!matches!(exact.scope, Scope::Everywhere)).then_some(&self.image),
         };
         cast::cast(exact.surface, exact.frame_from_surface, &rays, hits, image);
         Some(())

@@ -38,13 +38,18 @@ pub struct ZoneGrid {
 impl ZoneGrid {
     /// Cells of `reach` metres, or larger where `bounds` would have too many.
     pub fn new(bounds: &Aabb, reach: f32) -> Self {
+        Self::with_cells(bounds, reach, MAX_CELLS)
+    }
+
+    /// The same with `most` cells, of which there is one at least.
+    pub(super) fn with_cells(bounds: &Aabb, reach: f32, most: f32) -> Self {
         let extents = bounds.extents().max(Vec3::ZERO);
         let mut cell = reach;
         let count = |cell: f32| {
             let n = (extents / cell).floor() + Vec3::ONE;
             n.x * n.y * n.z
         };
-        while count(cell) > MAX_CELLS {
+        while count(cell) > most {
             cell *= 1.26; // a third of an octave: twice fewer cells
         }
         let dims = (extents / cell).floor() + Vec3::ONE;

@@ -1,0 +1,222 @@
+//! Stage `zone` for a cloud and an exact surface: which of the culled points are near it.
+//!
+//! Asking a surface for its distance is dear, and few points are near. So it is asked once for each
+//! cell of a coarse grid that holds points: nothing in the cell is nearer than its middle by more than half its
+//! diagonal. Of the points in cells that can be near, an even selection aims the camera; all of them
+//! are asked where it finds few, so that no contact is too small to be found.
+
+use super::normals;
+use super::side::Side;
+use super::zone::ZoneGrid;
+use crate::plan::{AIM_SAMPLES, is_aim_sample};
+use crate::{Aabb, PointCloud, RaySurface, VirtualCamera};
+use glamx::{Pose3, Vec3};
+
+/// Fewest near points of a selection that stand for all.
+const ENOUGH: usize = 32;
+
+/// Share of its reach by which a surface is farther away that counts as nothing: a march toward it would not
+/// end.
+const LEAST_FREE: f32 = 0.05;
+
+/// Least distances of what is in the cells, in metres, not a number where nothing was asked yet; kept from
+/// call to call.
+#[derive(Default)]
+pub(super) struct CellDistances(Vec<f32>);
+
+/// An exact surface where a pair has it.
+pub(super) struct Placed<'a> {
+    pub(super) surface: &'a dyn RaySurface,
+    pub(super) frame_from_surface: &'a Pose3,
+}
+
+impl Placed<'_> {
+    /// Signed distance, and the normal at the nearest point, in the frame of the pair.
+    pub(super) fn project(&self, point: Vec3) -> (f32, Vec3) {
+        let own = self.frame_from_surface.inverse_transform_point(point);
+        let (distance, normal) = self.surface.project(own);
+        (distance, self.frame_from_surface.rotation * normal)
+    }
+
+    /// Whether it comes within `reach` metres of a column of pixels: of one through `[u, v]`, between two depths.
+    /// Marches along it, each time as far as nothing can be near.
+    pub(super) fn meets(
+        &self,
+        camera: &VirtualCamera,
+        [u, v]: [f32; 2],
+        [mut depth, end]: [f32; 2],
+        reach: f32,
+    ) -> bool {
+        while depth <= end {
+            let (distance, _) = self.project(camera.point_at(u, v, depth));
+            let free = distance - reach;
+            if free.is_nan() || free <= LEAST_FREE * reach {
+                return true;
+            }
+            depth += free;
+        }
+        false
+    }
+}
+
+impl Side {
+    /// Finds the culled points within `reach` metres of an exact surface or inside it, or an even selection of
+    /// them; its normals at the nearest points go to `surface_normals`. `false` where none is near.
+    pub(super) fn near_exact(
+        &mut self,
+        cloud: &PointCloud,
+        frame_from_cloud: &Pose3,
+        exact: &Placed,
+        reach: f32,
+        surface_normals: &mut Vec<Vec3>,
+    ) -> bool {
+        let support = match cloud.normals() {
+            Some(_) => 0.0,
+            None => normals::SUPPORT * self.mean_radius(cloud),
+        };
+        self.in_near_cells(exact, reach, support);
+        let step = self.kept.len().div_ceil(AIM_SAMPLES) as u32;
+        self.select_near(exact, reach, step, surface_normals);
+        if step > 1 && self.near.len() < ENOUGH {
+            self.select_near(exact, reach, 1, surface_normals);
+        }
+        if self.near.is_empty() {
+            return false;
+        }
+        if cloud.normals().is_some() {
+            self.sample_normals(cloud, frame_from_cloud);
+        } else {
+            // Neighbours are not among the samples.
+            let of_support = &self.support;
+            normals::estimate(
+                of_support,
+                |i| self.points.point(i as usize),
+                |k| self.near.binary_search(&of_support[k]).is_ok(),
+                support,
+                &mut self.normals,
+                &mut self.kept,
+                &mut self.near_normals,
+            );
+        }
+        true
+    }
+
+    /// Fills `kept` with the points in cells that reach within `reach` metres of the surface, and `support`
+    /// with those within `beyond` metres more.
+    fn in_near_cells(&mut self, exact: &Placed, reach: f32, beyond: f32) {
+        let points = (0..self.points.len()).map(|i| self.points.point(i));
+        let bounds = points.fold(Aabb::EMPTY, Aabb::including);
+        let grid = ZoneGrid::with_cells(&bounds, reach, self.points.len() as f32);
+        let half_diagonal = 0.5 * 3.0f32.sqrt() / grid.inv_cell;
+        let distances = &mut self.cell_distances.0;
+        distances.clear();
+        distances.resize(grid.dims.iter().product(), f32::NAN);
+        self.support.clear();
+        self.kept.clear();
+        for i in 0..self.points.len() {
+            let at = ((self.points.point(i) - bounds.min) * grid.inv_cell).floor();
+            let cell = [at.x, at.y, at.z];
+            let [x, y, z] = [0, 1, 2].map(|k| (cell[k] as usize).min(grid.dims[k] - 1));
+            let least = &mut distances[(z * grid.dims[1] + y) * grid.dims[0] + x];
+            if least.is_nan() {
+                let cell = Vec3::new(x as f32, y as f32, z as f32);
+                let middle = bounds.min + (cell + 0.5) / grid.inv_cell;
+                *least = exact.project(middle).0 - half_diagonal;
+            }
+            if *least <= reach + beyond {
+                self.support.push(i as u32);
+                if *least <= reach {
+                    self.kept.push(i as u32);
+                }
+            }
+        }
+    }
+
+    /// Fills `near` with those of about every `step`-th of the points in `kept` that are near.
+    fn select_near(
+        &mut self,
+        exact: &Placed,
+        reach: f32,
+        step: u32,
+        surface_normals: &mut Vec<Vec3>,
+    ) {
+        self.near.clear();
+        surface_normals.clear();
+        self.deepest = 0.0;
+        for &i in &self.kept {
+            if !is_aim_sample(self.points.index[i as usize], step) {
+                continue;
+            }
+            let (distance, normal) = exact.project(self.points.point(i as usize));
+            self.deepest = self.deepest.max(-distance);
+            if distance <= reach {
+                self.near.push(i);
+                surface_normals.push(normal);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RayHit;
+    use fastrand::Rng;
+
+    /// A ball of one metre.
+    struct Ball;
+
+    impl RaySurface for Ball {
+        fn bounds(&self) -> Aabb {
+            Aabb {
+                min: Vec3::NEG_ONE,
+                max: Vec3::ONE,
+            }
+        }
+
+        fn crossings(&self, _: Vec3, _: Vec3, _: f32, _: &mut Vec<RayHit>) {}
+
+        fn project(&self, point: Vec3) -> (f32, Vec3) {
+            (point.length() - 1.0, point.normalize_or(Vec3::Y))
+        }
+
+        fn is_closed(&self) -> bool {
+            true
+        }
+    }
+
+    fn random(rng: &mut Rng) -> Vec3 {
+        Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5)
+    }
+
+    /// By the least distance of a line to the ball's middle.
+    #[test]
+    fn columns_that_a_ball_is_near_are_found() {
+        let mut rng = Rng::with_seed(21);
+        let (mut near, mut far) = (0, 0);
+        for _ in 0..2000 {
+            let pose = Pose3::from_translation(2.0 * random(&mut rng));
+            let ball = Placed {
+                surface: &Ball,
+                frame_from_surface: &pose,
+            };
+            let camera = VirtualCamera::along(random(&mut rng), 0.1);
+            let pixel = [40.0 * (rng.f32() - 0.5), 40.0 * (rng.f32() - 0.5)];
+            let depths = [-2.0 * rng.f32(), 2.0 * rng.f32()];
+            let reach = 0.05 + 0.3 * rng.f32();
+            let [from, to] = depths.map(|depth| camera.point_at(pixel[0], pixel[1], depth));
+            let along = (pose.translation - from).dot(to - from) / (to - from).length_squared();
+            let nearest = from.lerp(to, along.clamp(0.0, 1.0));
+            let distance = nearest.distance(pose.translation) - 1.0;
+            let found = ball.meets(&camera, pixel, depths, reach);
+            if distance <= reach {
+                assert!(found, "{distance} of {reach}");
+                near += 1;
+            } else if distance > 1.1 * reach {
+                assert!(!found, "{distance} of {reach}");
+                far += 1;
+            }
+        }
+        assert!(near > 300 && far > 300, "{near} {far}");
+    }
+}
