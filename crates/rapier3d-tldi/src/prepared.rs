@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
-use tldi::{Backend, BackendError, CpuBackend, Impact, ImpactQuery, PairResult};
+use tldi::{Backend, BackendError, ContactPatch, CpuBackend, Impact, ImpactQuery, PairResult};
 
 /// A distance that no other dispatcher gives.
 pub(crate) const PROBE_ANSWER: f32 = -1.0;
@@ -231,6 +231,26 @@ impl Shared {
             self.spot_pixels.fetch_add(pixels, Ordering::Relaxed);
             Ok(read(&spot.parts, &spot.results))
         })
+    }
+
+    /// Hands the contacts of a pair of parts on its way to `read`, which no batch could hold.
+    pub(crate) fn contacts_on_the_way<R>(
+        &self,
+        pair: ShapePair<'_>,
+        config: &TldiConfig,
+        read: impl FnOnce(&[ContactPatch]) -> Option<R>,
+    ) -> Option<R> {
+        if !within_reach(pair.shape1, pair.shape2, &pair.pos12, pair.prediction) {
+            return None;
+        }
+        self.on_the_spot(|spot| {
+            spot.compare(pair, config)?;
+            Ok(spot
+                .results
+                .first()
+                .and_then(|result| read(&result.patches)))
+        })
+        .flatten()
     }
 
     /// The impact of a motion; `None` also if the comparison failed, which is kept for

@@ -281,9 +281,20 @@ fn turning_impact(
     let time_at = |piece: u32| start + duration * piece as f32 / pieces;
     for piece in 0..pieces as u32 {
         let (from, to) = (time_at(piece), time_at(piece + 1));
+        let turned_against = (pieces > 1.0)
+            .then(|| {
+                let poses = [from, to].map(|time| a_from_b(time, time));
+                let (share, impact) = met_by_turning(shared, moving, poses, touching)?;
+                let time = from + (to - from) * share;
+                Some(hit_of(&impact, time, &a_from_b(time, time)))
+            })
+            .flatten();
         let frozen = a_from_b(from, 0.5 * (from + to));
         let way = a_from_b(to, 0.5 * (from + to)).translation - frozen.translation;
         let Some(direction) = way.try_normalize() else {
+            if turned_against.is_some() {
+                return turned_against;
+            }
             continue;
         };
         // What would seem to touch already in the next piece is met in this one.
@@ -309,10 +320,58 @@ fn turning_impact(
                 .max(0.5 * touching);
             let time = (from + (to - from) * distance / way.length()).min(end);
             let moved = Pose::from_translation(impact.distance * direction) * frozen;
-            return Some(hit_of(&impact, time, &moved));
+            let hit = hit_of(&impact, time, &moved);
+            return Some(match turned_against {
+                Some(other) if other.time_of_impact < time => other,
+                _ => hit,
+            });
+        }
+        if turned_against.is_some() {
+            return turned_against;
         }
     }
     None
+}
+
+/// What a part meets that moves and turns by so little that it can be told from what is near: where the contact is
+/// that closes first, and the share of the way until then.
+fn met_by_turning(
+    shared: &Shared,
+    moving: &Moving<'_>,
+    [before, after]: [Pose; 2],
+    touching: f32,
+) -> Option<(f32, Impact)> {
+    let from_before = before.inverse();
+    let way_of = |point: Vector| after * (from_before * point) - point;
+    let bounds = moving.parts[1].compute_local_aabb();
+    let longest = bounds
+        .vertices()
+        .into_iter()
+        .map(|corner| way_of(before * corner).length());
+    let pair = ShapePair {
+        shape1: moving.parts[0],
+        shape2: moving.parts[1],
+        pos12: before,
+        prediction: touching + longest.fold(0.0, f32::max),
+    };
+    shared.contacts_on_the_way(pair, &shared.config(), |patches| {
+        let meetings = patches.iter().flat_map(|patch| {
+            patch.points.iter().filter_map(move |point| {
+                let way = way_of(point.point_b);
+                let approach = -patch.normal.dot(way);
+                let meets = point.gap > touching
+                    && point.gap - approach <= touching
+                    && approach > LEAST_COSINE * way.length();
+                let impact = Impact {
+                    distance: point.gap,
+                    point: point.point_a,
+                    normal: patch.normal,
+                };
+                meets.then(|| (((point.gap - 0.5 * touching) / approach).min(1.0), impact))
+            })
+        });
+        meetings.min_by(|m, n| m.0.total_cmp(&n.0))
+    })
 }
 
 /// The hit of an impact; `a_from_b` maps from the second part's frame as it is then.

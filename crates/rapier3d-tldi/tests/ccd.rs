@@ -99,6 +99,68 @@ fn fast_slides_go_on() -> TestResult {
     Ok(())
 }
 
+/// The ends of a rod that spins beside a sheet stay on their side of it, at up to a turn of a radian in a step.
+#[test]
+fn ends_of_what_spins_stop() -> TestResult {
+    let half = Vector::new(0.5, 0.06, 0.06);
+    let rod: Vec<Vector> = cube(0.5).into_iter().map(|p| p * half / 0.5).collect();
+    let distance = 0.35;
+    for spin in [20.0, 40.0, 60.0] {
+        for begins_at in [0.0, 0.3] {
+            let (mut world, mut tldi) = attached();
+            world.gravity = Vector::ZERO;
+            let sheet = cloud_collider(shape(&square(1.0))).friction(0.0);
+            world.insert(RigidBodyBuilder::fixed(), sheet);
+            let spinning = RigidBodyBuilder::dynamic()
+                .pose(Pose::new(distance * Vector::Y, begins_at * Vector::Z))
+                .angvel(-spin * Vector::Z)
+                .ccd_enabled(true);
+            let (spinning, _) = world.insert(spinning, cloud_collider(shape(&rod)).friction(0.0));
+            for _ in 0..60 {
+                tldi.step(&mut world)?;
+                let pose = world.bodies[spinning].position();
+                let ends = [half.x, -half.x].map(|x| (pose * Vector::new(x, 0.0, 0.0)).y);
+                let lowest = ends[0].min(ends[1]);
+                // The middle of an end face is nearly as high as the rod's edge is thick when it touches.
+                assert!(
+                    lowest > 0.0,
+                    "{lowest} m at {spin} rad/s from {begins_at} on"
+                );
+            }
+            assert!(world.bodies[spinning].linvel().y > 0.0, "it is pushed off");
+        }
+    }
+    Ok(())
+}
+
+/// What spins fast on a rough floor is not stopped by it: friction-free, it goes on undiminished.
+#[test]
+fn fast_spins_go_on() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let mut rng = fastrand::Rng::with_seed(2);
+    let rough: Vec<Vector> = square(1.0)
+        .into_iter()
+        .map(|p| p + 0.3 * SPACING * (rng.f32() - 0.5) * Vector::Y)
+        .collect();
+    world.insert(
+        RigidBodyBuilder::fixed(),
+        cloud_collider(shape(&rough)).friction(0.0),
+    );
+    let spinner = RigidBodyBuilder::dynamic()
+        .translation(0.2 * Vector::Y)
+        .angvel(40.0 * Vector::Y)
+        .ccd_enabled(true);
+    let (spinner, _) = world.insert(spinner, cloud_collider(shape(&cube(0.2))).friction(0.0));
+    let mut turned = 0.0;
+    for _ in 0..30 {
+        let before = *world.bodies[spinner].rotation();
+        tldi.step(&mut world)?;
+        turned += before.angle_between(*world.bodies[spinner].rotation());
+    }
+    assert!((turned - 20.0).abs() < 0.5, "{turned}");
+    Ok(())
+}
+
 /// A wall with new points in every step that gives way by more than rapier's prediction distance, but by
 /// less than its mean radius: a body that is faster does not keep its speed behind it.
 #[test]

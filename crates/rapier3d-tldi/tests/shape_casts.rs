@@ -186,6 +186,56 @@ fn turning_casts() -> TestResult {
     Ok(())
 }
 
+/// A bar whose middle stays where it is meets the floor with its end; as clouds, and with either of them
+/// exact; in both orders.
+#[test]
+fn casts_of_what_turns_on_the_spot() -> TestResult {
+    let dispatcher = dispatcher();
+    let half = Vector::new(0.4, 0.08, 0.2);
+    let points: Vec<Vector> = cube(0.4).into_iter().map(|p| p * half / 0.4).collect();
+    let (cloud_bar, cloud_floor) = (shape(&points), shape(&square(0.8)));
+    let (exact_bar, exact_floor) = (Cuboid::new(half), HalfSpace::new(Vector::Y));
+    let pairs: [(&dyn Shape, &dyn Shape); 3] = [
+        (&cloud_bar, &cloud_floor),
+        (&cloud_bar, &exact_floor),
+        (&exact_bar, &cloud_floor),
+    ];
+    let (height, duration) = (0.3, 1.0 / 60.0);
+    let drop = |angle: f32| half.x * angle.sin().abs() + half.y * angle.cos().abs();
+    let met_at = (0..100_000)
+        .map(|k| k as f32 * 1e-5)
+        .find(|&angle| drop(angle) >= height);
+    let met_at = met_at.expect("it is long enough");
+    let still = NonlinearRigidMotion::constant_position(Pose::IDENTITY);
+    for (bar, floor) in pairs {
+        // Up to a step that ends a little after the end of the bar is through.
+        for spin in [10.0, 40.0, 90.0] {
+            let begins_at = (met_at - 0.7 * spin * duration).max(0.0);
+            let motion = NonlinearRigidMotion::new(
+                Pose::new(Vector::Y * height, Vector::Z * begins_at),
+                Vector::ZERO,
+                Vector::ZERO,
+                Vector::Z * spin,
+            );
+            let hit = dispatcher
+                .cast_shapes_nonlinear(&motion, bar, &still, floor, 0.0, duration, false)?
+                .expect("its end meets the floor");
+            let late = (begins_at + spin * hit.time_of_impact - met_at) * half.x;
+            assert!(late.abs() < 0.5 * SPACING, "{late} m late at {spin} rad/s");
+            assert!(hit.normal2.y > 0.9, "{hit:?}");
+            let swapped = dispatcher
+                .cast_shapes_nonlinear(&still, floor, &motion, bar, 0.0, duration, false)?
+                .expect("its end meets the floor");
+            assert!((swapped.time_of_impact - hit.time_of_impact).abs() < 1e-5);
+            let before = 0.6 * hit.time_of_impact;
+            let none = dispatcher
+                .cast_shapes_nonlinear(&motion, bar, &still, floor, 0.0, before, false)?;
+            assert!(none.is_none(), "{none:?}");
+        }
+    }
+    Ok(())
+}
+
 /// Both turn about a pivot far away: what they do relative to each other is what counts.
 #[test]
 fn casts_from_a_carousel() -> TestResult {
