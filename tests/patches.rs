@@ -2,9 +2,10 @@
 
 use std::f32::consts::{FRAC_PI_4, SQRT_2, TAU};
 use tldi::glamx::{Pose3, Quat, Vec3};
-use tldi::{ContactPixel, PairResult, Params, PatchScratch};
+use tldi::{ContactPixel, PairResult, Params, PatchScratch, PointCloud};
 use tldi_tests::{
     Samples, compare_clouds, random_pose, sampled_box, sampled_plane, sampled_sphere,
+    standard_normal,
 };
 
 const R: f32 = 0.012;
@@ -131,4 +132,44 @@ fn a_ball_in_a_groove_is_pushed_by_its_walls() {
     // Of a gap of 0.3 radii one in a hundred is scatter.
     assert!(pushing >= 11_700, "{pushing} patches for 12,000 contacts");
     assert!(300 * off <= pushing, "{off} of {pushing} patches are off");
+}
+
+/// Where noise leaves open where a ball touches, its contact is as wide as that and holds its lowest point, so that it
+/// lies; without noise it is a single point, on which it rolls.
+#[test]
+fn a_ball_on_noisy_samples_lies_on_several_points() {
+    let radius = 8.0 * R;
+    let (mut held, mut seen) = (0, 0);
+    for seed in 0..300 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let smooth = sampled_plane(30.0 * R, R, &mut rng);
+        let ball = sampled_sphere(radius, R).moved(&random_pose(&mut rng, 0.0));
+        let place = Vec3::new(2.0 * R * rng.f32(), radius - 0.1 * R, 2.0 * R * rng.f32());
+        let ball = ball.cloud(R);
+        let find = |floor: &PointCloud| {
+            let found = compare_clouds(floor, &ball, Pose3::from_translation(place), R);
+            assert_eq!(found.patches.len(), 1, "seed {seed}");
+            let patch = &found.patches[0];
+            assert!(patch.is_round, "seed {seed}");
+            patch.points.clone()
+        };
+        assert_eq!(find(&smooth.bare_cloud(R)).len(), 1, "seed {seed}");
+
+        let mut noisy = smooth;
+        for point in &mut noisy.points {
+            point.y += 0.25 * R * standard_normal(&mut rng);
+        }
+        let points = find(&noisy.bare_cloud(R));
+        assert_eq!(points.len(), 4, "seed {seed}");
+        // Each axis from the middle of the points, in half their extent.
+        let middle = points.iter().map(|p| p.middle()).sum::<Vec3>() / 4.0;
+        for axis in [0, 1].map(|k| points[k].middle() - middle) {
+            let off = (place - middle).dot(axis) / axis.length_squared();
+            held += usize::from(off.abs() <= 1.0);
+            seen += 1;
+        }
+    }
+    // Two standard errors hold 95 % of a normal distribution; that they are measured from noise costs some.
+    let share = held as f64 / seen as f64;
+    assert!((0.85..0.99).contains(&share), "{share}");
 }

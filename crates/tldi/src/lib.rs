@@ -7,6 +7,7 @@
 mod aabb;
 mod approach;
 mod backend;
+mod bowl;
 mod builder;
 mod camera;
 mod camera_policy;
@@ -38,6 +39,7 @@ mod tldi;
 pub use crate::tldi::{Facing, Layer, Tldi};
 pub use aabb::Aabb;
 pub use backend::{Backend, BackendError, PairQuery, PairResult, View};
+pub use bowl::Lowest;
 pub use builder::{CloudBuilder, NonFinite, Positions};
 pub use camera::{Projection, VirtualCamera};
 pub use camera_policy::CameraPolicy;

@@ -4,6 +4,7 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
+use crate::bowl::{GAP_PER_SLOPE, Lowest, slope_error};
 use crate::cpu::sweep::SAME_FACE;
 use crate::gap_fit::fitted_gap;
 use crate::links::{Groups, Links, join, root};
@@ -395,12 +396,25 @@ impl Shape {
         let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
         let roughness = supports.roughness_about_bowl;
         if let Some(lowest) = lowest_of_bowl {
-            // Around it the surfaces have other normals: points there would stop what rolls.
+            // Around it the surfaces have other normals: points there would stop what rolls. Where noise
+            // leaves open where it is, points as far apart let a ball lie that would otherwise roll about.
+            let off_fit = (members.iter().map(|&m| m as usize))
+                .filter(|&m| smooth[m].gap <= self.support_gap)
+                .map(|m| contacts[m].gap - smooth[m].gap);
+            let slope_error = slope_error(off_fit, params.pixel_size);
+            let Lowest { point, aside } = lowest;
+            let [u, v] = aside.map(|aside| slope_error * aside);
+            let points = if slope_error > 0.0 {
+                let moved = |aside: Vec3| self.point(point.middle() + aside, point.gap);
+                [u, v, -u, -v].into_iter().map(moved).collect()
+            } else {
+                [point].into_iter().collect()
+            };
             return ContactPatch {
                 normal: self.normal,
-                points: [lowest].into_iter().collect(),
+                points,
                 is_round: true,
-                roughness,
+                roughness: roughness.max(GAP_PER_SLOPE * slope_error),
             };
         }
         // Chosen for being low, they are lower than the plane of a flat contact by what its gaps scatter by.

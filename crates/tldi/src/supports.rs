@@ -1,5 +1,6 @@
 //! Which of many contact points a solver takes.
 
+use crate::bowl::{Bowl, Lowest};
 use crate::main_plane::Plane;
 use crate::{ContactPoint, PATCH_POINTS};
 use arrayvec::ArrayVec;
@@ -25,7 +26,7 @@ pub struct Supports {
     pub roughness_about_bowl: f32,
     /// The lowest point of that bowl, if it is one in both directions, among the points, and most of
     /// the roughness.
-    pub lowest_of_bowl: Option<ContactPoint>,
+    pub lowest_of_bowl: Option<Lowest>,
 }
 
 /// Most that lowness counts, in roughnesses: what is lower still is an odd one out, and would otherwise be
@@ -36,10 +37,6 @@ const LOWEST: f32 = 2.5;
 /// Least extent across the longest direction, as a share of that along it: less is rounding.
 const LEAST_WIDTH: f32 = 1e-6;
 
-/// Share of the roughness that a bowl leaves at the most. A small flat face whose rim is bent by
-/// estimated normals is no bowl.
-const UNEXPLAINED: f32 = 0.1;
-
 /// Share of points on one plane from which on gaps begin to count as flat, and from which on they do.
 /// Measured: faces of 10 × 10 points have 0.6 on a plane and 0.43 on each other, where their rims meet.
 const FLAT: [f32; 2] = [0.35, 0.5];
@@ -47,18 +44,6 @@ const FLAT: [f32; 2] = [0.35, 0.5];
 /// The same for the share of the roughness that a bowl leaves: the gaps of what bends a little are all near a
 /// plane as well.
 const UNBENT: [f32; 2] = [0.3, 0.5];
-
-/// Farthest that the lowest point of a bowl is from the middle of the points, in standard deviations
-/// along each main axis. In a disc the rim is at 2.
-const LOWEST_OF_BOWL: f32 = 1.5;
-
-/// Points that a bowl needs at least: it has five unknowns, and through as few points there is
-/// always one, with its lowest point anywhere.
-const LEAST_OF_BOWL: f32 = 6.0;
-
-/// Least spread of the squares of places, as a share of what they have in a disc, and least part of
-/// it that is not common to both axes: of places that differ less the bend is the noise of numbers.
-const LEAST_SPREAD: f32 = 0.02;
 
 /// Of points on one plane with unit normal `normal`, those on which a body would rest: in each of the four
 /// directions in which they reach out farthest, at right angles to each other, the one that is farthest
@@ -105,12 +90,10 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     let least = least_roughness.max(f32::MIN_POSITIVE);
     let roughness = (squares / count).sqrt();
     let residuals = || points.iter().map(|p| (place(p), residual(p)));
-    let (widening, left) = bowl(residuals(), count);
-    let lowest = -0.5 * slope / widening;
-    let is_bowl = left < UNEXPLAINED * roughness && lowest.abs().max_element() <= LOWEST_OF_BOWL;
-    let lowest_of_bowl = is_bowl.then(|| {
-        let gap = mean_gap + slope.dot(lowest) + widening.dot(lowest * lowest - Vec2::ONE);
-        let aside = lowest * sigma;
+    let bowl = Bowl::fit(residuals(), count);
+    let lowest_of_bowl = bowl.lowest(slope, roughness).map(|(place, above)| {
+        let gap = mean_gap + above;
+        let aside = place * sigma;
         let middle = centre + aside.x * longest + aside.y * across;
         // The surfaces bend away from the plane: as high as what is nearest.
         let off = |p: &ContactPoint| (p.middle() - middle).reject_from_normalized(normal);
@@ -118,13 +101,17 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
             .min_by(|p, q| off(p).length_squared().total_cmp(&off(q).length_squared()));
         let above = nearest.map_or(0.0, |p| (p.middle() - middle).dot(normal));
         let middle = middle + above * normal;
-        ContactPoint {
-            point_a: middle - 0.5 * gap * normal,
-            point_b: middle + 0.5 * gap * normal,
-            gap,
+        let aside = bowl.place_per_slope() * sigma;
+        Lowest {
+            point: ContactPoint {
+                point_a: middle - 0.5 * gap * normal,
+                point_b: middle + 0.5 * gap * normal,
+                gap,
+            },
+            aside: [aside.x * longest, aside.y * across],
         }
     });
-    let unbent = ramp(left / roughness.max(least), UNBENT);
+    let unbent = ramp(bowl.left / roughness.max(least), UNBENT);
     let (main_plane, flatness) = if unbent > 0.0 {
         let heights = points.iter().map(|p| (place(p), p.gap));
         let (main_plane, share) = plane.of_most(heights, roughness, least);
@@ -161,7 +148,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         flatness,
         indices,
         roughness,
-        roughness_about_bowl: left.min(roughness),
+        roughness_about_bowl: bowl.left.min(roughness),
         lowest_of_bowl,
     }
 }
@@ -178,38 +165,8 @@ fn corner_angle(places: impl Iterator<Item = Vec2>) -> f32 {
 }
 
 /// 0 up to `start`, 1 from `end` on.
-fn ramp(value: f32, [start, end]: [f32; 2]) -> f32 {
+pub(crate) fn ramp(value: f32, [start, end]: [f32; 2]) -> f32 {
     ((value - start) / (end - start)).clamp(0.0, 1.0)
-}
-
-/// The bowl that fits `count` heights above a plane best, at places in standard deviations along the
-/// main axes: by how much it rises with the square of the place, and the standard deviation of what
-/// it leaves.
-fn bowl(heights: impl Iterator<Item = (Vec2, f32)> + Clone, count: f32) -> (Vec2, f32) {
-    // Squares of the places, less their mean.
-    let bend = |place: Vec2| place * place - Vec2::ONE;
-    let (mut squares, mut mixed, mut moment) = (Vec2::ZERO, 0.0, Vec2::ZERO);
-    for (place, height) in heights.clone() {
-        let bend = bend(place);
-        squares += bend * bend;
-        mixed += bend.x * bend.y;
-        moment += height * bend;
-    }
-    let determinant = squares.x * squares.y - mixed * mixed;
-    let is_known = count >= LEAST_OF_BOWL
-        && squares.min_element() > LEAST_SPREAD * count
-        && determinant > LEAST_SPREAD * squares.x * squares.y;
-    let widening = if is_known {
-        let widening = Vec2::new(
-            moment.x * squares.y - moment.y * mixed,
-            moment.y * squares.x - moment.x * mixed,
-        );
-        (widening / determinant).max(Vec2::ZERO)
-    } else {
-        Vec2::ZERO
-    };
-    let left = heights.map(|(place, height)| (height - widening.dot(bend(place))).powi(2));
-    (widening, (left.sum::<f32>() / count).sqrt())
 }
 
 /// Direction across `normal`, of unit length, in which points about `centre` extend the most.
@@ -292,7 +249,7 @@ mod tests {
         assert_eq!(dome.roughness_about_bowl, dome.roughness);
         assert_eq!(dome.lowest_of_bowl, None);
         // d(0.02 x² + 0.1 x) = 0 at −2.5.
-        let lowest = cap(Vec2::splat(0.02)).lowest_of_bowl.expect("a bowl");
+        let lowest = cap(Vec2::splat(0.02)).lowest_of_bowl.expect("a bowl").point;
         assert!((lowest.gap + 0.125).abs() < 1e-3, "{lowest:?}");
         assert!((lowest.middle().x + 2.5).abs() < 0.01, "{lowest:?}");
         assert!(lowest.middle().z.abs() < 0.01, "{lowest:?}");
