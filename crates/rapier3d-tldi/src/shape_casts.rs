@@ -2,7 +2,8 @@
 //!
 //! A turning body is cast in pieces. In each the rotation is that of the piece's middle and the
 //! middle of the smaller shape moves straight; what this displaces by is added to what counts as
-//! met, so that an impact is found too early rather than too late.
+//! met, so that an impact is found too early rather than too late. What is beside that way and only
+//! turns towards the other shape is told by the contacts within its reach at the piece's beginning.
 
 use crate::exact::ExactShape;
 use crate::parts::{ShapePair, has_cloud, part, part_count, surface};
@@ -281,60 +282,53 @@ fn turning_impact(
     let time_at = |piece: u32| start + duration * piece as f32 / pieces;
     for piece in 0..pieces as u32 {
         let (from, to) = (time_at(piece), time_at(piece + 1));
-        let turned_against = (pieces > 1.0)
-            .then(|| {
-                let poses = [from, to].map(|time| a_from_b(time, time));
-                let (share, impact) = met_by_turning(shared, moving, poses, touching)?;
-                let time = from + (to - from) * share;
-                Some(hit_of(&impact, time, &a_from_b(time, time)))
-            })
-            .flatten();
-        let frozen = a_from_b(from, 0.5 * (from + to));
-        let way = a_from_b(to, 0.5 * (from + to)).translation - frozen.translation;
-        let Some(direction) = way.try_normalize() else {
-            if turned_against.is_some() {
-                return turned_against;
-            }
-            continue;
-        };
-        // What would seem to touch already in the next piece is met in this one.
-        let is_last = piece + 1 == pieces as u32;
-        let beyond = if is_last {
-            0.0
-        } else {
-            touching + 2.0 * displacement
-        };
-        let impact = shared.impact_on_the_spot(&ImpactQuery {
-            a: surface(&a),
-            b: surface(&b),
-            a_from_b: frozen,
-            motion: way + beyond * direction,
-            touching,
-            core_only: true,
-            params,
-        });
-        if let Some(impact) = impact {
+        let by_moving = || {
+            let frozen = a_from_b(from, 0.5 * (from + to));
+            let way = a_from_b(to, 0.5 * (from + to)).translation - frozen.translation;
+            let direction = way.try_normalize()?;
+            // What would seem to touch already in the next piece is met in this one.
+            let is_last = piece + 1 == pieces as u32;
+            let beyond = if is_last {
+                0.0
+            } else {
+                touching + 2.0 * displacement
+            };
+            let impact = shared.impact_on_the_spot(&ImpactQuery {
+                a: surface(&a),
+                b: surface(&b),
+                a_from_b: frozen,
+                motion: way + beyond * direction,
+                touching,
+                core_only: true,
+                params,
+            })?;
             // Not at the very start, which a solver takes for a contact that it has.
             let distance = (impact.distance - displacement)
                 .max(0.5 * impact.distance)
                 .max(0.5 * touching);
             let time = (from + (to - from) * distance / way.length()).min(end);
             let moved = Pose::from_translation(impact.distance * direction) * frozen;
-            let hit = hit_of(&impact, time, &moved);
-            return Some(match turned_against {
-                Some(other) if other.time_of_impact < time => other,
-                _ => hit,
-            });
-        }
-        if turned_against.is_some() {
-            return turned_against;
+            Some(hit_of(&impact, time, &moved))
+        };
+        let by_turning = || {
+            let poses = [from, to].map(|time| a_from_b(time, time));
+            let (share, impact) = met_by_turning(shared, moving, poses, touching)?;
+            let time = from + (to - from) * share;
+            Some(hit_of(&impact, time, &a_from_b(time, time)))
+        };
+        // In a single piece nothing turns by more than half a pixel.
+        let hits = [by_moving(), (pieces > 1.0).then(by_turning).flatten()];
+        let first = (hits.into_iter().flatten())
+            .min_by(|m, n| m.time_of_impact.total_cmp(&n.time_of_impact));
+        if first.is_some() {
+            return first;
         }
     }
     None
 }
 
-/// What a part meets that moves and turns by so little that it can be told from what is near: where the contact is
-/// that closes first, and the share of the way until then.
+/// Of the contacts that a piece of the motion closes, the first one, and the share of the piece until then: what
+/// only a turning brings together. What touches at its beginning is the solver's.
 fn met_by_turning(
     shared: &Shared,
     moving: &Moving<'_>,
@@ -359,9 +353,7 @@ fn met_by_turning(
             patch.points.iter().filter_map(move |point| {
                 let way = way_of(point.point_b);
                 let approach = -patch.normal.dot(way);
-                let meets = point.gap > touching
-                    && point.gap - approach <= touching
-                    && approach > LEAST_COSINE * way.length();
+                let meets = point.gap > touching && point.gap - approach <= touching;
                 let impact = Impact {
                     distance: point.gap,
                     point: point.point_a,

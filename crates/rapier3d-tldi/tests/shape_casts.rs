@@ -231,6 +231,13 @@ fn casts_of_what_turns_on_the_spot() -> TestResult {
             let none = dispatcher
                 .cast_shapes_nonlinear(&motion, bar, &still, floor, 0.0, before, false)?;
             assert!(none.is_none(), "{none:?}");
+
+            // What touches already is met no earlier than the motion begins, if at all.
+            let mut deep = motion;
+            deep.start = Pose::new(Vector::Y * height, Vector::Z * (met_at + 0.05));
+            let hit = dispatcher
+                .cast_shapes_nonlinear(&deep, bar, &still, floor, 0.0, duration, false)?;
+            assert!(hit.is_none_or(|hit| hit.time_of_impact > 0.0), "{hit:?}");
         }
     }
     Ok(())

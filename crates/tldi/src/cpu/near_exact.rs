@@ -161,6 +161,7 @@ impl Side {
 mod tests {
     use super::*;
     use crate::RayHit;
+    use crate::cpu::cull::{self, Region};
     use fastrand::Rng;
 
     /// A ball of one metre.
@@ -187,6 +188,76 @@ mod tests {
 
     fn random(rng: &mut Rng) -> Vec3 {
         Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5)
+    }
+
+    const REACH: f32 = 0.02;
+
+    fn here(surface: &dyn RaySurface) -> Placed<'_> {
+        Placed {
+            surface,
+            frame_from_surface: &Pose3::IDENTITY,
+        }
+    }
+
+    fn side_of(cloud: &PointCloud) -> Side {
+        let everything = Region {
+            overlap: cloud.bounds(),
+            other_from_frame: Pose3::IDENTITY,
+            other_bounds: cloud.bounds(),
+        };
+        let mut side = Side::default();
+        let Side { cull, points, .. } = &mut side;
+        cull::cull(cloud, &Pose3::IDENTITY, &everything, 1, cull, points);
+        assert_eq!(points.len(), cloud.len());
+        side
+    }
+
+    fn cloud_of(points: &[Vec3]) -> PointCloud<'_> {
+        let builder = PointCloud::builder(points).radius(REACH);
+        builder.build().expect("a valid cloud")
+    }
+
+    /// By brute force: points at up to three reaches from the ball.
+    #[test]
+    fn cells_hold_all_that_is_near() {
+        let mut rng = Rng::with_seed(22);
+        let heights = (0..20_000).map(|_| 3.0 * REACH * (2.0 * rng.f32() - 0.5));
+        let heights: Vec<f32> = heights.collect();
+        let at = |height: &f32| (1.0 + height) * random(&mut rng).normalize();
+        let points: Vec<Vec3> = heights.iter().map(at).collect();
+        let mut side = side_of(&cloud_of(&points));
+        side.in_near_cells(&here(&Ball), REACH, 0.5 * REACH);
+        for (found, within) in [(&side.kept, REACH), (&side.support, 1.5 * REACH)] {
+            for (i, height) in heights.iter().enumerate() {
+                if *height < 0.999 * within {
+                    let is_found = found.binary_search(&(i as u32)).is_ok();
+                    assert!(is_found, "{height} of {within}");
+                }
+            }
+            assert!(found.len() < points.len(), "all are near");
+        }
+    }
+
+    /// Three of 5,000 that are all in cells that can be near.
+    #[test]
+    fn a_few_of_many_are_found() {
+        let mut rng = Rng::with_seed(23);
+        let mut points: Vec<Vec3> = (0..5000)
+            .map(|_| (1.0 + 1.2 * REACH) * random(&mut rng).normalize())
+            .collect();
+        let near = [700, 1500, 4900];
+        for i in near {
+            points[i] = (1.0 + 0.5 * REACH) * points[i].normalize();
+        }
+        let cloud = cloud_of(&points);
+        let mut side = side_of(&cloud);
+        let mut normals = Vec::new();
+        let exact = here(&Ball);
+        assert!(side.near_exact(&cloud, &Pose3::IDENTITY, &exact, REACH, &mut normals));
+        assert_eq!(side.near, near.map(|i| i as u32));
+        for (i, normal) in near.into_iter().zip(normals) {
+            assert!(normal.dot(points[i].normalize()) > 0.999);
+        }
     }
 
     /// By the least distance of a line to the ball's middle.
