@@ -47,8 +47,6 @@ const fn known(
 }
 
 /// Several rows fail for each of these.
-const RESAMPLED: &str =
-    "New samples bring new gaps in every frame, which push although nothing moved.";
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
                          mean depth.";
 const DEEP_IN_WAVES: &str = "Fourteen of 10,000 hits: of small bodies in troughs hardly wider than they are, \
@@ -62,8 +60,12 @@ const SOFT_COLUMN: &str = "Of 600 stacks 14 drift by up to 1.2 r̄ and two fall 
 
 /// All of them.
 pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
-    known("rest", "ball, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.3),
-    known("rest", "bunny, new samples", RESAMPLED).no_worse_than("rms_speed_m_s", 0.015),
+    known(
+        "rest",
+        "bunny, new samples",
+        "Six of forty seeds: new samples bring new gaps in every frame, which push although nothing moved.",
+    )
+    .no_worse_than("rms_speed_m_s", 0.015),
     known("stack", "10 boxes, oriented", SOFT_COLUMN).no_worse_than("top_drift_mean_radii", 1.3),
     known("stack", "10 boxes, bare", SOFT_COLUMN),
     known("bounce", "box, restitution", SOLVER_SPINS)
@@ -146,12 +148,12 @@ mod tests {
     fn what_is_worse_than_declared_is_another_failure() {
         let cause = |speed: f64| {
             let metrics = BTreeMap::from([("rms_speed_m_s".to_owned(), speed)]);
-            known_cause("rest", "ball, new samples each frame", &metrics)
+            known_cause("rest", "bunny, new samples each frame", &metrics)
         };
-        assert!(cause(0.02).is_some());
+        assert!(cause(0.012).is_some());
         assert_eq!(cause(0.5), None);
         assert_eq!(
-            known_cause("rest", "ball, new samples each frame", &BTreeMap::new()),
+            known_cause("rest", "bunny, new samples each frame", &BTreeMap::new()),
             None
         );
         assert_eq!(

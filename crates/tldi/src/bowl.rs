@@ -12,7 +12,7 @@ const UNEXPLAINED: f32 = 0.1;
 const UNEXPLAINED_OF_MANY: f32 = 0.5;
 
 /// Points from which on noise is told from a rim or a crease.
-const MANY: f32 = 32.0;
+const MANY: f32 = 30.0;
 
 /// Farthest that the lowest point of a bowl is from the middle of the points, in standard deviations
 /// along each main axis. In a disc the rim is at 2.
