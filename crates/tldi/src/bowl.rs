@@ -18,6 +18,10 @@ const MANY: f32 = 30.0;
 /// along each main axis. In a disc the rim is at 2.
 const LOWEST: f32 = 1.5;
 
+/// By how much less a bowl may widen along one main axis than along the other, in standard deviations of its
+/// points: a whole bowl, however oblong, widens alike in those, and along an edge only noise does.
+const LEAST_ALIKE: f32 = 0.3;
+
 /// Points that a bowl needs at least: it has five unknowns, and through as few points there is
 /// always one, with its lowest point anywhere.
 const LEAST_POINTS: f32 = 6.0;
@@ -108,7 +112,9 @@ impl Bowl {
         } else {
             UNEXPLAINED_OF_MANY
         };
-        let is_bowl = self.left < unexplained * roughness && place.abs().max_element() <= LOWEST;
+        let is_bowl = self.left < unexplained * roughness
+            && self.widening.min_element() >= LEAST_ALIKE * self.widening.max_element()
+            && place.abs().max_element() <= LOWEST;
         let above = slope.dot(place) + self.widening.dot(place * place - Vec2::ONE);
         is_bowl.then_some((place, above))
     }
@@ -178,6 +184,27 @@ mod tests {
         let told = told.element_sum() / (2.0 * rounds as f32);
         // That the bend is fitted, too, adds a little.
         assert!((0.9..1.2).contains(&(scatter / told)), "{scatter} {told}");
+    }
+
+    /// What widens along one axis only, as around the edge of a box, is no bowl, whatever noise there is.
+    #[test]
+    fn a_noisy_edge_is_no_bowl() {
+        let mut rng = Rng::with_seed(13);
+        let places = disc();
+        let mut round = 0;
+        for across in [0.0, 0.4] {
+            for _ in 0..200 {
+                let height = |p: &Vec2| 0.4 * p.x * p.x + across * p.y * p.y;
+                let heights: Vec<(Vec2, f32)> = (places.iter())
+                    .map(|p| (*p, height(p) + 0.08 * normal(&mut rng)))
+                    .collect();
+                let bowl = Bowl::fit(heights.iter().copied(), places.len() as f32);
+                let lowest = bowl.lowest(Vec2::ZERO, 1.0);
+                assert!(lowest.is_none() || across > 0.0);
+                round += usize::from(lowest.is_some());
+            }
+        }
+        assert_eq!(round, 200);
     }
 
     /// Two standard errors of noise, none of what smooth surfaces leave or of too few pixels.
