@@ -194,7 +194,7 @@ mod tests {
         let mut round = 0;
         for across in [0.0, 0.4] {
             for _ in 0..200 {
-                let height = |p: &Vec2| 0.4 * p.x * p.x + across * p.y * p.y;
+                let height = |p: &Vec2| Vec2::new(0.4, across).dot(*p * *p - Vec2::ONE);
                 let heights: Vec<(Vec2, f32)> = (places.iter())
                     .map(|p| (*p, height(p) + 0.08 * normal(&mut rng)))
                     .collect();
