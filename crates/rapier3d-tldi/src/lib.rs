@@ -44,7 +44,7 @@
 //!
 //! # What does not work
 //! - Sweeps of fast bodies (continuous collision detection) take the shapes as they are at the
-//!   beginning of the step, and miss what only a turning on the spot would meet.
+//!   beginning of the step: what a surface does that deforms comes after.
 //! - Rapier's character controller asks its own dispatcher and passes through clouds.
 //! - A body wholly inside a cloud's volume, surfaces apart, is not in contact.
 //! - Rapier cannot serialise custom shapes, nor the state of pairs with clouds.

@@ -63,7 +63,8 @@ pub struct ContactPatch {
     pub normal: Vec3,
     /// One to [`PATCH_POINTS`] points.
     pub points: arrayvec::ArrayVec<ContactPoint, PATCH_POINTS>,
-    /// Whether the gaps form a bowl, whose lowest point is the only one: what touches there rolls.
+    /// Whether the gaps form a bowl, whose lowest point is the only one: what touches there rolls. Where noise leaves
+    /// open where that is, there are four around it, as far apart.
     pub is_round: bool,
     /// Standard deviation, in metres, of the gaps about a plane or, where they form one, a bowl: how
     /// far the measured gap of one point can be trusted.

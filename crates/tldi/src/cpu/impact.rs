@@ -7,6 +7,7 @@
 
 use super::columns::{Columns, dilate};
 use super::cull::{self, PointRadii, Region};
+use super::near_exact::Placed;
 use super::pair::Scratch;
 use super::side::{CloudView, ExactView, Scope};
 use super::splat::splat_radius;
@@ -240,8 +241,10 @@ impl Scratch {
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
                 let exact = ExactView {
-                    surface,
-                    frame_from_surface: a_from_a,
+                    exact: Placed {
+                        surface,
+                        frame_from_surface: a_from_a,
+                    },
                     reach: length,
                     scope: Scope::Cloud,
                 };
@@ -251,8 +254,10 @@ impl Scratch {
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
                 let exact = ExactView {
-                    surface,
-                    frame_from_surface: a_from_b,
+                    exact: Placed {
+                        surface,
+                        frame_from_surface: a_from_b,
+                    },
                     reach: length,
                     scope: Scope::Everywhere, // its rim is not that of the cloud
                 };

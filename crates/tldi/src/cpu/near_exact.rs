@@ -25,6 +25,7 @@ const LEAST_FREE: f32 = 0.05;
 pub(super) struct CellDistances(Vec<f32>);
 
 /// An exact surface where a pair has it.
+#[derive(Clone, Copy)]
 pub(super) struct Placed<'a> {
     pub(super) surface: &'a dyn RaySurface,
     pub(super) frame_from_surface: &'a Pose3,

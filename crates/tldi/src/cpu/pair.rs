@@ -223,8 +223,10 @@ impl Scratch {
         };
         // An unbounded surface as far as the cloud is deep in it, twice for what was not sampled.
         let exact_view = |surface, frame_from_surface, deepest: f32| ExactView {
-            surface,
-            frame_from_surface,
+            exact: Placed {
+                surface,
+                frame_from_surface,
+            },
             reach: 2.0 * deepest,
             scope: Scope::Near(plan.column_reach),
         };

@@ -10,7 +10,7 @@ use super::rect::{Footprint, Rect};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
 use super::sweep;
 use crate::plan::{AIM_SAMPLES, is_aim_sample};
-use crate::{Params, PointCloud, RayHit, RaySurface, Tldi, VirtualCamera};
+use crate::{Params, PointCloud, RayHit, Tldi, VirtualCamera};
 use glamx::{DVec3, Mat3, Pose3, Vec3};
 
 /// What one side holds, kept from call to call.
@@ -48,8 +48,7 @@ pub(super) struct CloudView<'a> {
 /// An exact surface that a camera looks at together with a cloud.
 #[derive(Clone, Copy)]
 pub(super) struct ExactView<'a> {
-    pub(super) surface: &'a dyn RaySurface,
-    pub(super) frame_from_surface: &'a Pose3,
+    pub(super) exact: Placed<'a>,
     /// How far beyond the cloud the surface is of interest, metres.
     pub(super) reach: f32,
     pub(super) scope: Scope,
@@ -238,19 +237,15 @@ impl Side {
     pub(super) fn look_with(
         &mut self,
         view: &CloudView,
-        exact: &ExactView,
+        look: &ExactView,
         touching: &mut Touching,
         hits: &mut Vec<RayHit>,
         image: &mut Tldi,
     ) -> Option<()> {
         let mut seen = self.project(view)?;
-        match exact.scope {
+        match look.scope {
             Scope::Near(reach) => {
-                let placed = Placed {
-                    surface: exact.surface,
-                    frame_from_surface: exact.frame_from_surface,
-                };
-                seen.rect = self.image_near(view, &seen, &placed, reach, touching)?;
+                seen.rect = self.image_near(view, &seen, &look.exact, reach, touching)?;
             }
             Scope::Cloud => self.whole_image(view, &seen),
             Scope::Everywhere => {
@@ -258,18 +253,22 @@ impl Side {
                 self.whole_image(view, &seen);
             }
         }
+        let Placed {
+            surface,
+            frame_from_surface,
+        } = look.exact;
         // Rays must pass through all of the surface, or what is deepest would be missed.
-        let extent = exact.surface.bounds().extents().length();
+        let extent = surface.bounds().extents().length();
         let through = if extent.is_finite() { extent } else { 0.0 };
-        let margin = view.params.prediction + (seen.far - seen.near) + through + exact.reach;
+        let margin = view.params.prediction + (seen.far - seen.near) + through + look.reach;
         let rays = Rays {
             camera: view.camera,
             rect: seen.rect,
             near: seen.near - margin,
             far: seen.far + margin,
-            cover: (!matches!(exact.scope, Scope::Everywhere)).then_some(&self.image),
+            cover: (!matches!(look.scope, Scope::Everywhere)).then_some(&self.image),
         };
-        cast::cast(exact.surface, exact.frame_from_surface, &rays, hits, image);
+        cast::cast(surface, frame_from_surface, &rays, hits, image);
         Some(())
     }
 }
