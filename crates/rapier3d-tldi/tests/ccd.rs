@@ -74,19 +74,21 @@ fn fast_bodies_stop() -> TestResult {
     Ok(())
 }
 
+/// Friction-free, with edges of `2 · half` metres, its heights within so many spacings.
+fn rough_floor(half: f32, spacings: f32, seed: u64) -> ColliderBuilder {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let rough: Vec<Vector> = square(half)
+        .into_iter()
+        .map(|p| p + spacings * SPACING * (rng.f32() - 0.5) * Vector::Y)
+        .collect();
+    cloud_collider(shape(&rough)).friction(0.0)
+}
+
 /// A fast slide over a rough floor is no impact: friction-free, it goes on undiminished.
 #[test]
 fn fast_slides_go_on() -> TestResult {
     let (mut world, mut tldi) = attached();
-    let mut rng = fastrand::Rng::with_seed(1);
-    let rough: Vec<Vector> = square(3.0)
-        .into_iter()
-        .map(|p| p + 0.3 * SPACING * (rng.f32() - 0.5) * Vector::Y)
-        .collect();
-    world.insert(
-        RigidBodyBuilder::fixed(),
-        cloud_collider(shape(&rough)).friction(0.0),
-    );
+    world.insert(RigidBodyBuilder::fixed(), rough_floor(3.0, 0.3, 1));
     let slider = RigidBodyBuilder::dynamic()
         .translation(Vector::new(-2.5, 0.2, 0.0))
         .linvel(Vector::X * 30.0);
@@ -137,15 +139,7 @@ fn ends_of_what_spins_stop() -> TestResult {
 #[test]
 fn fast_spins_go_on() -> TestResult {
     let (mut world, mut tldi) = attached();
-    let mut rng = fastrand::Rng::with_seed(2);
-    let rough: Vec<Vector> = square(1.0)
-        .into_iter()
-        .map(|p| p + 0.3 * SPACING * (rng.f32() - 0.5) * Vector::Y)
-        .collect();
-    world.insert(
-        RigidBodyBuilder::fixed(),
-        cloud_collider(shape(&rough)).friction(0.0),
-    );
+    world.insert(RigidBodyBuilder::fixed(), rough_floor(1.0, 1.0, 2));
     let spinner = RigidBodyBuilder::dynamic()
         .translation(0.2 * Vector::Y)
         .angvel(40.0 * Vector::Y)
