@@ -49,7 +49,7 @@ const fn known(
 /// Several rows fail for each of these.
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
                          mean depth.";
-const DEEP_IN_WAVES: &str = "Fourteen of 10,000 hits: of small bodies in troughs hardly wider than they are, \
+const DEEP_IN_WAVES: &str = "Nine of 10,000 hits: of small bodies in troughs hardly wider than they are, \
                              where a wave rises faster than rapier undoes penetrations, or sweeps stop at a \
                              crest that contacts, deep below it, do not face.";
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
@@ -75,7 +75,7 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "tunnelling",
         "scan",
-        "Seven of 100,000 hits: of a small spinning body that is deep in a rough scan without normals a \
+        "One of 60,000 hits: of a small spinning body that is deep in a rough scan without normals a \
          further view takes the wrong side.",
     )
     .no_worse_than("passed_share", 0.03),
