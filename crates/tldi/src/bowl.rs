@@ -103,8 +103,8 @@ impl Bowl {
     }
 
     /// The place of its lowest point above a plane that rises by `slope` in a standard deviation of each place,
-    /// and by how much that point is below the plane's middle, if it is a bowl in both directions, lowest
-    /// among its points, and most of the `roughness` about the plane.
+    /// and how high that point is above the plane's middle, if it is a bowl in both directions, lowest among its
+    /// points, and most of the `roughness` about the plane.
     pub(crate) fn lowest(&self, slope: Vec2, roughness: f32) -> Option<(Vec2, f32)> {
         let place = -0.5 * slope / self.widening;
         let unexplained = if self.count < MANY {
@@ -148,9 +148,11 @@ mod tests {
     }
 
     /// Places in a disc, in standard deviations along both axes.
-    fn disc() -> Vec<Vec2> {
+    fn disc(radius_squared: f32) -> Vec<Vec2> {
         let grid = (-4..=4).flat_map(|i| (-4..=4).map(move |j| Vec2::new(i as f32, j as f32)));
-        let disc: Vec<Vec2> = grid.filter(|p| p.length_squared() < 17.0).collect();
+        let disc: Vec<Vec2> = grid
+            .filter(|p| p.length_squared() < radius_squared)
+            .collect();
         let variance = disc.iter().map(|p| p.x * p.x).sum::<f32>() / disc.len() as f32;
         disc.into_iter().map(|p| p / variance.sqrt()).collect()
     }
@@ -159,7 +161,7 @@ mod tests {
     #[test]
     fn noise_moves_the_lowest_point_as_far_as_told() {
         let mut rng = Rng::with_seed(11);
-        let (places, widening, slope) = (disc(), 0.4, Vec2::new(0.3, -0.2));
+        let (places, widening, slope) = (disc(17.0), 0.4, Vec2::new(0.3, -0.2));
         let count = places.len() as f32;
         assert!(count >= MANY);
         let (mut squares, rounds) = (Vec2::ZERO, 400);
@@ -186,11 +188,33 @@ mod tests {
         assert!((0.9..1.2).contains(&(scatter / told)), "{scatter} {told}");
     }
 
+    /// A bowl under noise is one where many points tell so; of few it may as well be a rim.
+    #[test]
+    fn few_noisy_points_are_no_bowl() {
+        let mut rng = Rng::with_seed(14);
+        for (radius_squared, is_bowl) in [(7.0, false), (17.0, true)] {
+            let places = disc(radius_squared);
+            assert_eq!(places.len() as f32 >= MANY, is_bowl);
+            let heights: Vec<(Vec2, f32)> = (places.iter())
+                .map(|p| (*p, 0.4 * (*p * *p - Vec2::ONE).element_sum()))
+                .map(|(p, height)| (p, height + 0.1 * normal(&mut rng)))
+                .collect();
+            let bowl = Bowl::fit(heights.iter().copied(), places.len() as f32);
+            let roughness = 0.45;
+            assert!(
+                (0.15..0.4).contains(&(bowl.left / roughness)),
+                "{}",
+                bowl.left
+            );
+            assert_eq!(bowl.lowest(Vec2::ZERO, roughness).is_some(), is_bowl);
+        }
+    }
+
     /// What widens along one axis only, as around the edge of a box, is no bowl, whatever noise there is.
     #[test]
     fn a_noisy_edge_is_no_bowl() {
         let mut rng = Rng::with_seed(13);
-        let places = disc();
+        let places = disc(17.0);
         let mut round = 0;
         for across in [0.0, 0.4] {
             for _ in 0..200 {

@@ -51,7 +51,8 @@ impl Placed<'_> {
         while depth <= end {
             let (distance, _) = self.project(camera.point_at(u, v, depth));
             let free = distance - reach;
-            if free.is_nan() || free <= LEAST_FREE * reach {
+            // A depth so great that it does not grow is no reason to march for ever.
+            if free.is_nan() || free <= LEAST_FREE * reach || depth + free == depth {
                 return true;
             }
             depth += free;
@@ -237,6 +238,19 @@ mod tests {
             }
             assert!(found.len() < points.len(), "all are near");
         }
+    }
+
+    /// Where a step is less than a depth can tell.
+    #[test]
+    fn columns_far_away_end() {
+        let pose = Pose3::from_translation(1e7 * Vec3::Z);
+        let ball = Placed {
+            surface: &Ball,
+            frame_from_surface: &pose,
+        };
+        let camera = VirtualCamera::along(Vec3::Z, 0.1);
+        let [.., depth] = camera.view_from_point(pose.translation).to_array();
+        assert!(ball.meets(&camera, [12.0, 0.0], [depth, depth + 1e6], 0.01));
     }
 
     /// Three of 5,000 that are all in cells that can be near.
