@@ -17,7 +17,7 @@ const GRAY: Color = [120, 120, 120];
 const OF_MODELS: [Color; 6] = [BLUE, RED, GREEN, PURPLE, ORANGE, SKY];
 
 /// What a method's name begins with, and how it looks.
-const METHODS: [(&str, Color, Mark); 11] = [
+const METHODS: [(&str, Color, Mark); 12] = [
     ("bit grid", ORANGE, Mark::Disc),
     ("grid", BLUE, Mark::Disc),
     ("k-d tree", PURPLE, Mark::Triangle),
@@ -26,6 +26,7 @@ const METHODS: [(&str, Color, Mark); 11] = [
     ("bvh refit", GREEN, Mark::Cross),
     ("voxels", SKY, Mark::Diamond),
     ("compound of balls", GRAY, Mark::Square),
+    ("compound of discs", GRAY, Mark::Disc),
     ("mesh rebuild", GRAY, Mark::Triangle),
     ("mesh set_vertices", GRAY, Mark::Cross),
     ("paper", BLACK, Mark::Disc),

@@ -8,7 +8,7 @@ use rapier3d::parry::shape::{Compound, SharedShape};
 pub struct BallCompound;
 
 /// Most points of a body: rapier keeps a manifold for each pair of balls.
-const MOST_POINTS: usize = 50_000;
+pub(super) const MOST_POINTS: usize = 50_000;
 
 impl Peer for BallCompound {
     fn name(&self) -> String {

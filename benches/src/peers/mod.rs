@@ -7,6 +7,7 @@ mod ball_compound;
 mod bit_grid;
 mod bvh;
 mod culled;
+mod disc_compound;
 mod grid;
 mod kd_tree;
 mod refit;
@@ -18,6 +19,7 @@ pub use ball_compound::BallCompound;
 pub use bit_grid::BitGrid;
 pub use bvh::BvhRebuild;
 pub use culled::Culled;
+pub use disc_compound::DiscCompound;
 pub use grid::Grid;
 pub use kd_tree::KdTreeRebuild;
 pub use refit::BvhRefit;
@@ -150,6 +152,8 @@ pub fn all_peers() -> Vec<Box<dyn Peer>> {
         Box::new(Culled::new(BitGrid::default())),
         Box::new(BallCompound),
         Box::new(Culled::new(BallCompound)),
+        Box::new(DiscCompound),
+        Box::new(Culled::new(DiscCompound)),
         Box::new(TriMeshPeer::rebuilt()),
         Box::new(Culled::new(TriMeshPeer::rebuilt())),
         Box::new(TriMeshPeer::updated()),

@@ -22,7 +22,8 @@ fn boxes(seed: u64, count: usize) -> [Vec<Vec3>; 2] {
 #[test]
 fn balls_meet_those_that_brute_force_finds() {
     let mut peers = all_peers();
-    peers.retain(|peer| !peer.needs_faces() && !peer.name().starts_with("voxels"));
+    let takes_balls = |name: &str| !name.starts_with("voxels") && !name.contains("discs");
+    peers.retain(|peer| !peer.needs_faces() && takes_balls(&peer.name()));
     assert_eq!(peers.len(), 13);
     for seed in 0..30 {
         let [a, b] = boxes(seed, 300);
@@ -134,7 +135,7 @@ fn voxels_meet_where_cells_do() {
     assert!(answers[1] > 5, "{answers:?}");
 }
 
-/// Meshes, and ours on the points of meshes, answer as exact tests of all triangles do.
+/// Meshes, and ours and discs on the points of meshes, answer as exact tests of all triangles do.
 #[test]
 fn surfaces_meet_where_triangles_do() {
     let (points, faces) = bumpy_ball(2_000);
@@ -142,8 +143,8 @@ fn surfaces_meet_where_triangles_do() {
     let radius = crate::covering_radius(points.len(), 4.0 * std::f32::consts::PI);
     let method = Method::Default { pixel_scale: 1.0 };
     let mut peers = all_peers();
-    peers.retain(|peer| peer.needs_faces());
-    assert_eq!(peers.len(), 3);
+    peers.retain(|peer| peer.needs_faces() || peer.name().contains("discs"));
+    assert_eq!(peers.len(), 5);
     peers.push(Box::new(
         TldiPeer::new(Box::new(CpuBackend::new()), method, 1).expect("a thread can be started"),
     ));
@@ -178,6 +179,27 @@ fn surfaces_meet_where_triangles_do() {
     assert!(answers[0] > 3 && answers[1] > 3, "{answers:?}");
 }
 
+/// Discs lie in the surface, however that is turned: sheets half a radius apart, where balls overlap, do not
+/// touch, and those that nearly coincide do.
+#[test]
+fn discs_lie_in_the_surface() {
+    let mut rng = fastrand::Rng::with_seed(3);
+    let radius = 0.1;
+    for _ in 0..20 {
+        let turn = Quat::from_rotation_x(6.0 * rng.f32()) * Quat::from_rotation_z(6.0 * rng.f32());
+        let mut sheet = |height: f32| -> Vec<Vec3> {
+            let shift = 0.05 * rng.f32();
+            let at = |k: i32| radius * Vec3::new((k % 10) as f32 + shift, 0.0, (k / 10) as f32);
+            (0..100)
+                .map(|k| turn * (at(k) + height * Vec3::Y))
+                .collect()
+        };
+        let (a, apart, near) = (sheet(0.0), sheet(0.5 * radius), sheet(0.05 * radius));
+        let touch = |b: &[Vec3]| DiscCompound.compare(&Frame::new(&a, b, radius)).collides;
+        assert!(!touch(&apart) && touch(&near), "{turn}");
+    }
+}
+
 /// What a method cannot be measured with is said.
 #[test]
 fn frames_are_refused_with_a_reason() {
@@ -194,6 +216,8 @@ fn frames_are_refused_with_a_reason() {
         [
             "compound of balls",
             "compound of balls, culled",
+            "compound of discs",
+            "compound of discs, culled",
             "mesh rebuild (TriMesh)",
             "mesh rebuild (TriMesh), culled",
             "mesh set_vertices (TriMesh)",
