@@ -68,6 +68,7 @@ mod prepared;
 mod queries;
 mod report;
 mod resolution;
+mod rolling;
 mod sampled_motion;
 mod shape;
 mod shape_casts;

@@ -11,7 +11,7 @@ use crate::parts::{PartPair, ShapePair, clouds_of};
 use rapier3d::math::Pose;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::shape::Shape;
-use tldi::PairResult;
+use tldi::{ContactPatch, PairResult};
 
 /// Whether a pair touches in one round spot: it rolls there, and a point that rides on the bodies
 /// would soon be behind. One that stays a tenth of a radius behind drives a ball like a slope.
@@ -22,7 +22,7 @@ pub(crate) fn rolls(parts: &[PartPair], results: &[PairResult]) -> bool {
     let first = patches.next();
     parts.iter().all(|part| part.comparison.is_some())
         && patches.next().is_none()
-        && first.is_some_and(|patch| patch.is_round)
+        && first.is_some_and(ContactPatch::is_round)
 }
 
 /// Where a pair's contacts were measured, and for how long they hold.

@@ -8,6 +8,7 @@ use crate::exact::ExactShape;
 use crate::parts::append_queries;
 use crate::prepared::{PROBE_ANSWER, Shared};
 use crate::report::{ComparedBy, cloud_pairs, contacts_of};
+use crate::rolling::move_to_mid_step;
 use crate::surface_motion::{SurfaceMotions, TldiHooks};
 use crate::surface_push;
 use crate::{
@@ -165,6 +166,7 @@ impl TldiPipeline {
             batch.clear();
         } else {
             batch.expire();
+            move_to_mid_step(&mut batch, bodies, colliders, integration.dt);
             self.changed.clear();
         }
         *shared.batch_mut() = batch;

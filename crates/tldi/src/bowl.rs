@@ -1,7 +1,7 @@
 //! The bowl that gaps form around the contact of a round surface: where it is lowest, and how surely.
 
-use crate::ContactPoint;
 use crate::supports::ramp;
+use crate::{ContactPixel, ContactPoint};
 use glamx::{Vec2, Vec3};
 
 /// Share of the roughness that a bowl leaves at the most. A small flat face whose rim is bent by
@@ -49,6 +49,10 @@ const OFF_FIT: f32 = 0.92;
 /// surfaces are 0.01 to 0.04, those of samples with noise of a quarter of a radius 0.12 to 0.2.
 const NOISE: [f32; 2] = [0.04, 0.06];
 
+/// Most by which normals and gaps tell different radii of a surface: beyond, the normals are not those of the
+/// surface.
+const ALIKE_RADII: f32 = 2.0;
+
 /// The lowest point of a bowl.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lowest {
@@ -57,6 +61,8 @@ pub struct Lowest {
     /// How far it moves aside, along each main axis of the points, for an error of one metre of the slope of the
     /// gaps over a standard deviation of the places, metres.
     pub aside: [Vec3; 2],
+    /// Along the same axes, vectors as long as the bowl's radii of curvature, metres.
+    pub radii: [Vec3; 2],
 }
 
 /// A paraboloid that widens along the main axes, or does not bend, above a plane.
@@ -135,6 +141,25 @@ pub(crate) fn slope_error(off: impl Iterator<Item = f32>, pixel_size: f32) -> f3
     }
     let noise = (squares / count).sqrt() / OFF_FIT;
     DOUBT * ramp(noise / pixel_size, NOISE) * noise * (ALIKE / count).sqrt()
+}
+
+/// The relative radius of curvature along `radius`, that of the gaps of `contacts` about `centre`, by how their
+/// normals turn: a vector along it, metres. What the gaps of a ball tell is up to a fifth too much or too little,
+/// by how far up they are known.
+pub(crate) fn relative_radius<'c>(
+    radius: Vec3,
+    centre: Vec3,
+    contacts: impl Iterator<Item = &'c ContactPixel>,
+) -> Vec3 {
+    let (axis, by_gaps) = radius.normalize_and_length();
+    let (mut squares, mut turn) = (0.0, 0.0);
+    for contact in contacts {
+        let place = (contact.middle() - centre).dot(axis);
+        squares += place * place;
+        turn += place * (contact.normal_a + contact.normal_b).dot(axis);
+    }
+    let by_normals = squares / turn.max(f32::MIN_POSITIVE);
+    by_normals.clamp(by_gaps / ALIKE_RADII, by_gaps * ALIKE_RADII) * axis
 }
 
 #[cfg(test)]

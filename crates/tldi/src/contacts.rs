@@ -63,10 +63,19 @@ pub struct ContactPatch {
     pub normal: Vec3,
     /// One to [`PATCH_POINTS`] points.
     pub points: arrayvec::ArrayVec<ContactPoint, PATCH_POINTS>,
-    /// Whether the gaps form a bowl, whose lowest point is the only one: what touches there rolls. Where noise leaves
-    /// open where that is, there are four around it, as far apart.
-    pub is_round: bool,
+    /// Where the gaps form a bowl, along both of its main axes a vector as long as the relative radius of
+    /// curvature of the surfaces, 1 / (1 / R_a + 1 / R_b), metres: the bowl's lowest point moves by as much for
+    /// each radian that they turn. That point is the only one, and what touches there rolls; where noise leaves
+    /// open where it is, there are four around it, as far apart.
+    pub relative_radii: Option<[Vec3; 2]>,
     /// Standard deviation, in metres, of the gaps about a plane or, where they form one, a bowl: how
     /// far the measured gap of one point can be trusted.
     pub roughness: f32,
+}
+
+impl ContactPatch {
+    /// Whether the surfaces touch in one round spot, on which they roll.
+    pub fn is_round(&self) -> bool {
+        self.relative_radii.is_some()
+    }
 }

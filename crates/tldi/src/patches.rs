@@ -4,7 +4,7 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
-use crate::bowl::{GAP_PER_SLOPE, Lowest, slope_error};
+use crate::bowl::{GAP_PER_SLOPE, Lowest, relative_radius, slope_error};
 use crate::cpu::sweep::SAME_FACE;
 use crate::gap_fit::fitted_gap;
 use crate::links::{Groups, Links, join, root};
@@ -398,11 +398,21 @@ impl Shape {
         if let Some(lowest) = lowest_of_bowl {
             // Around it the surfaces have other normals: points there would stop what rolls. Where noise
             // leaves open where it is, points as far apart let a ball lie that would otherwise roll about.
-            let off_fit = (members.iter().map(|&m| m as usize))
-                .filter(|&m| smooth[m].gap <= self.support_gap)
-                .map(|m| contacts[m].gap - smooth[m].gap);
+            let in_band = || {
+                (members.iter().map(|&m| m as usize))
+                    .filter(|&m| smooth[m].gap <= self.support_gap)
+                    .map(|m| (&contacts[m], &smooth[m]))
+            };
+            let off_fit = in_band().map(|(contact, smooth)| contact.gap - smooth.gap);
             let slope_error = slope_error(off_fit, params.pixel_size);
-            let Lowest { point, aside } = lowest;
+            let Lowest {
+                point,
+                aside,
+                radii,
+            } = lowest;
+            let relative_radii = radii.map(|radius| {
+                relative_radius(radius, self.centre, in_band().map(|(contact, _)| contact))
+            });
             let [u, v] = aside.map(|aside| slope_error * aside);
             let points = if slope_error > 0.0 {
                 let moved = |aside: Vec3| self.point(point.middle() + aside, point.gap);
@@ -413,7 +423,7 @@ impl Shape {
             return ContactPatch {
                 normal: self.normal,
                 points,
-                is_round: true,
+                relative_radii: Some(relative_radii),
                 roughness: roughness.max(GAP_PER_SLOPE * slope_error),
             };
         }
@@ -430,7 +440,7 @@ impl Shape {
         let mut patch = ContactPatch {
             normal: self.normal,
             points: chosen.map(in_plane).collect(),
-            is_round: false,
+            relative_radii: None,
             roughness,
         };
         patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));

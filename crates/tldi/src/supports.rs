@@ -109,6 +109,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
                 gap,
             },
             aside: [aside.x * longest, aside.y * across],
+            radii: [aside.x * sigma.x * longest, aside.y * sigma.y * across],
         }
     });
     let unbent = ramp(bowl.left / roughness.max(least), UNBENT);

@@ -1,4 +1,4 @@
-//! Balls that roll, rods and tops that spin on a plane.
+//! Balls that roll, rods and tops that spin, and a doll that rocks on a plane.
 
 use crate::suite::arena::{Arena, DT, Material};
 use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
@@ -11,10 +11,12 @@ use tldi::glamx::{Vec2, Vec3};
 pub(crate) const SCENE: Scene = Scene {
     name: "roll-spin",
     about: "A ball of 0.3 m rolls 10 m, a rod of 0.6 m spins flat on the floor at 10 rad/s, and a \
-            round top (a ball) spins upright at 50 rad/s; r̄ = 2 cm.",
+            round top (a ball) spins upright at 50 rad/s; a roly-poly doll (the ball, its centre of mass \
+            10 cm below the middle) rocks for 10 s, 5° off its rest at first; r̄ = 2 cm.",
     rule: "Way of the ball in 10 m / v seconds, angle and speed of the spins after 1 s within 5 % of \
            the primitive's (of the initial spin's where that is larger); the ball's heading within \
-           1°; rod and top stay within r̄ of their place.",
+           1°; rod and top stay within r̄ of their place; the doll rocks no faster in the last two \
+           seconds than in the first two.",
     cases,
 };
 
@@ -24,6 +26,9 @@ const WAY: f32 = 10.0;
 const SPIN_SECONDS: f32 = 1.0;
 /// Half extents of the rod, metres.
 const ROD: Vec3 = Vec3::new(0.3, 0.04, 0.04);
+/// How far the doll's centre of mass is below the middle of its ball, metres.
+const LOW: f32 = 0.1;
+const ROCK_SECONDS: f32 = 10.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Spinner {
@@ -65,6 +70,12 @@ fn cases(scale: &Scale) -> Vec<Case> {
                 move |setup, verdict| spin(setup, verdict, spinner, seed),
             ));
         }
+        cases.push(Case::new(
+            SCENE.name,
+            "doll",
+            seed,
+            move |setup, verdict| rock(setup, verdict, seed),
+        ));
     }
     cases
 }
@@ -133,5 +144,43 @@ fn spin(setup: &Setup, verdict: &mut Verdict, spinner: Spinner, seed: u64) -> Re
         0.05 * rate.abs().max(initial),
     );
     verdict.at_most("shift_mean_radii", ours[2] / SPACING, 1.0);
+    Ok(())
+}
+
+/// Nothing drives the doll: it rocks no faster at last than at first.
+fn rock(setup: &Setup, verdict: &mut Verdict, seed: u64) -> Result<(), Stop> {
+    let mut rng = Rng::with_seed(seed);
+    let mut arena = Arena::new(setup)?;
+    let floor = Surface::flat(Vec2::splat(1.0), SPACING, Backing::Solid, &mut rng);
+    arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;
+    let mut surface = Surface::ball(RADIUS, SPACING);
+    // As much mass as a ball of water, half as far from its middle as that of a ball is.
+    let mass = 14.0;
+    let inertia = 0.1 * mass * RADIUS * RADIUS;
+    surface.mass = Some(MassProperties::new(
+        LOW * Vec3::NEG_Y,
+        mass,
+        Vec3::splat(inertia),
+    ));
+    let height = RADIUS + surface.lift_on(&floor, setup.method);
+    let body = RigidBodyBuilder::dynamic()
+        .translation(Vec3::Y * height)
+        .rotation(Vec3::Z * 5.0_f32.to_radians());
+    let doll = arena.insert(body, &surface, Material::default())?;
+    let steps = (ROCK_SECONDS / DT) as usize;
+    let ends = (2.0 / DT) as usize;
+    let (mut first, mut last) = (0.0_f32, 0.0_f32);
+    for step in 0..steps {
+        arena.step()?;
+        let rate = arena.body(&doll).angvel().length();
+        if step < ends {
+            first = first.max(rate);
+        }
+        if step + ends >= steps {
+            last = last.max(rate);
+        }
+    }
+    let first = verdict.note("rate_at_first_rad_s", first);
+    verdict.at_most("rate_at_last_rad_s", last, first);
     Ok(())
 }
