@@ -4,6 +4,8 @@
 //! middle of the smaller shape moves straight; what this displaces by is added to what counts as
 //! met, so that an impact is found too early rather than too late. What is beside that way and only
 //! turns towards the other shape is told by the contacts within its reach at the piece's beginning.
+//! Most motions meet nothing but what touches already, so pieces are first as long as a body may turn
+//! that rapier takes for slow, and those in which something is met are cast again in short ones.
 
 use crate::exact::ExactShape;
 use crate::parts::{ShapePair, has_cloud, part, part_count, surface};
@@ -24,6 +26,10 @@ const MAX_PIECES: f32 = 64.0;
 /// By how much a piece may displace a point from where it truly is, in pixels. Less than the rim
 /// that casts of turning bodies spare.
 const MAX_DISPLACEMENT: f32 = 0.5;
+
+/// The same, in CCD thicknesses, of pieces that only tell whether anything is met: the ends of a body then turn by
+/// half a thickness, from which on rapier takes it for fast.
+const SLOW: f32 = 0.25;
 
 /// Distance in pixels up to which surfaces count as touching: what their measured gap scatters by
 /// (0.1), twice, since contacts are kept until a pair has moved by as much.
@@ -244,87 +250,143 @@ fn straight_impact(
 fn turning_impact(
     shared: &Shared,
     moving: &Moving<'_>,
-    [motion_a, motion_b]: &[NonlinearRigidMotion; 2],
+    motions: &[NonlinearRigidMotion; 2],
     start: f32,
     end: f32,
 ) -> Option<ShapeCastHit> {
     let params = moving.params(&shared.config())?;
-    let bounds = moving.parts[1].compute_local_aabb();
-    let middle = bounds.center();
-    // In the frame of the first part, as if the second had the rotation of another time.
-    let a_from_b = |time: f32, rotated_as: f32| {
+    let turning = Turning {
+        shared,
+        moving,
+        motions,
+        params,
+        end,
+    };
+    let fine = MAX_DISPLACEMENT * params.pixel_size;
+    let mut whole = turning.pieces(start, end, fine);
+    if whole.len() == 1 {
+        return whole.find_map(|piece| turning.met_by_moving(piece));
+    }
+    let coarse = fine.max(SLOW * moving.parts[1].ccd_thickness());
+    turning.pieces(start, end, coarse).find_map(|piece| {
+        let hit = turning.hit_in(piece)?;
+        let mut finer = turning.pieces(piece.from, piece.to, fine);
+        if finer.len() == 1 {
+            return Some(hit);
+        }
+        finer.find_map(|piece| turning.hit_in(piece))
+    })
+}
+
+/// The motion of two parts both of which may turn.
+struct Turning<'a> {
+    shared: &'a Shared,
+    moving: &'a Moving<'a>,
+    motions: &'a [NonlinearRigidMotion; 2],
+    params: Params,
+    /// The time until which it lasts.
+    end: f32,
+}
+
+/// A piece of such a motion.
+#[derive(Clone, Copy)]
+struct Piece {
+    from: f32,
+    to: f32,
+    /// What the rotation of its middle displaces points by, metres.
+    displacement: f32,
+}
+
+impl Turning<'_> {
+    /// In the frame of the first part, as if the second had the rotation of another time.
+    fn a_from_b(&self, time: f32, rotated_as: f32) -> Pose {
         let pose_at = |time: f32| {
-            let pose_a = motion_a.position_at_time(time);
-            pose_a.inv_mul(&motion_b.position_at_time(time))
+            let [pose_a, pose_b] = [0, 1].map(|k: usize| self.motions[k].position_at_time(time));
+            pose_a.inv_mul(&pose_b)
         };
+        let middle = self.moving.parts[1].compute_local_aabb().center();
         let rotation = pose_at(rotated_as).rotation;
         Pose::from_parts(pose_at(time) * middle - rotation * middle, rotation)
-    };
-    let duration = end - start;
-    let turn_a = motion_a.angvel.length() * duration;
-    let turn = (motion_b.angvel - motion_a.angvel).length() * duration;
-    // The corners of the second part turn by so much, and its middle's way bends about the first.
-    let turned = 0.5 * turn * bounds.half_extents().length();
-    let [before, after] = [start, end].map(|time| a_from_b(time, time) * middle);
-    let lever = motion_a
-        .local_center
-        .distance(before)
-        .max(motion_a.local_center.distance(after));
-    let allowed = MAX_DISPLACEMENT * params.pixel_size;
-    let pieces = (turned / allowed)
-        .max(turn_a * (lever / (8.0 * allowed)).sqrt())
-        .ceil()
-        .clamp(1.0, MAX_PIECES);
-    let displacement = turned / pieces;
-
-    let [a, b] = moving.parts.map(ExactShape);
-    let touching = TOUCHING * params.pixel_size;
-    let time_at = |piece: u32| start + duration * piece as f32 / pieces;
-    for piece in 0..pieces as u32 {
-        let (from, to) = (time_at(piece), time_at(piece + 1));
-        let by_moving = || {
-            let frozen = a_from_b(from, 0.5 * (from + to));
-            let way = a_from_b(to, 0.5 * (from + to)).translation - frozen.translation;
-            let direction = way.try_normalize()?;
-            // What would seem to touch already in the next piece is met in this one.
-            let is_last = piece + 1 == pieces as u32;
-            let beyond = if is_last {
-                0.0
-            } else {
-                touching + 2.0 * displacement
-            };
-            let impact = shared.impact_on_the_spot(&ImpactQuery {
-                a: surface(&a),
-                b: surface(&b),
-                a_from_b: frozen,
-                motion: way + beyond * direction,
-                touching,
-                core_only: true,
-                params,
-            })?;
-            // Not at the very start, which a solver takes for a contact that it has.
-            let distance = (impact.distance - displacement)
-                .max(0.5 * impact.distance)
-                .max(0.5 * touching);
-            let time = (from + (to - from) * distance / way.length()).min(end);
-            let moved = Pose::from_translation(impact.distance * direction) * frozen;
-            Some(hit_of(&impact, time, &moved))
-        };
-        let by_turning = || {
-            let poses = [from, to].map(|time| a_from_b(time, time));
-            let (share, impact) = met_by_turning(shared, moving, poses, touching)?;
-            let time = from + (to - from) * share;
-            Some(hit_of(&impact, time, &a_from_b(time, time)))
-        };
-        // In a single piece nothing turns by more than half a pixel.
-        let hits = [by_moving(), (pieces > 1.0).then(by_turning).flatten()];
-        let first = (hits.into_iter().flatten())
-            .min_by(|m, n| m.time_of_impact.total_cmp(&n.time_of_impact));
-        if first.is_some() {
-            return first;
-        }
     }
-    None
+
+    /// As many pieces as displace no point by more than `allowed` metres, but for [`MAX_PIECES`].
+    fn pieces(
+        &self,
+        start: f32,
+        end: f32,
+        allowed: f32,
+    ) -> impl ExactSizeIterator<Item = Piece> + use<> {
+        let [motion_a, motion_b] = self.motions;
+        let bounds = self.moving.parts[1].compute_local_aabb();
+        let duration = end - start;
+        let turn_a = motion_a.angvel.length() * duration;
+        let turn = (motion_b.angvel - motion_a.angvel).length() * duration;
+        // The corners of the second part turn by so much, and its middle's way bends about the first.
+        let turned = 0.5 * turn * bounds.half_extents().length();
+        let lever = [start, end]
+            .map(|time| self.a_from_b(time, time) * bounds.center())
+            .map(|middle| motion_a.local_center.distance(middle));
+        let lever = lever[0].max(lever[1]);
+        let count = (turned / allowed)
+            .max(turn_a * (lever / (8.0 * allowed)).sqrt())
+            .ceil()
+            .clamp(1.0, MAX_PIECES);
+        let time_at = move |piece: u32| start + duration * piece as f32 / count;
+        (0..count as u32).map(move |piece| Piece {
+            from: time_at(piece),
+            to: time_at(piece + 1),
+            displacement: turned / count,
+        })
+    }
+
+    /// What is met first in a piece.
+    fn hit_in(&self, piece: Piece) -> Option<ShapeCastHit> {
+        let hits = [self.met_by_moving(piece), self.met_by_turning(piece)];
+        (hits.into_iter().flatten()).min_by(|m, n| m.time_of_impact.total_cmp(&n.time_of_impact))
+    }
+
+    fn met_by_moving(&self, piece: Piece) -> Option<ShapeCastHit> {
+        let Piece {
+            from,
+            to,
+            displacement,
+        } = piece;
+        let touching = TOUCHING * self.params.pixel_size;
+        let frozen = self.a_from_b(from, 0.5 * (from + to));
+        let way = self.a_from_b(to, 0.5 * (from + to)).translation - frozen.translation;
+        let direction = way.try_normalize()?;
+        // What would seem to touch already in the next piece is met in this one.
+        let beyond = if to < self.end {
+            touching + 2.0 * displacement
+        } else {
+            0.0
+        };
+        let [a, b] = self.moving.parts.map(ExactShape);
+        let impact = self.shared.impact_on_the_spot(&ImpactQuery {
+            a: surface(&a),
+            b: surface(&b),
+            a_from_b: frozen,
+            motion: way + beyond * direction,
+            touching,
+            core_only: true,
+            params: self.params,
+        })?;
+        // Not at the very start, which a solver takes for a contact that it has.
+        let distance = (impact.distance - displacement)
+            .max(0.5 * impact.distance)
+            .max(0.5 * touching);
+        let time = (from + (to - from) * distance / way.length()).min(self.end);
+        let moved = Pose::from_translation(impact.distance * direction) * frozen;
+        Some(hit_of(&impact, time, &moved))
+    }
+
+    fn met_by_turning(&self, Piece { from, to, .. }: Piece) -> Option<ShapeCastHit> {
+        let touching = TOUCHING * self.params.pixel_size;
+        let poses = [from, to].map(|time| self.a_from_b(time, time));
+        let (share, impact) = met_by_turning(self.shared, self.moving, poses, touching)?;
+        let time = from + (to - from) * share;
+        Some(hit_of(&impact, time, &self.a_from_b(time, time)))
+    }
 }
 
 /// Of the contacts that a piece of the motion closes, the first one, and the share of the piece until then: what
