@@ -2,7 +2,7 @@
 
 use std::f32::consts::{FRAC_PI_4, SQRT_2, TAU};
 use tldi::glamx::{Pose3, Quat, Vec3};
-use tldi::{ContactPixel, PairResult, Params, PatchScratch, PointCloud, Surface};
+use tldi::{ContactPatch, ContactPixel, PairResult, Params, PatchScratch, PointCloud, Surface};
 use tldi_tests::{
     Samples, compare, compare_clouds, random_pose, sampled_box, sampled_plane, sampled_sphere,
     standard_normal,
@@ -218,4 +218,114 @@ fn an_egg_on_a_ball_tells_the_relative_radii() {
     // Curvatures scatter by 1.2 %, of estimated normals about 2 % too much by 1.5 %: four standard deviations. By
     // gaps alone they are off by up to a fifth, by how far up these are known.
     assert!(least > 0.95 && most < 1.08, "{least} to {most}");
+}
+
+/// A cylinder touches along a line, on whose ends it lies: where they are, how deep, and its radius. An edge is no
+/// such line, whatever its angles.
+#[test]
+fn a_cylinder_lies_on_the_ends_of_a_line() {
+    let (radius, half) = (12.0 * R, 9.0 * R);
+    let cylinder = sampled_cylinder(radius, half, R);
+    for seed in 0..60 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let floor = sampled_plane(50.0 * R, R, &mut rng);
+        let yaw = Quat::from_rotation_y(TAU * rng.f32());
+        let turn = yaw * Quat::from_rotation_z(TAU * rng.f32());
+        let depth = 0.2 * R * rng.f32();
+        let place = Vec3::new(R * rng.f32(), radius - depth, R * rng.f32());
+        let (floor, body) = match seed % 2 {
+            0 => (floor.cloud(R), cylinder.cloud(R)),
+            _ => (floor.bare_cloud(R), cylinder.cloud(R)),
+        };
+        let found = compare_clouds(&floor, &body, Pose3::from_parts(place, turn), R);
+        assert_eq!(found.patches.len(), 1, "seed {seed}");
+        let patch = &found.patches[0];
+        let [across, none] = patch.relative_radii.expect("it rolls");
+        assert_eq!((patch.points.len(), none), (2, Vec3::ZERO), "seed {seed}");
+        // By (r / R)² / 2 too much, and a scatter of as much.
+        assert!((across.length() / radius - 1.0).abs() < 0.02, "{across}");
+        let (x, z) = (yaw * Vec3::X, yaw * Vec3::Z);
+        assert!(across.normalize().dot(x).abs() > 0.999, "seed {seed}");
+        let along = [0, 1].map(|k| (patch.points[k].middle() - place).dot(z));
+        // The discs of the outermost samples reach a radius beyond the rim, and pixels are as wide.
+        for end in [along[0].min(along[1]) + half, half - along[0].max(along[1])] {
+            assert!(end.abs() < 1.5 * R, "seed {seed}: {end}");
+        }
+        for point in &patch.points {
+            let off = (point.middle() - place).dot(x);
+            assert!(off.abs() < 0.25 * R, "seed {seed}: {off}");
+            assert!((point.gap + depth).abs() < 0.1 * R, "seed {seed}");
+        }
+
+        let half = R * Vec3::new(8.0, 8.0, 10.0);
+        let body = sampled_box(half, R, &mut rng).cloud(R);
+        let lean = 0.35 + 0.87 * rng.f32();
+        let turn = yaw * Quat::from_rotation_z(lean);
+        let height = half.x * lean.sin() + half.y * lean.cos() - depth;
+        let pose = Pose3::from_parts(place.with_y(height), turn);
+        let found = compare_clouds(&floor, &body, pose, R);
+        assert!(!found.patches.is_empty(), "seed {seed}");
+        assert!(
+            found.patches.iter().all(|patch| !patch.is_round()),
+            "{seed}"
+        );
+    }
+}
+
+/// Two balls of one body touch in a spot each.
+#[test]
+fn a_dumbbell_touches_in_two_spots() {
+    let (radius, apart) = (10.0 * R, 14.0 * R);
+    for seed in 0..20 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let floor = sampled_plane(60.0 * R, R, &mut rng).cloud(R);
+        let ball = sampled_sphere(radius, R);
+        let mut body = ball.moved(&Pose3::from_translation(apart * Vec3::X));
+        let other = ball.moved(&Pose3::from_translation(-apart * Vec3::X));
+        body.points.extend(other.points);
+        body.normals.extend(other.normals);
+        let turn = Quat::from_rotation_y(TAU * rng.f32()) * Quat::from_rotation_x(TAU * rng.f32());
+        let depth = 0.2 * R * rng.f32();
+        let place = (radius - depth) * Vec3::Y;
+        let found = compare_clouds(&floor, &body.cloud(R), Pose3::from_parts(place, turn), R);
+        assert_eq!(found.patches.len(), 2, "seed {seed}");
+        for center in [apart, -apart].map(|x| turn * (x * Vec3::X)) {
+            let is_below = |patch: &ContactPatch| {
+                patch.points.len() == 1
+                    && patch.is_round()
+                    && patch.points[0].middle().with_y(0.0).distance(center) < 0.1 * R
+                    && (patch.points[0].gap + depth).abs() < 0.1 * R
+            };
+            assert!(found.patches.iter().any(is_below), "seed {seed}");
+        }
+    }
+}
+
+/// A cylinder about the z axis.
+fn sampled_cylinder(radius: f32, half: f32, spacing: f32) -> Samples {
+    let (mut points, mut normals) = (Vec::new(), Vec::new());
+    let around = |radius: f32| (TAU * radius / spacing).ceil().max(1.0) as usize;
+    let rows = (2.0 * half / spacing).ceil() as usize;
+    for row in 0..=rows {
+        for k in 0..around(radius) {
+            let turn = (k as f32 + 0.5 * (row % 2) as f32) / around(radius) as f32;
+            let (sin, cos) = (TAU * turn).sin_cos();
+            let z = half * (2.0 * row as f32 / rows as f32 - 1.0);
+            points.push(Vec3::new(radius * cos, radius * sin, z));
+            normals.push(Vec3::new(cos, sin, 0.0));
+        }
+    }
+    for ring in (0..)
+        .map(|k| k as f32 * spacing)
+        .take_while(|r| *r < radius)
+    {
+        for k in 0..around(ring) {
+            let (sin, cos) = (TAU * k as f32 / around(ring) as f32).sin_cos();
+            for side in [1.0, -1.0] {
+                points.push(Vec3::new(ring * cos, ring * sin, side * half));
+                normals.push(side * Vec3::Z);
+            }
+        }
+    }
+    Samples { points, normals }
 }

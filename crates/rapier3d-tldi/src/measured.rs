@@ -13,16 +13,15 @@ use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::shape::Shape;
 use tldi::{ContactPatch, PairResult};
 
-/// Whether a pair touches in one round spot: it rolls there, and a point that rides on the bodies
+/// Whether a pair touches in one or two round spots or lines: it rolls there, and a point that rides on the bodies
 /// would soon be behind. One that stays a tenth of a radius behind drives a ball like a slope.
 pub(crate) fn rolls(parts: &[PartPair], results: &[PairResult]) -> bool {
-    let mut patches = (parts.iter())
+    let patches = (parts.iter())
         .filter_map(|part| part.comparison.as_ref())
         .flat_map(|comparison| &results[comparison.query].patches);
-    let first = patches.next();
     parts.iter().all(|part| part.comparison.is_some())
-        && patches.next().is_none()
-        && first.is_some_and(ContactPatch::is_round)
+        && (1..=2).contains(&patches.clone().count())
+        && patches.clone().all(ContactPatch::is_round)
 }
 
 /// Where a pair's contacts were measured, and for how long they hold.

@@ -90,9 +90,10 @@ fn contact_moved(
     // The material of the body at the contact moves with it, and the contact over the surfaces.
     let material = body_turn.cross(spot - center_of_mass);
     let slope = patch.normal.cross(turn);
-    let over_surfaces = radii
-        .into_iter()
-        .map(|radius| slope.dot(radius.normalize_or_zero()) * radius)
-        .sum::<Vector>();
-    material.reject_from_normalized(patch.normal) - over_surfaces
+    // Along a line the ends stay where they are.
+    let along = |radius: Vector| {
+        let axis = radius.normalize_or_zero();
+        (material - radius.length() * slope).dot(axis) * axis
+    };
+    radii.into_iter().map(along).sum()
 }

@@ -11,6 +11,9 @@ const UNEXPLAINED: f32 = 0.1;
 /// The same of at least [`MANY`] points: noise of a quarter of a radius leaves a third of a ball's.
 const UNEXPLAINED_OF_MANY: f32 = 0.5;
 
+/// The same of a valley: the ends of a cylinder are bent by their rims.
+const UNEXPLAINED_OF_VALLEY: f32 = 0.4;
+
 /// Points from which on noise is told from a rim or a crease.
 const MANY: f32 = 30.0;
 
@@ -63,6 +66,26 @@ pub struct Lowest {
     pub aside: [Vec3; 2],
     /// Along the same axes, vectors as long as the bowl's radii of curvature, metres.
     pub radii: [Vec3; 2],
+}
+
+/// The floor of a valley.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Floor {
+    /// Its ends, and the gaps there.
+    pub ends: [ContactPoint; 2],
+    /// Across it, a vector as long as its radius of curvature, metres.
+    pub radius: Vec3,
+}
+
+/// Where gaps around the contact of a cylinder are lowest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Valley {
+    /// The main axis across it.
+    pub(crate) across: usize,
+    /// Where its floor is along that axis, in standard deviations.
+    pub(crate) place: f32,
+    /// By how much the gaps rise with the square of the distance from there, in standard deviations, metres.
+    pub(crate) bend: f32,
 }
 
 /// A paraboloid that widens along the main axes, or does not bend, above a plane.
@@ -125,6 +148,23 @@ impl Bowl {
         is_bowl.then_some((place, above))
     }
 
+    /// The floor of a valley, which widens along one main axis only, if the gaps above a plane that rises by `slope`
+    /// are one.
+    pub(crate) fn valley(&self, slope: Vec2, roughness: f32) -> Option<Valley> {
+        let across = usize::from(self.widening.y > self.widening.x);
+        let bend = self.widening[across];
+        let place = -0.5 * slope[across] / bend;
+        let is_valley = self.left < UNEXPLAINED_OF_VALLEY * roughness
+            && self.count >= MANY
+            && self.widening[1 - across] < LEAST_ALIKE * bend
+            && place.abs() <= LOWEST;
+        is_valley.then_some(Valley {
+            across,
+            place,
+            bend,
+        })
+    }
+
     /// How far that place moves for an error of one metre of the slope.
     pub(crate) fn place_per_slope(&self) -> Vec2 {
         0.5 / self.widening
@@ -144,22 +184,26 @@ pub(crate) fn slope_error(off: impl Iterator<Item = f32>, pixel_size: f32) -> f3
 }
 
 /// The relative radius of curvature along `radius`, that of the gaps of `contacts` about `centre`, by how their
-/// normals turn: a vector along it, metres. What the gaps of a ball tell is up to a fifth too much or too little,
-/// by how far up they are known.
+/// normals turn: a vector along it, metres; and which share of the variance of the normals a steady turn explains.
+/// What the gaps of a ball tell is up to a fifth too much or too little, by how far up they are known.
 pub(crate) fn relative_radius<'c>(
     radius: Vec3,
     centre: Vec3,
     contacts: impl Iterator<Item = &'c ContactPixel>,
-) -> Vec3 {
+) -> (Vec3, f32) {
     let (axis, by_gaps) = radius.normalize_and_length();
-    let (mut squares, mut turn) = (0.0, 0.0);
+    let (mut squares, mut turn, mut turns) = (0.0, 0.0, 0.0);
     for contact in contacts {
         let place = (contact.middle() - centre).dot(axis);
+        let normal = (contact.normal_a + contact.normal_b).dot(axis);
         squares += place * place;
-        turn += place * (contact.normal_a + contact.normal_b).dot(axis);
+        turn += place * normal;
+        turns += normal * normal;
     }
     let by_normals = squares / turn.max(f32::MIN_POSITIVE);
-    by_normals.clamp(by_gaps / ALIKE_RADII, by_gaps * ALIKE_RADII) * axis
+    let radius = by_normals.clamp(by_gaps / ALIKE_RADII, by_gaps * ALIKE_RADII) * axis;
+    let steady = turn * turn / (squares * turns).max(f32::MIN_POSITIVE);
+    (radius, steady)
 }
 
 #[cfg(test)]

@@ -66,7 +66,8 @@ pub struct ContactPatch {
     /// Where the gaps form a bowl, along both of its main axes a vector as long as the relative radius of
     /// curvature of the surfaces, 1 / (1 / R_a + 1 / R_b), metres: the bowl's lowest point moves by as much for
     /// each radian that they turn. That point is the only one, and what touches there rolls; where noise leaves
-    /// open where it is, there are four around it, as far apart.
+    /// open where it is, there are four around it, as far apart. Along a line, as of a cylinder on a floor, the
+    /// second vector is zero and the points are the line's ends.
     pub relative_radii: Option<[Vec3; 2]>,
     /// Standard deviation, in metres, of the gaps about a plane or, where they form one, a bowl: how
     /// far the measured gap of one point can be trusted.
@@ -74,7 +75,7 @@ pub struct ContactPatch {
 }
 
 impl ContactPatch {
-    /// Whether the surfaces touch in one round spot, on which they roll.
+    /// Whether the surfaces touch in one round spot, or along a line, on which they roll.
     pub fn is_round(&self) -> bool {
         self.relative_radii.is_some()
     }

@@ -27,6 +27,7 @@ mod noise;
 mod normals;
 pub mod paper;
 mod params;
+mod part_shape;
 mod patches;
 pub mod plan;
 mod radii;

@@ -4,16 +4,16 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
-use crate::bowl::{GAP_PER_SLOPE, Lowest, relative_radius, slope_error};
 use crate::cpu::sweep::SAME_FACE;
 use crate::gap_fit::fitted_gap;
 use crate::links::{Groups, Links, join, root};
 use crate::lone_points::LonePoints;
 use crate::noise::allow_for_noise;
-use crate::supports::{longest_axis, supports};
+use crate::part_shape::{Shape, common_normal};
 use crate::{
     ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, PairQuery, PairResult, Params,
 };
+use arrayvec::ArrayVec;
 use glamx::Vec3;
 use std::ops::Range;
 
@@ -25,10 +25,6 @@ const SAME_GROUP: f32 = 0.866;
 
 /// A part whose pixels' unit normals have a mean shorter than this (a spread of about 14°) is split.
 const FLAT: f32 = 0.97;
-
-/// A surface's normal averaged over linked neighbours that is shorter than this (a spread of 26°) is a mean
-/// over a crease, which says nothing of a bend.
-const CREASED: f32 = 0.9;
 
 /// Patches of fewer pixels are not split.
 const LEAST_SPLIT: usize = 12;
@@ -42,46 +38,14 @@ const MAX_SPLITS: u32 = 3;
 /// that bear the load).
 pub const SAME_PLANE: f32 = 0.985;
 
-/// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal.
-const NORMAL_BAND: f32 = 2.0;
-
-/// Band whose pixels can be support points and decide where a part is split. What penetrates can up to
-/// [`NORMAL_BAND`]: a body that lies deeper on one side must not sink in on the other.
-const SUPPORT_BAND: f32 = 1.0;
-
-/// The gaps of a patch are taken to be at least this rough, in pixels: below, extent alone chooses
-/// the support points.
-const LEAST_ROUGHNESS: f32 = 0.05;
-
-/// Band above the smallest gap, in pixels, over which the deepest point is a mean.
-const DEEPEST_BAND: f32 = 0.1;
-
-/// By how much that point must be deeper than the support points to count, in roughnesses: on flat
-/// faces it is noise, and four corners bear more than three.
-const DEEPER: f32 = 0.4;
-
-/// Roughness, in pixels, from which on a bend of the surfaces does not count as such. Gaps that rise
-/// through all of the support band, as around a ball's contact, deviate from a plane by 0.29; those
-/// of a small face whose rim is blurred by estimated normals by 0.1.
-const LEAST_RISE: f32 = 0.15;
-
-/// Most that a point of a flat contact may be off its plane to be moved onto it, in pixels: what estimated
-/// normals make of the rims of two faces. What is lower still is a bump under the face.
-const OFF_PLANE: f32 = 0.4;
-
-/// Variance (1 − mean length) that a surface's normals are taken to have at least, 1.4°: keeps the weights
-/// of two perfectly flat surfaces finite. Were it 0.01, a box's sides, which a moving view sees as
-/// well, would tilt the normal by 0.6°, and a floor brake what slides over it by 2 % more.
-const LEAST_VARIANCE: f32 = 3e-4;
-
 /// A contact pixel after averaging over its linked neighbours.
 #[derive(Clone, Copy, Debug)]
-struct Smooth {
-    gap: f32,
-    normal_a: Vec3,
-    normal_b: Vec3,
+pub(crate) struct Smooth {
+    pub(crate) gap: f32,
+    pub(crate) normal_a: Vec3,
+    pub(crate) normal_b: Vec3,
     /// Unit normal from the first surface towards the second.
-    normal: Vec3,
+    pub(crate) normal: Vec3,
 }
 
 /// Memory of [`PatchScratch::reduce`], kept from call to call.
@@ -95,8 +59,9 @@ pub struct PatchScratch {
     groups: Groups,
     stack: Vec<(usize, usize, u32)>,
     parts: Vec<Part>,
-    /// Members of the parts of one patch, and those that can be support points.
+    /// Members of the parts of one patch, of one of its groups, and those that can be support points.
     patch: Vec<u32>,
+    spot: Vec<u32>,
     points: Vec<ContactPoint>,
 }
 
@@ -203,15 +168,53 @@ impl PatchScratch {
                 }
                 !in_plane
             });
-            let shape = Shape::of(&self.patch, contacts, &self.smooth, params);
-            out.push(shape.patch(
-                &self.patch,
-                contacts,
-                &self.smooth,
-                &mut self.points,
-                params,
-            ));
+            let first = out.len();
+            if !self.push_round_spots(contacts, params, out) {
+                out.truncate(first);
+                let members = std::mem::take(&mut self.patch);
+                out.push(self.patch_of(&members, contacts, params));
+                self.patch = members;
+            }
         }
+    }
+
+    /// Pushes a patch for each of the groups on one plane, if they are several, and each a single spot: what
+    /// touches in two of them rolls on both. Returns whether they are.
+    fn push_round_spots(
+        &mut self,
+        contacts: &[ContactPixel],
+        params: &Params,
+        out: &mut Vec<ContactPatch>,
+    ) -> bool {
+        let mut groups = ArrayVec::<u32, PATCH_POINTS>::new();
+        for &member in &self.patch {
+            let group = self.group[member as usize];
+            if !groups.contains(&group) && groups.try_push(group).is_err() {
+                return false;
+            }
+        }
+        let mut spot = std::mem::take(&mut self.spot);
+        let most = MAX_PATCHES - out.len();
+        let are_spots = (2..=most).contains(&groups.len())
+            && groups.into_iter().all(|group| {
+                spot.clear();
+                let members = self.patch.iter().copied();
+                spot.extend(members.filter(|&m| self.group[m as usize] == group));
+                out.push(self.patch_of(&spot, contacts, params));
+                (out.last()).is_some_and(|patch| patch.is_round() && patch.points.len() == 1)
+            });
+        self.spot = spot;
+        are_spots
+    }
+
+    fn patch_of(
+        &mut self,
+        members: &[u32],
+        contacts: &[ContactPixel],
+        params: &Params,
+    ) -> ContactPatch {
+        let shape = Shape::of(members, contacts, &self.smooth, params);
+        shape.patch(members, contacts, &self.smooth, &mut self.points, params)
     }
 
     /// Averages normals over linked neighbours and fits the gaps to them: what is left of a sensor's
@@ -275,203 +278,5 @@ fn order(contacts: &mut [ContactPixel]) {
     let place = |c: &ContactPixel| (c.view, c.pixel[1], c.pixel[0]);
     if !contacts.is_sorted_by_key(place) {
         contacts.sort_unstable_by(|c, d| (place(c).cmp(&place(d))).then(d.gap.total_cmp(&c.gap)));
-    }
-}
-
-/// Unit normal from the first surface towards the second, from the means of unit normals of both:
-/// weighted by the inverse of their variance, so that the flat side of an edge on a face, and the
-/// smooth side of a noisy scan, decide.
-fn common_normal(mean_a: Vec3, mean_b: Vec3) -> Option<Vec3> {
-    let weighted = |mean: Vec3| {
-        let spread = (1.0 - mean.length()).max(0.0);
-        mean.normalize_or_zero() / (spread + LEAST_VARIANCE)
-    };
-    (weighted(mean_a) - weighted(mean_b)).try_normalize()
-}
-
-/// Weight of a gap `above` the smallest one: 1 there, falling smoothly to 0 at `band`.
-fn falloff(above: f32, band: f32) -> f32 {
-    let rest = (1.0 - above / band).max(0.0);
-    rest * rest
-}
-
-fn least_gap(members: &[u32], smooth: &[Smooth]) -> f32 {
-    members
-        .iter()
-        .fold(f32::INFINITY, |g, &m| g.min(smooth[m as usize].gap))
-}
-
-/// Length of the mean of the unit normals of the members that are at no crease: 1 where they agree, or where
-/// there is none.
-fn normal_length(members: &[u32], smooth: &[Smooth]) -> f32 {
-    let (sum, count) = members
-        .iter()
-        .map(|&m| &smooth[m as usize])
-        .filter(|s| s.normal_a.length().min(s.normal_b.length()) >= CREASED)
-        .fold((Vec3::ZERO, 0), |(sum, n), s| (sum + s.normal, n + 1));
-    match count {
-        0 => 1.0,
-        _ => sum.length() / count as f32,
-    }
-}
-
-/// Normal and main direction of a part.
-struct Shape {
-    normal: Vec3,
-    /// See [`normal_length`].
-    normal_length: f32,
-    least_gap: f32,
-    /// Greatest gap of a support point.
-    support_gap: f32,
-    centre: Vec3,
-    /// Across the normal: the direction of largest extent.
-    longest: Vec3,
-}
-
-impl Shape {
-    fn of(members: &[u32], contacts: &[ContactPixel], smooth: &[Smooth], params: &Params) -> Self {
-        let least_gap = least_gap(members, smooth);
-        let (mut mean_a, mut mean_b, mut mean) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-        let mut total = 0.0;
-        let normal_band = NORMAL_BAND * params.pixel_size;
-        for s in members.iter().map(|&m| &smooth[m as usize]) {
-            let w = falloff(s.gap - least_gap, normal_band);
-            mean_a += w * s.normal_a;
-            mean_b += w * s.normal_b;
-            mean += w * s.normal;
-            total += w;
-        }
-        let normal = common_normal(mean_a / total, mean_b / total)
-            .or_else(|| mean.try_normalize())
-            .unwrap_or(smooth[members[0] as usize].normal);
-        let support_band = SUPPORT_BAND * params.pixel_size;
-        let support_gap = least_gap + (-least_gap).clamp(support_band, normal_band);
-        let in_band = || {
-            members
-                .iter()
-                .filter(move |&&m| smooth[m as usize].gap <= support_gap)
-                .map(|&m| contacts[m as usize].middle())
-        };
-        let centre = in_band().sum::<Vec3>() / in_band().count() as f32;
-        Self {
-            normal,
-            normal_length: normal_length(members, smooth),
-            least_gap,
-            support_gap,
-            centre,
-            longest: longest_axis(in_band(), centre, normal),
-        }
-    }
-
-    /// Parts `members` by the plane through the centre across the longest direction; returns how
-    /// many are in the first part.
-    fn split(&self, members: &mut [u32], contacts: &[ContactPixel]) -> usize {
-        let behind =
-            |m: u32| (contacts[m as usize].middle() - self.centre).dot(self.longest) >= 0.0;
-        // Members stay in the order of their pixels.
-        members.sort_unstable_by_key(|&m| (behind(m), m));
-        members.partition_point(|&m| !behind(m))
-    }
-
-    /// The patch's support points and, in place of the highest of these, its deepest point where
-    /// that is clearly deeper (a ball's).
-    fn patch(
-        &self,
-        members: &[u32],
-        contacts: &[ContactPixel],
-        smooth: &[Smooth],
-        points: &mut Vec<ContactPoint>,
-        params: &Params,
-    ) -> ContactPatch {
-        points.clear();
-        points.extend(
-            members
-                .iter()
-                .map(|&m| m as usize)
-                .filter(|&m| smooth[m].gap <= self.support_gap)
-                .map(|m| self.point(contacts[m].middle(), smooth[m].gap)),
-        );
-        let supports = supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
-        let rises = supports.roughness >= LEAST_RISE * params.pixel_size;
-        let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
-        let roughness = supports.roughness_about_bowl;
-        if let Some(lowest) = lowest_of_bowl {
-            // Around it the surfaces have other normals: points there would stop what rolls. Where noise
-            // leaves open where it is, points as far apart let a ball lie that would otherwise roll about.
-            let in_band = || {
-                (members.iter().map(|&m| m as usize))
-                    .filter(|&m| smooth[m].gap <= self.support_gap)
-                    .map(|m| (&contacts[m], &smooth[m]))
-            };
-            let off_fit = in_band().map(|(contact, smooth)| contact.gap - smooth.gap);
-            let slope_error = slope_error(off_fit, params.pixel_size);
-            let Lowest {
-                point,
-                aside,
-                radii,
-            } = lowest;
-            let relative_radii = radii.map(|radius| {
-                relative_radius(radius, self.centre, in_band().map(|(contact, _)| contact))
-            });
-            let [u, v] = aside.map(|aside| slope_error * aside);
-            let points = if slope_error > 0.0 {
-                let moved = |aside: Vec3| self.point(point.middle() + aside, point.gap);
-                [u, v, -u, -v].into_iter().map(moved).collect()
-            } else {
-                [point].into_iter().collect()
-            };
-            return ContactPatch {
-                normal: self.normal,
-                points,
-                relative_radii: Some(relative_radii),
-                roughness: roughness.max(GAP_PER_SLOPE * slope_error),
-            };
-        }
-        // Chosen for being low, they are lower than the plane of a flat contact by what its gaps scatter by.
-        // What bends, or is rougher than that, is as low as it is, but for the rim of a flat contact.
-        let scatter = if rises { 0.0 } else { roughness };
-        let off_plane = OFF_PLANE * params.pixel_size;
-        let scatter = scatter + supports.flatness * (off_plane - scatter).max(0.0);
-        let in_plane = |(k, above): (usize, f32)| {
-            let point = points[k];
-            self.point(point.middle(), point.gap - above.clamp(-scatter, scatter))
-        };
-        let chosen = supports.indices.into_iter().zip(supports.above_plane);
-        let mut patch = ContactPatch {
-            normal: self.normal,
-            points: chosen.map(in_plane).collect(),
-            relative_radii: None,
-            roughness,
-        };
-        patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
-        let deepest = self.deepest(points, params);
-        // Where the gaps do not rise only a bump under the face counts.
-        let of_rims = if rises { supports.flatness } else { 1.0 } * off_plane;
-        let deeper = DEEPER * supports.roughness + of_rims;
-        if deepest.gap < patch.points[0].gap - deeper {
-            patch.points.truncate(PATCH_POINTS - 1);
-            patch.points.insert(0, deepest);
-        }
-        patch
-    }
-
-    /// Mean of the points with the smallest gaps.
-    fn deepest(&self, points: &[ContactPoint], params: &Params) -> ContactPoint {
-        let (mut middle, mut gap, mut total) = (Vec3::ZERO, 0.0, 0.0);
-        for point in points {
-            let w = falloff(point.gap - self.least_gap, DEEPEST_BAND * params.pixel_size);
-            middle += w * point.middle();
-            gap += w * point.gap;
-            total += w;
-        }
-        self.point(middle / total, gap / total)
-    }
-
-    fn point(&self, middle: Vec3, gap: f32) -> ContactPoint {
-        ContactPoint {
-            point_a: middle - 0.5 * gap * self.normal,
-            point_b: middle + 0.5 * gap * self.normal,
-            gap,
-        }
     }
 }

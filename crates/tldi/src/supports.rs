@@ -1,6 +1,6 @@
 //! Which of many contact points a solver takes.
 
-use crate::bowl::{Bowl, Lowest};
+use crate::bowl::{Bowl, Floor, Lowest, Valley};
 use crate::main_plane::Plane;
 use crate::{ContactPoint, PATCH_POINTS};
 use arrayvec::ArrayVec;
@@ -27,6 +27,8 @@ pub struct Supports {
     /// The lowest point of that bowl, if it is one in both directions, among the points, and most of
     /// the roughness.
     pub lowest_of_bowl: Option<Lowest>,
+    /// The floor of that bowl, if it is a valley: bent along one axis only.
+    pub floor_of_valley: Option<Floor>,
 }
 
 /// Most that lowness counts, in roughnesses: what is lower still is an odd one out, and would otherwise be
@@ -44,6 +46,9 @@ const FLAT: [f32; 2] = [0.35, 0.5];
 /// The same for the share of the roughness that a bowl leaves: the gaps of what bends a little are all near a
 /// plane as well.
 const UNBENT: [f32; 2] = [0.3, 0.5];
+
+/// How far from the floor of a valley points tell how low it is, in standard deviations across it.
+const NEAR_FLOOR: f32 = 0.4;
 
 /// Of points on one plane with unit normal `normal`, those on which a body would rest: in each of the four
 /// directions in which they reach out farthest, at right angles to each other, the one that is farthest
@@ -91,8 +96,8 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     let roughness = (squares / count).sqrt();
     let residuals = || points.iter().map(|p| (place(p), residual(p)));
     let bowl = Bowl::fit(residuals(), count);
-    let lowest_of_bowl = bowl.lowest(slope, roughness).map(|(place, above)| {
-        let gap = mean_gap + above;
+    let axes = [longest, across];
+    let contact_at = |place: Vec2, gap: f32| {
         let aside = place * sigma;
         let middle = centre + aside.x * longest + aside.y * across;
         // The surfaces bend away from the plane: as high as what is nearest.
@@ -101,15 +106,44 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
             .min_by(|p, q| off(p).length_squared().total_cmp(&off(q).length_squared()));
         let above = nearest.map_or(0.0, |p| (p.middle() - middle).dot(normal));
         let middle = middle + above * normal;
+        ContactPoint {
+            point_a: middle - 0.5 * gap * normal,
+            point_b: middle + 0.5 * gap * normal,
+            gap,
+        }
+    };
+    let lowest_of_bowl = bowl.lowest(slope, roughness).map(|(place, above)| {
         let aside = bowl.place_per_slope() * sigma;
         Lowest {
-            point: ContactPoint {
-                point_a: middle - 0.5 * gap * normal,
-                point_b: middle + 0.5 * gap * normal,
-                gap,
-            },
+            point: contact_at(place, mean_gap + above),
             aside: [aside.x * longest, aside.y * across],
             radii: [aside.x * sigma.x * longest, aside.y * sigma.y * across],
+        }
+    });
+    let floor_of_valley = bowl.valley(slope, roughness).map(|valley| {
+        let Valley {
+            across,
+            place: lowest,
+            bend,
+        } = valley;
+        let along = 1 - across;
+        let near = (points.iter().map(|p| (place(p), p.gap)))
+            .filter(|(place, _)| (place[across] - lowest).abs() <= NEAR_FLOOR);
+        let (mut ends, mut sum, mut count) = ([f32::INFINITY, f32::NEG_INFINITY], 0.0, 0.0);
+        for (place, gap) in near {
+            let at = place[along];
+            ends = [ends[0].min(at), ends[1].max(at)];
+            sum += gap - slope[along] * at - bend * (place[across] - lowest).powi(2);
+            count += 1.0;
+        }
+        let end = |at: f32| {
+            let mut place = Vec2::splat(at);
+            place[across] = lowest;
+            contact_at(place, sum / count + slope[along] * at)
+        };
+        Floor {
+            ends: ends.map(end),
+            radius: 0.5 / bend * sigma[across].powi(2) * axes[across],
         }
     });
     let unbent = ramp(bowl.left / roughness.max(least), UNBENT);
@@ -151,6 +185,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         roughness,
         roughness_about_bowl: bowl.left.min(roughness),
         lowest_of_bowl,
+        floor_of_valley,
     }
 }
 
