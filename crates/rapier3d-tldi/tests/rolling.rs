@@ -83,8 +83,11 @@ fn rocking(floor: ColliderBuilder, floor_first: bool, doll: ColliderBuilder) -> 
     turning
 }
 
-fn doll() -> PointCloudShape {
-    shape(&ball(RADIUS, 2000, (RADIUS - LOW) * Vector::Y))
+/// Of balls at these places along the axis about which it rocks.
+fn doll(places: &[f32]) -> PointCloudShape {
+    let at = |z: &f32| (RADIUS - LOW) * Vector::Y + *z * Vector::Z;
+    let balls = places.iter().map(|z| ball(RADIUS, 2000, at(z)));
+    shape(&balls.flatten().collect::<Vec<_>>())
 }
 
 /// Angular frequency of small rocking: m g (R − h) / (I + m h²).
@@ -114,18 +117,22 @@ fn what_rocks_gains_no_energy() {
         .build()
         .expect("a valid cloud");
     let ground = cloud_collider(PointCloudShape::new(ground));
-    for (name, floor, floor_first) in [
-        ("half-space", half_space(), true),
-        ("half-space", half_space(), false),
-        ("cloud", ground.clone(), true),
-        ("cloud", ground, false),
+    let [one, two] = [doll(&[0.0]), doll(&[-0.15, 0.15])];
+    for (name, floor, floor_first, doll) in [
+        ("half-space", half_space(), true, &one),
+        ("half-space", half_space(), false, &one),
+        ("cloud", ground.clone(), true, &one),
+        ("cloud", ground.clone(), false, &one),
+        ("half-space, two spots", half_space(), true, &two),
+        ("cloud, two spots", ground, true, &two),
     ] {
-        let turning = rocking(floor, floor_first, cloud_collider(doll()));
+        let turning = rocking(floor, floor_first, cloud_collider(doll.clone()));
         // The start is not exactly in touch.
         let at_first = largest(&turning[..60]);
         assert!((at_first / first - 1.0).abs() < 0.15, "{name}: {at_first}");
         let at_last = largest(&turning[420..]);
-        assert!(at_last < 0.8 * first, "{name}: {at_last} after {at_first}");
+        // The middle of four substeps is an eighth of a step early: by theory 0.12 is left.
+        assert!(at_last < 0.3 * first, "{name}: {at_last} after {at_first}");
         // Zero crossings of the first second and a half, while it rocks far enough to be measured.
         let crossings: Vec<usize> = (1..90)
             .filter(|&k| turning[k - 1] * turning[k] < 0.0)
@@ -176,14 +183,15 @@ fn what_is_round_rolls_on() -> TestResult {
         .collect();
     let primitives = pair.map(|at| ColliderBuilder::ball(RADIUS).translation(at));
     let lying = Vector::X * (0.5 * PI);
+    // Where they lie is known to a fiftieth of a radius, a slope that slow balls feel.
     for (name, ours, primitives, share) in [
         (
             "ball",
             ball(RADIUS, 2000, Vector::ZERO),
             vec![ColliderBuilder::ball(RADIUS)],
-            0.02,
+            0.04,
         ),
-        ("balls", balls, primitives.to_vec(), 0.02),
+        ("balls", balls, primitives.to_vec(), 0.04),
         // The radius of its line is known as well as a ball's, but its ends are bent by their rims.
         (
             "cylinder",
@@ -192,7 +200,7 @@ fn what_is_round_rolls_on() -> TestResult {
             0.08,
         ),
     ] {
-        for (speed, level_first) in [(0.5, true), (1.5, true), (1.5, false)] {
+        for (speed, level_first) in [(0.2, true), (1.5, true), (1.5, false)] {
             let expected = rolled(primitives.clone(), speed, level_first)?;
             assert!(expected > 0.9 * 3.0 * speed, "{name}: {expected}");
             let body = cloud_collider(shape(&ours));

@@ -243,6 +243,48 @@ fn casts_of_what_turns_on_the_spot() -> TestResult {
     Ok(())
 }
 
+/// What is thick is looked at in pieces in which it turns by much: its corner meets the floor no less exactly, be it
+/// that it falls or that it turns once all around where it is.
+#[test]
+fn casts_of_what_is_thick_and_turns() -> TestResult {
+    let dispatcher = dispatcher();
+    let half = 1.2;
+    let (cloud_cube, cloud_floor) = (shape(&cube(half)), shape(&square(2.5)));
+    let exact_floor = HalfSpace::new(Vector::Y);
+    let still = NonlinearRigidMotion::constant_position(Pose::IDENTITY);
+    let drop = |angle: f32| half * (angle.sin().abs() + angle.cos().abs());
+    for (height, fall, spin, duration) in [
+        (1.8, 9.0, 20.0, 1.0 / 30.0),
+        (2.1, 24.0, 60.0, 1.0 / 30.0),
+        (1.5, 0.0, std::f32::consts::TAU, 1.0),
+    ] {
+        let met_at = (0..100_000)
+            .map(|k| duration * k as f32 * 1e-5)
+            .find(|&t| height - fall * t <= drop(spin * t))
+            .expect("it reaches the floor");
+        let motion = NonlinearRigidMotion::new(
+            Pose::from_translation(Vector::Y * height),
+            Vector::ZERO,
+            -fall * Vector::Y,
+            spin * Vector::Z,
+        );
+        for floor in [&cloud_floor as &dyn Shape, &exact_floor] {
+            let hit = dispatcher
+                .cast_shapes_nonlinear(&motion, &cloud_cube, &still, floor, 0.0, duration, false)?
+                .expect("its corner meets the floor");
+            // The corner comes down by so much more until then.
+            let gap_at = |t: f32| height - fall * t - drop(spin * t);
+            let early = gap_at(hit.time_of_impact) - gap_at(met_at);
+            // A pixel, and what edges are felt late by.
+            assert!(
+                early.abs() < 1.25 * SPACING,
+                "{early} m early at {spin} rad/s"
+            );
+        }
+    }
+    Ok(())
+}
+
 /// Both turn about a pivot far away: what they do relative to each other is what counts.
 #[test]
 fn casts_from_a_carousel() -> TestResult {
