@@ -120,7 +120,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
             radii: [aside.x * sigma.x * longest, aside.y * sigma.y * across],
         }
     });
-    let floor_of_valley = bowl.valley(slope, roughness).map(|valley| {
+    let floor_of_valley = bowl.valley(slope, roughness).and_then(|valley| {
         let Valley {
             across,
             place: lowest,
@@ -141,10 +141,10 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
             place[across] = lowest;
             contact_at(place, sum / count + slope[along] * at)
         };
-        Floor {
+        (ends[0] < ends[1]).then(|| Floor {
             ends: ends.map(end),
             radius: 0.5 / bend * sigma[across].powi(2) * axes[across],
-        }
+        })
     });
     let unbent = ramp(bowl.left / roughness.max(least), UNBENT);
     let (main_plane, flatness) = if unbent > 0.0 {
@@ -290,6 +290,33 @@ mod tests {
         assert!((lowest.middle().x + 2.5).abs() < 0.01, "{lowest:?}");
         assert!(lowest.middle().z.abs() < 0.01, "{lowest:?}");
         assert_eq!(cap(Vec2::new(0.02, 0.0)).lowest_of_bowl, None);
+    }
+
+    /// A trough has a floor, as low as it is and as long, with its radius; one of which only the sides are seen has
+    /// none.
+    #[test]
+    fn troughs_have_floors() {
+        let trough = |is_seen: fn(i32) -> bool| {
+            let places = (-4..=4).flat_map(|i| (-9..=9).map(move |j| (i, j)));
+            let points: Vec<ContactPoint> = (places.filter(|(i, _)| is_seen(*i)))
+                .map(|(i, j)| Vec3::new(i as f32, 0.0, j as f32))
+                .map(|p| ContactPoint {
+                    point_a: p,
+                    point_b: p,
+                    gap: 0.05 * (p.x - 1.0).powi(2) + 0.01 * p.z,
+                })
+                .collect();
+            supports(&points, Vec3::Y, 1e-4)
+        };
+        let floor = trough(|_| true).floor_of_valley.expect("a floor");
+        for end in floor.ends {
+            let middle = end.middle();
+            assert!((middle.x - 1.0).abs() < 1e-3, "{end:?}");
+            assert!((middle.z.abs() - 9.0).abs() < 1e-3, "{end:?}");
+            assert!((end.gap - 0.01 * middle.z).abs() < 1e-3, "{end:?}");
+        }
+        assert!((floor.radius.length() - 10.0).abs() < 0.01, "{floor:?}");
+        assert_eq!(trough(|i| i.abs() >= 3).floor_of_valley, None);
     }
 
     /// A face whose rim dips on two sides and is lifted on the others is as flat as its middle, and its
