@@ -49,7 +49,7 @@ const fn known(
 /// Several rows fail for each of these.
 const ONE_LAYER: &str = "Sheets within 2 r̄ of each other without normals become one layer at their \
                          mean depth.";
-const DEEP_IN_WAVES: &str = "Nine of 10,000 hits: of small bodies in troughs hardly wider than they are, \
+const DEEP_IN_WAVES: &str = "Eight of 10,000 hits: of small bodies in troughs hardly wider than they are, \
                              where a wave rises faster than rapier undoes penetrations, or sweeps stop at a \
                              crest that contacts, deep below it, do not face.";
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
