@@ -216,7 +216,7 @@ fn an_egg_on_a_ball_tells_the_relative_radii() {
         }
     }
     // Curvatures scatter by 1.2 %, of estimated normals about 2 % too much by 1.5 %: four standard deviations. By
-    // gaps alone they are off by up to a fifth, by how far up these are known.
+    // gaps alone those of small balls are off by up to a fifth, by how far up the gaps are known.
     assert!(least > 0.95 && most < 1.08, "{least} to {most}");
 }
 
