@@ -46,7 +46,7 @@ fn is_best_seen(look: ptr<function, Look>, normal: vec3f) -> bool {
 }
 
 // Depth of the layer that continues `from` in a neighbouring pixel, or INFINITE.
-fn continued(from_layer: u32, c: Column, merge_gap: f32) -> f32 {
+fn continued(from_layer: u32, c: Column, thickness: f32) -> f32 {
     let depth = layers[from_layer].depth;
     var best = INFINITE;
     var nearest = INFINITE;
@@ -58,29 +58,29 @@ fn continued(from_layer: u32, c: Column, merge_gap: f32) -> f32 {
             best = layers[k].depth;
         }
     }
-    return select(INFINITE, best, nearest <= merge_gap);
+    return select(INFINITE, best, nearest <= thickness);
 }
 
 // Whether a layer of `a` and one of `b` swap their order between two neighbouring pixels, or coincide.
 fn swaps(look: ptr<function, Look>, a: Column, b: Column, a_next: Column, b_next: Column) -> bool {
-    let merge_gap = (*look).params.merge_gap;
+    let thickness = (*look).params.thickness;
     for (var ka = a.begin; ka < a.end; ka++) {
         if is_edge_on(layers[ka].normal) {
             continue;
         }
-        let next_a = continued(ka, a_next, merge_gap);
+        let next_a = continued(ka, a_next, thickness);
         if next_a == INFINITE {
             continue;
         }
         for (var kb = b.begin; kb < b.end; kb++) {
             let apart = layers[ka].depth - layers[kb].depth;
-            if is_edge_on(layers[kb].normal) || abs(apart) > 2.0 * merge_gap {
+            if is_edge_on(layers[kb].normal) || abs(apart) > 2.0 * thickness {
                 continue;
             }
             if !is_best_seen(look, layers[ka].normal) && !is_best_seen(look, layers[kb].normal) {
                 continue;
             }
-            let next_b = continued(kb, b_next, merge_gap);
+            let next_b = continued(kb, b_next, thickness);
             if next_b != INFINITE && apart * (next_a - next_b) <= 0.0 {
                 return true;
             }
@@ -98,14 +98,14 @@ struct Place {
 }
 
 // Whether layer `k` of side `s` goes on at `p`. Beyond the image it is taken to.
-fn goes_on(s: u32, k: u32, p: vec2i, place: Place, merge_gap: f32) -> bool {
+fn goes_on(s: u32, k: u32, p: vec2i, place: Place, thickness: f32) -> bool {
     if any(p < vec2i(0)) || any(p >= place.size) {
         return true;
     }
     let next = column(s, place.first + u32(p.y * place.size.x + p.x));
     let depth = layers[k].depth;
     for (var n = next.begin; n < next.end; n++) {
-        if abs(layers[n].depth - depth) <= merge_gap
+        if abs(layers[n].depth - depth) <= thickness
             || (layers[n].near <= depth && depth <= layers[n].far) {
             return true;
         }
@@ -114,7 +114,7 @@ fn goes_on(s: u32, k: u32, p: vec2i, place: Place, merge_gap: f32) -> bool {
 }
 
 // Whether layer `k` of side `s` goes on in pixels on both sides of a line across `across`.
-fn is_on_both_sides(across: vec2f, s: u32, k: u32, place: Place, merge_gap: f32) -> bool {
+fn is_on_both_sides(across: vec2f, s: u32, k: u32, place: Place, thickness: f32) -> bool {
     let beside = BESIDE * length(across);
     var there = vec2<bool>(false);
     for (var dj = -1; dj <= 1; dj++) {
@@ -124,7 +124,7 @@ fn is_on_both_sides(across: vec2f, s: u32, k: u32, place: Place, merge_gap: f32)
             }
             let along = dot(across, vec2f(f32(di), f32(dj)));
             let side = vec2<bool>(along >= beside, -along >= beside);
-            if any(side) && goes_on(s, k, place.at + vec2i(di, dj), place, merge_gap) {
+            if any(side) && goes_on(s, k, place.at + vec2i(di, dj), place, thickness) {
                 there = there | side;
             }
         }
@@ -133,20 +133,20 @@ fn is_on_both_sides(across: vec2f, s: u32, k: u32, place: Place, merge_gap: f32)
 }
 
 // Whether layer `other` of side `s` lies well within the layer `wall` and goes on on both sides of it.
-fn is_through(wall: u32, other: u32, s: u32, place: Place, merge_gap: f32) -> bool {
-    let rim = 0.5 * merge_gap;
+fn is_through(wall: u32, other: u32, s: u32, place: Place, thickness: f32) -> bool {
+    let rim = 0.5 * thickness;
     let depth = layers[other].depth;
     return abs(dot(layers[wall].normal, layers[other].normal)) < SAME_FACE
         && layers[wall].near + rim < depth && depth < layers[wall].far - rim
-        && is_on_both_sides(layers[wall].normal.xy, s, other, place, merge_gap);
+        && is_on_both_sides(layers[wall].normal.xy, s, other, place, thickness);
 }
 
 // Whether a layer of one lies well within a thick layer of the other, a wall seen edge-on, to which it
 // is not parallel, and goes on on both sides of it.
-fn pierces(a: Column, b: Column, place: Place, merge_gap: f32) -> bool {
+fn pierces(a: Column, b: Column, place: Place, thickness: f32) -> bool {
     for (var ka = a.begin; ka < a.end; ka++) {
         for (var kb = b.begin; kb < b.end; kb++) {
-            if is_through(ka, kb, 1u, place, merge_gap) || is_through(kb, ka, 0u, place, merge_gap) {
+            if is_through(ka, kb, 1u, place, thickness) || is_through(kb, ka, 0u, place, thickness) {
                 return true;
             }
         }
@@ -165,8 +165,8 @@ fn opposed(entry: vec3f, leaving: vec3f) -> bool {
 }
 
 // Depth at which the ray entered the part of a body that it leaves through layer `last`.
-fn entered_at(c: Column, last: u32, middle: f32, merge_gap: f32) -> f32 {
-    let thin = layers[last].depth - merge_gap;
+fn entered_at(c: Column, last: u32, middle: f32, thickness: f32) -> f32 {
+    let thin = layers[last].depth - thickness;
     for (var k = last; k > c.begin; k--) {
         let before = k - 1u;
         if is_edge_on(layers[before].normal) {
@@ -179,8 +179,8 @@ fn entered_at(c: Column, last: u32, middle: f32, merge_gap: f32) -> f32 {
 }
 
 // Depth at which the ray leaves the part of a body that it enters through layer `first`.
-fn left_at(c: Column, first: u32, middle: f32, merge_gap: f32) -> f32 {
-    let thin = layers[first].depth + merge_gap;
+fn left_at(c: Column, first: u32, middle: f32, thickness: f32) -> f32 {
+    let thin = layers[first].depth + thickness;
     for (var behind = first + 1u; behind < c.end; behind++) {
         if is_edge_on(layers[behind].normal) {
             continue;
@@ -193,14 +193,14 @@ fn left_at(c: Column, first: u32, middle: f32, merge_gap: f32) -> f32 {
 
 // The layer of `a` that meets layer `kb` of `b`, or NONE.
 fn met_by(look: ptr<function, Look>, a: Column, b: Column, kb: u32) -> u32 {
-    let merge_gap = (*look).params.merge_gap;
-    let entered = entered_at(b, kb, (*look).middle_b, merge_gap);
+    let thickness = (*look).params.thickness;
+    let entered = entered_at(b, kb, (*look).middle_b, thickness);
     for (var ka = a.begin; ka < a.end; ka++) {
         if facing_of(a, ka) == EXIT || is_edge_on(layers[ka].normal)
-            || entered > left_at(a, ka, (*look).middle_a, merge_gap) {
+            || entered > left_at(a, ka, (*look).middle_a, thickness) {
             continue;
         }
-        if layers[kb].depth - layers[ka].depth <= merge_gap
+        if layers[kb].depth - layers[ka].depth <= thickness
             || opposed(layers[ka].normal, layers[kb].normal) {
             return ka;
         }
@@ -294,7 +294,7 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     let pixel = vec2u(in_image % size.x, in_image / size.x);
     if atomicLoad(&found[pair * PAIR_WORDS + CROSSINGS]) < CROSSED {
         let place = Place(vec2i(pixel), vec2i(size), k - in_image);
-        var crossings = PIERCED * u32(pierces(a, b, place, look.params.merge_gap));
+        var crossings = PIERCED * u32(pierces(a, b, place, look.params.thickness));
         if pixel.x + 1u < size.x {
             crossings += SWAPPED
                 * u32(swaps(&look, a, b, column(0u, k + 1u), column(1u, k + 1u)));

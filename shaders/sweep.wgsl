@@ -68,7 +68,9 @@ fn depth_of(key: u32) -> u32 {
 }
 
 fn is_same_layer(key: u32, next: u32, merge_steps: u32) -> bool {
-    return key >> DEPTH_BITS == next >> DEPTH_BITS && depth_of(next) - depth_of(key) <= merge_steps;
+    let class_of = key >> DEPTH_BITS;
+    let apart = select(merge_steps, max(merge_steps, DEPTH_STEPS), class_of == EDGE_ON_CLASS);
+    return class_of == next >> DEPTH_BITS && depth_of(next) - depth_of(key) <= apart;
 }
 
 fn weight_of(f: vec2u) -> u32 {
@@ -186,7 +188,7 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
             end = begin;
         }
     }
-    let merge_steps = pairs[view / MAX_VIEWS].merge_steps;
+    let merge_steps = sides[view / MAX_VIEWS * 2u + s].merge_steps;
     if end > begin {
         sort_fragments(begin, end - begin);
         count = 1u;

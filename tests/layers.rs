@@ -2,7 +2,7 @@
 
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Facing, Layer, Params, PointCloud, Tldi, VirtualCamera, build};
-use tldi_tests::{oracle_layers, random_unit, sampled_sphere};
+use tldi_tests::{oracle_layers, random_unit, sampled_plane, sampled_sphere};
 
 /// Every pixel's layers equal those of an O(n²) sort-and-merge in f64.
 #[test]
@@ -38,9 +38,9 @@ fn layers_equal_brute_force() {
                 layers.sort_by(|a, b| a.near.total_cmp(&b.near));
                 assert_eq!(layers.len(), truth.len(), "seed {seed}, pixel ({u}, {v})");
                 for (layer, (near, far, depth)) in layers.iter().zip(truth) {
-                    // Two fixed-point steps (merge gap / 4096 each) and weights in 255ths of the
-                    // merge gap's spread.
-                    let step = f64::from(params.merge_gap) / 4096.0;
+                    // Two fixed-point steps (thickness / 4096 each) and weights in 255ths of the
+                    // layer's spread.
+                    let step = f64::from(params.thickness) / 4096.0;
                     let spread = (far - near) / 100.0;
                     assert!(
                         (f64::from(layer.near) - near).abs() < 2.0 * step,
@@ -112,6 +112,55 @@ fn a_sphere_has_two_layers_at_the_analytic_depths() {
                     assert!(layer.normal.dot(normal) > 0.99, "at {rho}: {layer:?}");
                 }
             }
+        }
+    }
+}
+
+/// Two sheets without normals, 1.5 radii apart, are two layers, where they are; told that so much is noise,
+/// they are one.
+#[test]
+fn near_sheets_are_two_layers() {
+    let (r, apart) = (0.01, 0.015);
+    let mut rng = fastrand::Rng::with_seed(9);
+    for noise in [0.0, r] {
+        for _ in 0..6 {
+            let mut points = sampled_plane(0.4, r, &mut rng).points;
+            let upper = sampled_plane(0.4, r, &mut rng).points;
+            points.extend(upper.into_iter().map(|p| p + apart * Vec3::Y));
+            let cloud = PointCloud::builder(points).radius(r).noise(noise).build();
+            let cloud = cloud.expect("the points are valid");
+            // Within 22° of the normal.
+            let axis = (0.4 * random_unit(&mut rng).reject_from(Vec3::Y) - Vec3::Y).normalize();
+            let camera = VirtualCamera::along(axis, r);
+            let image = build(&cloud, &Pose3::IDENTITY, &camera, &Params::for_radius(r));
+            let (mut seen, mut as_expected) = (0, 0);
+            for (i, j) in (0..image.size[0]).flat_map(|i| (0..image.size[1]).map(move |j| (i, j))) {
+                let [u, v] = [image.origin[0] + i as i32, image.origin[1] + j as i32];
+                let heights: Vec<f32> = (image.layers_at(i, j).iter())
+                    .map(|l| camera.point_at(u as f32 + 0.5, v as f32 + 0.5, l.depth))
+                    .filter(|p| p.x.abs().max(p.z.abs()) < 0.17)
+                    .map(|p| p.y)
+                    .collect();
+                if heights.is_empty() {
+                    continue;
+                }
+                seen += 1;
+                let truth: &[f32] = if noise > 0.0 {
+                    &[0.5 * apart]
+                } else {
+                    &[apart, 0.0]
+                };
+                let near = |(height, truth): (&f32, &f32)| (height - truth).abs() < 0.4 * r;
+                as_expected += usize::from(
+                    heights.len() == truth.len() && heights.iter().zip(truth).all(near),
+                );
+            }
+            // Estimated of both sheets at once, normals are some degrees off.
+            assert!(seen > 500, "{seen}");
+            assert!(
+                as_expected * 10 > seen * 9,
+                "{noise}: {as_expected} of {seen}"
+            );
         }
     }
 }

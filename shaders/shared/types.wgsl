@@ -15,6 +15,8 @@ override SAME_FACE: f32;
 override MAX_WEIGHT: f32;
 override DEPTH_BITS: u32;
 override MAX_DEPTH: f32;
+override DEPTH_STEPS: u32;
+override EDGE_ON_CLASS: u32;
 override LEAST_TILE: i32;
 override FACING: f32;
 override BESIDE: f32;
@@ -54,12 +56,12 @@ const INFINITE: f32 = 3.0e38;
 struct Params {
     pixel_size: f32,
     merge_gap: f32,
+    thickness: f32,
     prediction: f32,
     slope_damping: f32,
     rho: f32,
     stack_segments: u32,
     variant: u32,
-    padding: u32,
 }
 
 // Sizes of the batch, capacities in elements, and where the parts of the arena begin, in words.
@@ -104,9 +106,9 @@ struct Pair {
     toward_b: vec3f,
     has_last: u32,
     last_axis: vec3f,
-    merge_steps: u32,
-    lies: vec3f,
     body_is_b: u32,
+    lies: vec3f,
+    padding_g: u32,
     motion: vec3f,
     padding_a: u32,
     body_middle: vec3f,
@@ -159,8 +161,8 @@ struct Side {
     cell_first: u32,
     cell_inv: f32,
     mean_radius: f32,
+    merge_steps: u32,
     padding_a: u32,
-    padding_b: u32,
 }
 
 // Bits of `Side.flags`.

@@ -39,8 +39,16 @@ pub fn oracle_layers(
             runs.push(vec![f]);
         }
     }
-    let gap = f64::from(params.merge_gap);
+    let gap_of = |f: &OracleFragment| {
+        let gap = f64::from(params.merge_gap) + 0.8 * f64::from(cloud.noise());
+        if f.class == 2 {
+            gap.max(f64::from(params.thickness))
+        } else {
+            gap
+        }
+    };
     for (k, f) in runs.iter().enumerate() {
+        let gap = gap_of(&f[0]);
         let close =
             |g: &[OracleFragment]| ((f[0].depth - g[0].depth).abs() - gap).abs() < 1e-3 * gap;
         if runs[..k].iter().any(|g| close(g)) {
@@ -53,7 +61,7 @@ pub fn oracle_layers(
                 let touching = runs[a].iter().any(|f| {
                     runs[b]
                         .iter()
-                        .any(|g| f.class == g.class && (f.depth - g.depth).abs() <= gap)
+                        .any(|g| f.class == g.class && (f.depth - g.depth).abs() <= gap_of(f))
                 });
                 if touching {
                     let other = runs.swap_remove(b);

@@ -146,7 +146,7 @@ pub(crate) fn append_part_pairs<'a>(
                         last_axis,
                     },
                     params,
-                    scatter: config.scatter * 0.5 * params.merge_gap,
+                    scatter: config.scatter * 0.5 * params.thickness,
                     query,
                 }
             });

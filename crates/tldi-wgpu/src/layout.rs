@@ -72,9 +72,9 @@ pub(crate) struct PairData {
     toward_b: [f32; 3],
     has_last: u32,
     last_axis: [f32; 3],
-    merge_steps: u32,
-    lies: [f32; 3],
     body_is_b: u32,
+    lies: [f32; 3],
+    padding_g: u32,
     motion: [f32; 3],
     padding_a: u32,
     body_middle: [f32; 3],
@@ -119,9 +119,9 @@ impl PairData {
             toward_b: plan.approach.toward_b().to_array(),
             has_last: u32::from(plan.approach.last_axis.is_some()),
             last_axis: plan.approach.last_axis.unwrap_or(Vec3::ZERO).to_array(),
-            merge_steps: scale.merge_steps(&query.params),
-            lies: plan.approach.lies.to_array(),
             body_is_b: u32::from(body.is_b),
+            lies: plan.approach.lies.to_array(),
+            padding_g: 0,
             motion: plan.approach.motion.to_array(),
             padding_a: 0,
             body_middle: body.middle.to_array(),
@@ -142,6 +142,7 @@ pub(crate) struct CloudFacts {
     len: usize,
     mean_radius: f32,
     max_radius: f32,
+    noise: f32,
     has_normals: bool,
     is_oriented: bool,
     radii_differ: bool,
@@ -155,6 +156,7 @@ impl CloudFacts {
                 len: cloud.len(),
                 mean_radius: cloud.mean_radius(),
                 max_radius: cloud.max_radius(),
+                noise: cloud.noise(),
                 has_normals: cloud.normals().is_some(),
                 is_oriented: cloud.normals_oriented(),
                 radii_differ: matches!(cloud.radii(), Radii::PerPoint(_)),
@@ -163,6 +165,7 @@ impl CloudFacts {
                 len: cloud.len,
                 mean_radius: cloud.mean_radius,
                 max_radius: cloud.max_radius,
+                noise: 0.0,
                 has_normals: false,
                 is_oriented: false,
                 radii_differ: true,
@@ -192,7 +195,8 @@ pub(crate) struct SideData {
     pub(crate) cell_first: u32,
     cell_inv: f32,
     mean_radius: f32,
-    padding: [u32; 2],
+    merge_steps: u32,
+    padding: u32,
 }
 
 impl SideData {
@@ -235,7 +239,8 @@ impl SideData {
             cell_first,
             cell_inv: 1.0 / cell,
             mean_radius: cloud.mean_radius,
-            padding: [0; 2],
+            merge_steps: DepthScale::new(0.0, params).merge_steps(params, cloud.noise),
+            padding: 0,
         }
     }
 
@@ -340,9 +345,9 @@ mod tests {
     #[test]
     fn layouts_are_those_of_wgsl() {
         assert_same_layout!("Params", Params, [
-            pixel_size pixel_size, merge_gap merge_gap, prediction prediction,
+            pixel_size pixel_size, merge_gap merge_gap, thickness thickness, prediction prediction,
             slope_damping slope_damping, rho rho, stack_segments stack_segments,
-            variant variant, _padding padding,
+            variant variant,
         ]);
         assert_same_layout!("Batch", BatchData, [
             pairs pairs, items items, survivors survivors, tiles tiles, pixels pixels,
@@ -357,7 +362,7 @@ mod tests {
             zone_first zone_first, larger_from_a_y larger_from_a_y, zone_words zone_words,
             larger_from_a_z larger_from_a_z, policy policy, half_extents half_extents,
             plainness plainness, toward_b toward_b, has_last has_last, last_axis last_axis,
-            merge_steps merge_steps, lies lies, body_is_b body_is_b, motion motion, body_middle body_middle, body_half_extents body_half_extents, body_from_a body_from_a_x, view view_x, image_size image_size,
+            body_is_b body_is_b, lies lies, motion motion, body_middle body_middle, body_half_extents body_half_extents, body_from_a body_from_a_x, view view_x, image_size image_size,
             depth_step depth_step, depth_inv_step depth_inv_step,
         ]);
         assert_same_layout!("Side", SideData, [
@@ -366,6 +371,7 @@ mod tests {
             flags flags, first_point first_point, first_normal first_normal,
             radius_scale radius_scale, max_radius max_radius, cell_dims cell_dims,
             cell_first cell_first, cell_inv cell_inv, mean_radius mean_radius,
+            merge_steps merge_steps,
         ]);
     }
 

@@ -103,7 +103,7 @@ impl Links {
         roots: &mut Vec<u32>,
     ) {
         let is_deep =
-            |c: &ContactPixel| c.point_a.distance(c.point_b) > params.merge_gap && c.gap < 0.0;
+            |c: &ContactPixel| c.point_a.distance(c.point_b) > params.thickness && c.gap < 0.0;
         self.counts.clear();
         self.counts.resize(result.contacts.len(), 0);
         for &(k, l) in &self.pairs {
@@ -117,7 +117,7 @@ impl Links {
                     *count = NONE;
                     continue;
                 }
-                let confirmed = *count as f32 / CONFIRMING as f32 * params.merge_gap;
+                let confirmed = *count as f32 / CONFIRMING as f32 * params.thickness;
                 contact.gap = contact.gap.max(-confirmed);
             }
             *count = kept;

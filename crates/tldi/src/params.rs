@@ -30,9 +30,13 @@ pub struct Params {
     /// Edge of a pixel at the surface, in metres. Coarser than r̄ loses detail, finer costs time
     /// and lets noise through; r̄ was best (design notes, "What was tried", 3).
     pub pixel_size: f32,
-    /// Fragments of one pixel whose depths differ by no more than this belong to one layer, in
-    /// metres. Two balls of radius r̄ overlap in depth up to 2 r̄.
+    /// Fragments of one pixel whose depths follow each other by no more than this belong to one layer, in
+    /// metres; by more, the noisier the cloud is told to be. Sheets farther apart than this are two.
     pub merge_gap: f32,
+    /// How thick a surface is, in metres: layers of neighbouring pixels whose depths differ by no more
+    /// continue each other, and what is no deeper in a surface touches it. Two balls of radius r̄ overlap in
+    /// depth up to 2 r̄.
+    pub thickness: f32,
     /// Contacts with a gap up to this are reported, in metres (rapier's prediction distance).
     pub prediction: f32,
     /// Share of a splat's slope that extrapolates its depth to the pixel centre, 0 to 1.
@@ -45,8 +49,6 @@ pub struct Params {
     pub stack_segments: u32,
     /// The [`Variant`]: 0 is `Paper`, 1 is `Oriented`.
     pub variant: u32,
-    /// Keeps the size a multiple of 16 bytes, as uniform buffers want it. Always 0.
-    pub _padding: u32,
 }
 
 impl Params {
@@ -54,13 +56,13 @@ impl Params {
     pub fn for_radius(radius: f32) -> Self {
         Self {
             pixel_size: radius,
-            merge_gap: 2.0 * radius,
+            merge_gap: 1.2 * radius,
+            thickness: 2.0 * radius,
             prediction: 2.0 * radius,
             slope_damping: 0.7,
             rho: 0.05,
             stack_segments: 128,
             variant: 1,
-            _padding: 0,
         }
     }
 

@@ -13,10 +13,10 @@ pub use crate::cpu::normals::SUPPORT;
 pub use crate::cpu::splat::DepthScale;
 pub use crate::cpu::zone::ZoneGrid;
 
-/// Columns in which the surfaces are farther apart along the view than this many merge gaps, or
+/// Columns in which the surfaces are farther apart along the view than this many thicknesses, or
 /// prediction distances, are not modelled. A contact at the prediction distance is as far along
 /// the view where its normal is 60° off (beyond, depths along the view tell no distance); surfaces
-/// that cross between neighbouring pixels are at most two merge gaps apart in both.
+/// that cross between neighbouring pixels are at most two thicknesses apart in both.
 const REACH: f32 = 2.0;
 
 /// Depth in pixels to which a body that has sunk below all of a surface is looked for. Points that
@@ -124,7 +124,7 @@ impl PairPlan {
                 side(query.a_from_b, Pose3::IDENTITY, bounds_a, middle_b),
             ],
             zone_reach,
-            column_reach: REACH * query.params.merge_gap.max(query.params.prediction),
+            column_reach: REACH * query.params.thickness.max(query.params.prediction),
             approach: {
                 let (motion, last_axis) = match query.view {
                     View::Fixed(_) => (Vec3::ZERO, None),

@@ -51,10 +51,14 @@ pub(crate) fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static 
 impl Params {
     /// Whether a backend can use them; if not, why.
     pub fn check(&self) -> Result<(), &'static str> {
-        if self.pixel_size > 0.0 && self.merge_gap > 0.0 && self.prediction >= 0.0 {
+        if self.pixel_size > 0.0
+            && self.merge_gap > 0.0
+            && self.thickness > 0.0
+            && self.prediction >= 0.0
+        {
             Ok(())
         } else {
-            Err("pixel_size and merge_gap must be positive, prediction not negative")
+            Err("pixel_size, merge_gap and thickness must be positive, prediction not negative")
         }
     }
 }

@@ -135,12 +135,12 @@ fn swaps(
                     .abs()
                     .total_cmp(&(m.depth - from.depth).abs())
             })?;
-        ((next.depth - from.depth).abs() <= params.merge_gap).then_some(next.depth)
+        ((next.depth - from.depth).abs() <= params.thickness).then_some(next.depth)
     };
     a.iter().filter(|l| !is_edge_on(l)).any(|la| {
         continuous(la, a_next).is_some_and(|na| {
             b.iter().filter(|l| !is_edge_on(l)).any(|lb| {
-                (la.depth - lb.depth).abs() <= 2.0 * params.merge_gap
+                (la.depth - lb.depth).abs() <= 2.0 * params.thickness
                     && (best_seen(la.normal, others) || best_seen(lb.normal, others))
                     && continuous(lb, b_next)
                         .is_some_and(|nb| (la.depth - lb.depth) * (na - nb) <= 0.0)
@@ -153,7 +153,7 @@ fn swaps(
 /// not parallel, and goes on on both sides of it: of a surface that ends beside a wall, the last splats
 /// are in the wall's pixels.
 fn pierces(a: &Tldi, b: &Tldi, pixel: [u32; 2], params: &Params) -> bool {
-    let rim = 0.5 * params.merge_gap;
+    let rim = 0.5 * params.thickness;
     let through = |walls: &Tldi, other: &Tldi| {
         let [i, j] = pixel;
         walls.layers_at(i, j).iter().any(|wall| {
@@ -184,7 +184,7 @@ fn is_on_both_sides(
         i >= width
             || j >= height
             || image.layers_at(i, j).iter().any(|next| {
-                (next.depth - layer.depth).abs() <= params.merge_gap
+                (next.depth - layer.depth).abs() <= params.thickness
                     || (next.near..=next.far).contains(&layer.depth)
             })
     };
@@ -256,7 +256,7 @@ fn contact_pixels([a, b]: [Column; 2], at: &PixelView, params: &Params, result: 
             .filter(|(_, la)| a.facing(la) != Facing::Exit && !is_edge_on(la))
             .filter(|(ka, _)| entered <= left_at(&a.from(*ka), at.middles.a, params))
             .map(|(_, la)| la)
-            .find(|la| exit.depth - la.depth <= params.merge_gap || opposed(la, exit));
+            .find(|la| exit.depth - la.depth <= params.thickness || opposed(la, exit));
         let Some(entry) = entry else { continue };
         // Outward normals in the view frame: the camera sees a from outside, b from inside.
         let normal_a = facing_camera(entry.normal, -1.0);
@@ -330,7 +330,7 @@ fn entered_at(column: &Column, middle: Option<f32>, params: &Params) -> f32 {
     let Some((exit, before)) = column.layers.split_last() else {
         return f32::INFINITY;
     };
-    let thin = exit.depth - params.merge_gap;
+    let thin = exit.depth - params.thickness;
     let before = before.iter().rfind(|l| !is_edge_on(l));
     match (column.facing(exit), before) {
         (Facing::Exit, None) => f32::NEG_INFINITY,
@@ -345,7 +345,7 @@ fn left_at(column: &Column, middle: Option<f32>, params: &Params) -> f32 {
     let Some((entry, behind)) = column.layers.split_first() else {
         return f32::NEG_INFINITY;
     };
-    let thin = entry.depth + params.merge_gap;
+    let thin = entry.depth + params.thickness;
     let behind = behind.iter().find(|l| !is_edge_on(l));
     match (column.facing(entry), behind) {
         (Facing::Entry, None) => f32::INFINITY,

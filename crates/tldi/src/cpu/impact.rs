@@ -236,7 +236,7 @@ impl Scratch {
         let (hits, touching) = (&mut self.hits, &mut self.touching);
         match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
-                let reach = length + query.params.merge_gap;
+                let reach = length + query.params.thickness;
                 self.look_at_clouds(&view_of(a, a_from_a), &view_of(b, a_from_b), reach)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
@@ -398,5 +398,5 @@ fn back(layer: &Layer, params: &Params) -> f32 {
 
 /// By how much splats that are seen edge-on stand out in depth beyond their points, metres.
 fn rise(params: &Params) -> f32 {
-    0.5 * params.merge_gap * params.slope_damping
+    0.5 * params.thickness * params.slope_damping
 }

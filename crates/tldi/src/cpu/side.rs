@@ -196,6 +196,7 @@ impl Side {
             sweep::sweep(
                 &mut self.fragments,
                 points.oriented,
+                imaging.scale.merge_steps(view.params, view.cloud.noise()),
                 color,
                 imaging,
                 &mut self.image,

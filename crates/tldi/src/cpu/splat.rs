@@ -20,9 +20,17 @@ const LEAST_RADIUS_PX: f32 = 0.75;
 /// |n·v| under which a surface is seen edge-on (78°): its tangent plane says nothing about depth.
 pub(crate) const EDGE_ON: f32 = 0.2;
 
-/// Depth steps in one merge gap: depths are summed as integers, so that sums do not depend on the
+/// Class of splats that are seen edge-on.
+pub(super) const EDGE_ON_CLASS: u32 = 2;
+
+/// Depth steps in a surface's thickness: depths are summed as integers, so that sums do not depend on the
 /// order of the points.
-const DEPTH_STEPS: f32 = 4096.0;
+pub(super) const DEPTH_STEPS: u32 = 4096;
+
+/// By how much of a cloud's noise its fragments may follow each other more widely in depth and still be one
+/// layer: with noise of r̄ as widely as a surface is thick, since narrower gaps tear noisy sheets apart (`accuracy
+/// --variant told`).
+const NOISE_MERGED: f32 = 0.8;
 
 /// Steps of a normal's component in the integer sums.
 pub(crate) const NORMAL_STEPS: f32 = 16384.0;
@@ -41,7 +49,9 @@ const DEPTH_BITS: u32 = 30;
 const MAX_DEPTH: f32 = ((1 << DEPTH_BITS) - 64) as f32;
 
 /// For [`stage_constants`](crate::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 6] = [
+pub(crate) const CONSTANTS: [(&str, f64); 8] = [
+    ("EDGE_ON_CLASS", EDGE_ON_CLASS as f64),
+    ("DEPTH_STEPS", DEPTH_STEPS as f64),
     ("LEAST_RADIUS_PX", LEAST_RADIUS_PX as f64),
     ("EDGE_ON", EDGE_ON as f64),
     ("NORMAL_STEPS", NORMAL_STEPS as f64),
@@ -62,7 +72,7 @@ pub(crate) struct Fragment {
 }
 
 impl Fragment {
-    /// 0 entry, 1 exit (or not oriented), 2 edge-on.
+    /// 0 entry, 1 exit (or not oriented), [`EDGE_ON_CLASS`].
     pub(crate) fn class(&self) -> u32 {
         self.key >> DEPTH_BITS
     }
@@ -87,7 +97,7 @@ pub struct DepthScale {
 impl DepthScale {
     /// The scale that counts from `zero` metres.
     pub fn new(zero: f32, params: &Params) -> Self {
-        let step = params.merge_gap / DEPTH_STEPS;
+        let step = params.thickness / DEPTH_STEPS as f32;
         Self {
             zero,
             step,
@@ -95,9 +105,10 @@ impl DepthScale {
         }
     }
 
-    /// Depths in one layer that follow each other are at most this many steps apart.
-    pub fn merge_steps(&self, params: &Params) -> u32 {
-        (params.merge_gap / self.step) as u32
+    /// Depths in one layer that follow each other are at most this many steps apart, of a cloud whose noise
+    /// has a standard deviation of `noise` metres.
+    pub fn merge_steps(&self, params: &Params, noise: f32) -> u32 {
+        ((params.merge_gap + NOISE_MERGED * noise) * self.inv_step) as u32
     }
 
     pub(crate) fn metres(&self, steps: f32) -> f32 {
@@ -316,7 +327,7 @@ impl Splat {
         };
         let along = normal.dot(direction);
         let class = if along.abs() < EDGE_ON {
-            2
+            EDGE_ON_CLASS
         } else {
             u32::from(!oriented || along > 0.0)
         };

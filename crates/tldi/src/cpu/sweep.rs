@@ -1,12 +1,15 @@
 //! Stage `sweep`: the fragments of each pixel become layers.
 //!
 //! Within a pixel the fragments are sorted by class (entry, exit, edge-on) and depth; a run whose
-//! depths follow each other within the merge gap is one layer. Its depth is the mean of its
-//! fragments; at an edge of a surface with given normals, of those on one face, as tangent planes do
-//! not hold beyond it (estimated normals are means of both faces there). Sums are integers: a layer
-//! does not depend on the order of the points.
+//! depths follow each other within the merge gap (of a wall seen edge-on, within a thickness) is one
+//! layer. Its depth is the mean of its fragments; at an edge of a surface with given normals, of those
+//! on one face, as tangent planes do not hold beyond it (estimated normals are means of both faces
+//! there). Sums are integers: a layer does not depend on the order of the points.
 
-use super::splat::{DepthScale, EDGE_ON, Fragment, Fragments, Imaging, NORMAL_STEPS, Splat};
+use super::splat::{
+    DEPTH_STEPS, DepthScale, EDGE_ON, EDGE_ON_CLASS, Fragment, Fragments, Imaging, NORMAL_STEPS,
+    Splat,
+};
 use crate::{Facing, Layer, Tldi};
 use glamx::Vec3;
 
@@ -25,14 +28,20 @@ pub(crate) const CONSTANTS: [(&str, f64); 2] =
 pub(crate) fn sweep(
     fragments: &mut Fragments,
     oriented: bool,
+    merge_steps: u32,
     color: Option<&dyn Fn(u32) -> [u8; 4]>,
     imaging: &Imaging,
     out: &mut Tldi,
 ) {
     let scale = &imaging.scale;
-    let gap_steps = scale.merge_steps(imaging.params);
-    let same_layer =
-        |f: &Fragment, g: &Fragment| f.class() == g.class() && g.depth() - f.depth() <= gap_steps;
+    let same_layer = |f: &Fragment, g: &Fragment| {
+        let apart = if f.class() == EDGE_ON_CLASS {
+            merge_steps.max(DEPTH_STEPS)
+        } else {
+            merge_steps
+        };
+        f.class() == g.class() && g.depth() - f.depth() <= apart
+    };
     for pixel in 0..fragments.pixels() {
         let (in_pixel, splats) = fragments.of_pixel(pixel);
         in_pixel.sort_unstable_by_key(|f| f.key);
