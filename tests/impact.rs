@@ -289,6 +289,34 @@ fn lone_points_are_passed() {
     }
 }
 
+/// Flying pixels before all of the pixels that count of a small ball hide nothing.
+#[test]
+fn what_lone_points_hide_is_met() {
+    let mut rng = fastrand::Rng::with_seed(6);
+    let ball = sampled_sphere(3.0 * R, R).cloud(R);
+    let mut points = sampled_plane(0.4, R, &mut rng).points;
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]];
+    let above =
+        |(k, [x, z]): (usize, [f32; 2])| R * Vec3::new(0.8 * x, 6.0 + 6.0 * k as f32, 0.8 * z);
+    points.extend(corners.into_iter().enumerate().map(above));
+    let cloud = PointCloud::builder(points).radius(R).build();
+    let cloud = cloud.expect("a valid cloud");
+    for core_only in [false, true] {
+        let found = impact(&ImpactQuery {
+            core_only,
+            ..query(
+                Surface::Cloud(&cloud),
+                Surface::Cloud(&ball),
+                Pose3::translation(0.0, 0.5, 0.0),
+                -Vec3::Y,
+            )
+        });
+        let found = found.expect("the sheet is behind the lone points");
+        let off = found.distance - (0.5 - 3.0 * R);
+        assert!(off.abs() < R, "off by {off}");
+    }
+}
+
 /// A small ball that comes in obliquely at speed, its rim first, is not let in as deep as its rim is
 /// wide; what is beside its way is passed all the same.
 #[test]

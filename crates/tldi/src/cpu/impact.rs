@@ -95,14 +95,13 @@ impl Scratch {
             }
             self.core.find(b.size[0]);
         }
-        self.meetings.clear();
-        for pixel in 0..b.pixel_count() {
+        let nearest = |pixel: usize, beyond: f32| {
             let place = match query.core_only {
                 true => self.core.place(pixel, b.size[0]),
                 false => CORE,
             };
             if place == OUTSIDE {
-                continue;
+                return None;
             }
             let layers = a.layers_of(pixel);
             let met = (0..layers.len()).filter(|&k| !leaves_solid(&layers[..=k]));
@@ -118,12 +117,17 @@ impl Scratch {
                     && (0.0..=length).contains(&meeting.distance)
                     && (meeting.distance >= query.touching || approach > query.params.pixel_size)
             };
-            let nearest = met
-                .flat_map(leading)
-                .filter(in_way)
-                .min_by(|m, n| m.distance.total_cmp(&n.distance));
-            self.meetings.extend(nearest);
-        }
+            met.flat_map(leading)
+                .filter(|meeting| meeting.distance > beyond && in_way(meeting))
+                .min_by(|m, n| m.distance.total_cmp(&n.distance))
+        };
+        let order = |m: &Meeting, n: &Meeting| {
+            (m.distance.total_cmp(&n.distance)).then(m.pixel.cmp(&n.pixel))
+        };
+        self.meetings.clear();
+        (self.meetings)
+            .extend((0..b.pixel_count()).filter_map(|pixel| nearest(pixel, f32::NEG_INFINITY)));
+        self.meetings.sort_unstable_by(order);
         let image_width = b.size[0] as usize;
         let origin = b.origin.map(|o| o as f32 + 0.5);
         let place = |pixel: usize, depth: f32| {
@@ -139,11 +143,19 @@ impl Scratch {
             };
             of(&query.a, place(meeting.pixel, meeting.depth)) || of(&query.b, b_from_a * before)
         };
-        self.meetings.sort_unstable_by(|m, n| {
-            (m.distance.total_cmp(&n.distance)).then(m.pixel.cmp(&n.pixel))
-        });
-        let first_not_lone = self.meetings.iter().position(|meeting| !is_lone(meeting))?;
-        self.meetings.drain(..first_not_lone);
+        // What a lone point hides its pixel meets behind it.
+        let mut lone = 0;
+        while let Some(meeting) = self.meetings.get(lone).filter(|meeting| is_lone(meeting)) {
+            let Some(behind) = nearest(meeting.pixel, meeting.distance) else {
+                lone += 1;
+                continue;
+            };
+            let is_before = |m: &Meeting| order(m, &behind).is_lt();
+            let passed = self.meetings[lone + 1..].partition_point(is_before);
+            self.meetings[lone] = behind;
+            self.meetings[lone..=lone + passed].rotate_left(1);
+        }
+        self.meetings.drain(..lone);
         let first = self.meetings.first()?;
         // A single pixel's normal may be that of a rim.
         let near = first.distance + NORMAL_BAND * query.params.pixel_size;
