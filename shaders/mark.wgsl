@@ -37,9 +37,9 @@ fn splat_of(view: u32, i: u32, normal_in_frame: vec3f) -> Splat {
     var splat: Splat;
     splat.class_bits = u32(!oriented || normal.z > 0.0);
     if abs(normal.z) < EDGE_ON {
-        splat.class_bits = EDGE_ON_CLASS;
+        splat.class_bits = 2u;
     }
-    splat.class_bits <<= DEPTH_BITS;
+    splat.class_bits = (splat.class_bits << DEPTH_BITS) | u32(abs(normal.z) < STEEP);
     let steepest = vec2f(1.0e18);
     splat.slope = select(
         vec2f(0.0),

@@ -1,5 +1,5 @@
-// Stage `splat`: the fragments of every splat. A fragment is a key, class and depth, and the splat
-// above its weight.
+// Stage `splat`: the fragments of every splat. A fragment is a key (class, depth and, in the
+// lowest bit, whether it is steep), and the splat above its weight.
 
 @group(0) @binding(7) var<storage, read_write> views: array<View>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
@@ -31,7 +31,7 @@ fn splat(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
             let weight = truncated(1.0 + (MAX_WEIGHT - 1.0) * max(share, 0.0) * splat.facing, MAX_WEIGHT);
             let place = atomicAdd(&work[end_at(s, row + u32(x))], 1u);
             if place < batch.fragments {
-                fragments[place] = vec2u(splat.class_bits | depth, k << 8u | weight);
+                fragments[place] = vec2u(splat.class_bits | (depth & ~1u), k << 8u | weight);
             }
         }
     }

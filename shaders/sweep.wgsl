@@ -64,13 +64,13 @@ fn sort_fragments(begin: u32, count: u32) {
 }
 
 fn depth_of(key: u32) -> u32 {
-    return key & ((1u << DEPTH_BITS) - 1u);
+    return key & ((1u << DEPTH_BITS) - 2u);
 }
 
 fn is_same_layer(key: u32, next: u32, merge_steps: u32) -> bool {
-    let class_of = key >> DEPTH_BITS;
-    let apart = select(merge_steps, max(merge_steps, DEPTH_STEPS), class_of == EDGE_ON_CLASS);
-    return class_of == next >> DEPTH_BITS && depth_of(next) - depth_of(key) <= apart;
+    let is_steep = ((key | next) & 1u) > 0u;
+    let apart = select(merge_steps, max(merge_steps, DEPTH_STEPS), is_steep);
+    return key >> DEPTH_BITS == next >> DEPTH_BITS && depth_of(next) - depth_of(key) <= apart;
 }
 
 fn weight_of(f: vec2u) -> u32 {

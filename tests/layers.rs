@@ -38,16 +38,16 @@ fn layers_equal_brute_force() {
                 layers.sort_by(|a, b| a.near.total_cmp(&b.near));
                 assert_eq!(layers.len(), truth.len(), "seed {seed}, pixel ({u}, {v})");
                 for (layer, (near, far, depth)) in layers.iter().zip(truth) {
-                    // Two fixed-point steps (thickness / 4096 each) and weights in 255ths of the
+                    // Depths are even numbers of steps (thickness / 4096), weights 255ths: of the
                     // layer's spread.
                     let step = f64::from(params.thickness) / 4096.0;
                     let spread = (far - near) / 100.0;
                     assert!(
-                        (f64::from(layer.near) - near).abs() < 2.0 * step,
+                        (f64::from(layer.near) - near).abs() < 3.0 * step,
                         "seed {seed}"
                     );
                     assert!(
-                        (f64::from(layer.far) - far).abs() < 2.0 * step,
+                        (f64::from(layer.far) - far).abs() < 3.0 * step,
                         "seed {seed}"
                     );
                     if depth.is_nan() {
@@ -55,7 +55,7 @@ fn layers_equal_brute_force() {
                         continue;
                     }
                     assert!(
-                        (f64::from(layer.depth) - depth).abs() < 2.0 * step + spread,
+                        (f64::from(layer.depth) - depth).abs() < 3.0 * step + spread,
                         "seed {seed}"
                     );
                     // Random normals: a layer of several points has faces.

@@ -16,7 +16,7 @@ override MAX_WEIGHT: f32;
 override DEPTH_BITS: u32;
 override MAX_DEPTH: f32;
 override DEPTH_STEPS: u32;
-override EDGE_ON_CLASS: u32;
+override STEEP: f32;
 override LEAST_TILE: i32;
 override FACING: f32;
 override BESIDE: f32;

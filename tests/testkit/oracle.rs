@@ -18,9 +18,8 @@ pub struct OracleFragment {
 }
 
 /// The layers `(near, far, depth)` of pixel `(i, j)` of an orthographic camera that looks along
-/// +z with pixel edges of `params.pixel_size`: every splat of the cloud is tried (O(points)), and
-/// fragments are merged one by one into any layer of their class within the merge gap until
-/// nothing changes (O(n²)).
+/// +z with pixel edges of `params.pixel_size`: every splat of the cloud is tried (O(points)); of a
+/// class those that follow each other within the merge gap, or a thickness where one is steep, are a layer.
 ///
 /// `None` where a decision (covered or not, which class, merged or not) is closer than `f32` can
 /// tell: there the oracle knows no better than what it judges. The depth alone is not a number where
@@ -33,45 +32,38 @@ pub fn oracle_layers(
 ) -> Option<Vec<(f64, f64, f64)>> {
     let pixel = f64::from(params.pixel_size);
     let normals = cloud.normals().expect("the oracle needs normals");
-    let mut runs: Vec<Vec<OracleFragment>> = Vec::new();
+    let mut fragments = Vec::new();
     for (k, p) in cloud.points().enumerate() {
-        if let Some(f) = fragment(cloud, p, normals[k], k, [i, j], pixel, params)? {
-            runs.push(vec![f]);
-        }
+        fragments.extend(fragment(cloud, p, normals[k], k, [i, j], pixel, params)?);
     }
-    let gap_of = |f: &OracleFragment| {
-        let gap = f64::from(params.merge_gap) + 0.8 * f64::from(cloud.noise());
-        if f.class == 2 {
-            gap.max(f64::from(params.thickness))
-        } else {
-            gap
-        }
+    fragments.sort_by(|f, g| {
+        (f.class, f.depth)
+            .partial_cmp(&(g.class, g.depth))
+            .expect("finite")
+    });
+    let flat = f64::from(params.merge_gap) + 0.8 * f64::from(cloud.noise());
+    let steep = flat.max(f64::from(params.thickness));
+    let gap = |f: &OracleFragment, g: &OracleFragment| {
+        let is_steep = f.normal.z.abs().min(g.normal.z.abs()) < 0.8;
+        if is_steep { steep } else { flat }
     };
-    for (k, f) in runs.iter().enumerate() {
-        let gap = gap_of(&f[0]);
-        let close =
-            |g: &[OracleFragment]| ((f[0].depth - g[0].depth).abs() - gap).abs() < 1e-3 * gap;
-        if runs[..k].iter().any(|g| close(g)) {
-            return None;
-        }
+    // Depths are rounded to even steps of a thickness / 4096; equal ones have no order.
+    let is_close = |f: &OracleFragment, g: &OracleFragment| {
+        f.class == g.class
+            && ((g.depth - f.depth - gap(f, g)).abs() < 1e-3 * steep
+                || ((f.normal.z.abs() < 0.8) != (g.normal.z.abs() < 0.8)
+                    && g.depth - f.depth < 1e-3 * steep))
+    };
+    if fragments
+        .windows(2)
+        .any(|pair| is_close(&pair[0], &pair[1]))
+    {
+        return None;
     }
-    'merge: loop {
-        for a in 0..runs.len() {
-            for b in a + 1..runs.len() {
-                let touching = runs[a].iter().any(|f| {
-                    runs[b]
-                        .iter()
-                        .any(|g| f.class == g.class && (f.depth - g.depth).abs() <= gap_of(f))
-                });
-                if touching {
-                    let other = runs.swap_remove(b);
-                    runs[a].extend(other);
-                    continue 'merge;
-                }
-            }
-        }
-        break;
-    }
+    let follows = |f: &OracleFragment, g: &OracleFragment| {
+        f.class == g.class && g.depth - f.depth <= gap(f, g)
+    };
+    let runs: Vec<&[OracleFragment]> = fragments.chunk_by(follows).collect();
     let mut layers: Vec<_> = runs
         .iter()
         .map(|run| {

@@ -31,7 +31,8 @@ pub struct Params {
     /// and lets noise through; r̄ was best (design notes, "What was tried", 3).
     pub pixel_size: f32,
     /// Fragments of one pixel whose depths follow each other by no more than this belong to one layer, in
-    /// metres; by more, the noisier the cloud is told to be. Sheets farther apart than this are two.
+    /// metres; by more, the noisier the cloud is told to be, and where the surface is steep by a thickness.
+    /// Sheets farther apart than this are two.
     pub merge_gap: f32,
     /// How thick a surface is, in metres: layers of neighbouring pixels whose depths differ by no more
     /// continue each other, and what is no deeper in a surface touches it. Two balls of radius r̄ overlap in

@@ -20,8 +20,9 @@ const LEAST_RADIUS_PX: f32 = 0.75;
 /// |n·v| under which a surface is seen edge-on (78°): its tangent plane says nothing about depth.
 pub(crate) const EDGE_ON: f32 = 0.2;
 
-/// Class of splats that are seen edge-on.
-pub(super) const EDGE_ON_CLASS: u32 = 2;
+/// |n·v| under which (37°) a splat is steep: how deep its surface is within a pixel is uncertain by so much
+/// that what follows within a thickness is of one layer.
+const STEEP: f32 = 0.8;
 
 /// Depth steps in a surface's thickness: depths are summed as integers, so that sums do not depend on the
 /// order of the points.
@@ -50,7 +51,7 @@ const MAX_DEPTH: f32 = ((1 << DEPTH_BITS) - 64) as f32;
 
 /// For [`stage_constants`](crate::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 8] = [
-    ("EDGE_ON_CLASS", EDGE_ON_CLASS as f64),
+    ("STEEP", STEEP as f64),
     ("DEPTH_STEPS", DEPTH_STEPS as f64),
     ("LEAST_RADIUS_PX", LEAST_RADIUS_PX as f64),
     ("EDGE_ON", EDGE_ON as f64),
@@ -63,7 +64,8 @@ pub(crate) const CONSTANTS: [(&str, f64); 8] = [
 /// One splat in one pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Fragment {
-    /// Class, then depth at the pixel's centre in [`DepthScale::step`]s from [`DepthScale::zero`].
+    /// Class, then depth at the pixel's centre in [`DepthScale::step`]s from [`DepthScale::zero`]; in the
+    /// lowest bit whether it is steep.
     pub(crate) key: u32,
     /// Index of the splat.
     pub(crate) splat: u32,
@@ -72,14 +74,19 @@ pub(crate) struct Fragment {
 }
 
 impl Fragment {
-    /// 0 entry, 1 exit (or not oriented), [`EDGE_ON_CLASS`].
+    /// 0 entry, 1 exit (or not oriented), 2 edge-on.
     pub(crate) fn class(&self) -> u32 {
         self.key >> DEPTH_BITS
     }
 
-    /// In steps.
+    /// In steps; even.
     pub(crate) fn depth(&self) -> u32 {
-        self.key & ((1 << DEPTH_BITS) - 1)
+        self.key & ((1 << DEPTH_BITS) - 2)
+    }
+
+    /// Whether its splat is [`STEEP`].
+    pub(crate) fn is_steep(&self) -> bool {
+        self.key & 1 > 0
     }
 }
 
@@ -163,7 +170,7 @@ pub(crate) struct Splat {
     /// First and last column and row that may be covered, within the image.
     first: [i32; 2],
     last: [i32; 2],
-    /// The class where a fragment's key has it.
+    /// The class and whether it is steep, where a fragment's key has them.
     class: u32,
     /// Which of the kept points this is.
     pub(crate) kept: u32,
@@ -327,7 +334,7 @@ impl Splat {
         };
         let along = normal.dot(direction);
         let class = if along.abs() < EDGE_ON {
-            EDGE_ON_CLASS
+            2
         } else {
             u32::from(!oriented || along > 0.0)
         };
@@ -368,7 +375,7 @@ impl Splat {
             depth: (view.z - scale.zero) * scale.inv_step,
             steps: params.slope_damping * pixel_size * scale.inv_step,
             facing: along.abs(),
-            class: class << DEPTH_BITS,
+            class: class << DEPTH_BITS | u32::from(along.abs() < STEEP),
             normal: normal.to_array().map(|c| (sign * c * NORMAL_STEPS) as i16),
             first,
             last,
@@ -441,7 +448,7 @@ fn fill(splats: &[Splat], rows: &Rect, out: Out, rise: impl Fn(&Splat, [f32; 2],
                     let rise = splat.limited(rise(splat, [u, v], [dx, dy]));
                     let share = 1.0 - (dx * dx + dy * dy + rise * rise) * inv_radius_squared;
                     let depth = truncated(splat.depth + splat.steps * rise, MAX_DEPTH);
-                    keys[l] = splat.class | depth;
+                    keys[l] = splat.class | depth & !1;
                     let share_seen = if share > 0.0 {
                         share * splat.facing
                     } else {

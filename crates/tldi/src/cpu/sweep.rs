@@ -1,14 +1,13 @@
 //! Stage `sweep`: the fragments of each pixel become layers.
 //!
 //! Within a pixel the fragments are sorted by class (entry, exit, edge-on) and depth; a run whose
-//! depths follow each other within the merge gap (of a wall seen edge-on, within a thickness) is one
+//! depths follow each other within the merge gap (of what is steep, within a thickness) is one
 //! layer. Its depth is the mean of its fragments; at an edge of a surface with given normals, of those
 //! on one face, as tangent planes do not hold beyond it (estimated normals are means of both faces
 //! there). Sums are integers: a layer does not depend on the order of the points.
 
 use super::splat::{
-    DEPTH_STEPS, DepthScale, EDGE_ON, EDGE_ON_CLASS, Fragment, Fragments, Imaging, NORMAL_STEPS,
-    Splat,
+    DEPTH_STEPS, DepthScale, EDGE_ON, Fragment, Fragments, Imaging, NORMAL_STEPS, Splat,
 };
 use crate::{Facing, Layer, Tldi};
 use glamx::Vec3;
@@ -35,7 +34,7 @@ pub(crate) fn sweep(
 ) {
     let scale = &imaging.scale;
     let same_layer = |f: &Fragment, g: &Fragment| {
-        let apart = if f.class() == EDGE_ON_CLASS {
+        let apart = if f.is_steep() || g.is_steep() {
             merge_steps.max(DEPTH_STEPS)
         } else {
             merge_steps
