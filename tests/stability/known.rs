@@ -52,7 +52,7 @@ const DEEP_IN_WAVES: &str = "Eight of 10,000 hits: of small bodies in troughs ha
                              crest that contacts, deep below it, do not face.";
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
                             it spins off, as the primitive does, and may land again with up to 10 % more \
-                            energy. Corners that are found half a pixel too far out double what it loses.";
+                            energy. Corners that are found half a pixel too far out triple what it loses.";
 const SOFT_COLUMN: &str = "Of 600 stacks 14 drift by up to 1.2 r̄ and two fall with rapier's default of 4 solver iterations, \
                            in which its own cuboids lean by 0.5 r̄; with 12 all of 600 stand within 0.8 r̄.";
 
