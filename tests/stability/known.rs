@@ -93,7 +93,7 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
         "grazing",
         "ball in a groove, bare",
         "Near the bottom of a groove without normals, the estimated ones are means of both sides: at one \
-         angle of thirteen seeds in twenty a normal is 15° off, of two a gap by 0.3 r̄.",
+         angle of eighteen seeds in forty a normal is 15° off, of three a gap by 0.3 r̄.",
     )
     .no_worse_than("worst_gap_error_mean_radii", 0.5),
     known(

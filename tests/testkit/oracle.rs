@@ -41,18 +41,20 @@ pub fn oracle_layers(
             .partial_cmp(&(g.class, g.depth))
             .expect("finite")
     });
-    let flat = f64::from(params.merge_gap) + 0.8 * f64::from(cloud.noise());
-    let steep = flat.max(f64::from(params.thickness));
-    let gap = |f: &OracleFragment, g: &OracleFragment| {
-        let is_steep = f.normal.z.abs().min(g.normal.z.abs()) < 0.8;
-        if is_steep { steep } else { flat }
+    let face_on = f64::from(params.merge_gap) + 0.8 * f64::from(cloud.noise());
+    let steep = face_on.max(f64::from(params.thickness));
+    let is_steep = |f: &OracleFragment| f.normal.z.abs() < 0.8;
+    let gap = |f: &OracleFragment, g: &OracleFragment| match is_steep(f) || is_steep(g) {
+        true => steep,
+        false => face_on,
     };
     // Depths are rounded to even steps of a thickness / 4096; equal ones have no order.
+    let rounding = 1e-3 * steep;
     let is_close = |f: &OracleFragment, g: &OracleFragment| {
+        let apart = g.depth - f.depth;
         f.class == g.class
-            && ((g.depth - f.depth - gap(f, g)).abs() < 1e-3 * steep
-                || ((f.normal.z.abs() < 0.8) != (g.normal.z.abs() < 0.8)
-                    && g.depth - f.depth < 1e-3 * steep))
+            && ((apart - gap(f, g)).abs() < rounding
+                || is_steep(f) != is_steep(g) && apart < rounding)
     };
     if fragments
         .windows(2)

@@ -33,12 +33,10 @@ pub(crate) fn sweep(
     out: &mut Tldi,
 ) {
     let scale = &imaging.scale;
+    let steep_steps = merge_steps.max(DEPTH_STEPS);
     let same_layer = |f: &Fragment, g: &Fragment| {
-        let apart = if f.is_steep() || g.is_steep() {
-            merge_steps.max(DEPTH_STEPS)
-        } else {
-            merge_steps
-        };
+        let is_steep = f.is_steep() || g.is_steep();
+        let apart = if is_steep { steep_steps } else { merge_steps };
         f.class() == g.class() && g.depth() - f.depth() <= apart
     };
     for pixel in 0..fragments.pixels() {
