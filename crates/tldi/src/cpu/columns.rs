@@ -19,9 +19,6 @@ const LEAST_TILE: i32 = 2;
 /// For [`stage_constants`](crate::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 1] = [("LEAST_TILE", LEAST_TILE as f64)];
 
-/// Tile of points that are out of view.
-const OUT_OF_VIEW: u32 = u32::MAX;
-
 /// Lanes of the bounds' reduction.
 const LANES: usize = 16;
 
@@ -31,7 +28,7 @@ pub(crate) struct Columns {
     pub(crate) x: Vec<f32>,
     pub(crate) y: Vec<f32>,
     pub(crate) depth: Vec<f32>,
-    /// Index of the tile of each point.
+    /// Index of the tile of each point; one beyond the last for what is out of view.
     pub(crate) tile: Vec<u32>,
     /// For each tile the least depth (of `a`) or the greatest (of `b`) of what may be seen in it.
     depths: Vec<f32>,
@@ -143,7 +140,7 @@ impl Columns {
                     let view = self.view(i);
                     self.tile[i] = match view.z >= near && view.z <= far {
                         true => tiles.of(camera.pixel_from_view(view)),
-                        false => OUT_OF_VIEW,
+                        false => tiles.out_of_view(),
                     };
                 }
             }
@@ -154,12 +151,13 @@ impl Columns {
     /// neighbours may have.
     pub(crate) fn reduce(&mut self, tiles: &Tiles, sign: f32, margin: f32) {
         self.depths.clear();
-        self.depths.resize(tiles.count(), f32::INFINITY);
+        self.depths.resize(tiles.count() + 1, f32::INFINITY);
         for (tile, depth) in self.tile.iter().zip(&self.depth) {
-            if let Some(least) = self.depths.get_mut(*tile as usize) {
-                *least = least.min(sign * depth - margin);
-            }
+            let least = &mut self.depths[*tile as usize];
+            let depth = sign * depth - margin;
+            *least = if depth < *least { depth } else { *least };
         }
+        self.depths.truncate(tiles.count());
         dilate(&mut self.depths, &mut self.spare, tiles.dims[0], |a, b| {
             if a < b { a } else { b }
         });
@@ -186,10 +184,10 @@ impl Columns {
     }
 
     /// Fills `out` with the indices of all points that are in view.
-    pub(crate) fn in_view(&self, out: &mut Vec<u32>) {
+    pub(crate) fn in_view(&self, tiles: &Tiles, out: &mut Vec<u32>) {
         let all = 0..self.tile.len() as u32;
         out.clear();
-        out.extend(all.filter(|&i| self.tile[i as usize] != OUT_OF_VIEW));
+        out.extend(all.filter(|&i| self.tile[i as usize] != tiles.out_of_view()));
     }
 
     /// Fills `out` with the indices of the points that are modelled.
@@ -207,15 +205,14 @@ impl Columns {
         let mut count = 0;
         for (i, tile) in self.tile.iter().enumerate() {
             out[count] = i as u32;
-            count += usize::from(tiles.get(*tile as usize).copied().unwrap_or(0));
+            count += usize::from(tiles[*tile as usize]);
         }
         out.truncate(count);
     }
 
     /// Whether a point is in a tile that is modelled.
     pub(crate) fn is_modelled(&self, touching: &Touching, i: u32) -> bool {
-        let tile = self.tile[i as usize] as usize;
-        touching.modelled.get(tile).is_some_and(|&m| m > 0)
+        touching.modelled[self.tile[i as usize] as usize] > 0
     }
 }
 
@@ -232,6 +229,11 @@ impl Tiles {
 
     pub(crate) fn count(&self) -> usize {
         self.dims[0] * self.dims[1]
+    }
+
+    /// Index of the tile of points that are out of view, beyond the last.
+    fn out_of_view(&self) -> u32 {
+        self.count() as u32
     }
 
     /// Indices of the tiles whose points can reach into `rows`.
@@ -259,7 +261,7 @@ impl Tiles {
         if x >= 0.0 && y >= 0.0 && x < w && y < h {
             y as u32 * self.dims[0] as u32 + x as u32
         } else {
-            OUT_OF_VIEW
+            self.out_of_view()
         }
     }
 }
@@ -298,6 +300,9 @@ impl Touching {
         for _ in 0..(support_px / tiles.edge as f32).ceil() as usize {
             dilate(&mut self.around, &mut self.spare, width, u8::max);
         }
+        // Not what is out of view.
+        self.modelled.push(0);
+        self.around.push(0);
         let first = [0, 1].map(|k| tiles.origin[k] + lo[k] as i32 * tiles.edge);
         let last = [0, 1].map(|k| tiles.origin[k] + (hi[k] as i32 + 1) * tiles.edge - 1);
         Rect::from_corners(first, last)?.intersection(rect)
@@ -381,12 +386,12 @@ fn locate(tiles: &Tiles, pixel_size: f32, x: &[f32], y: &[f32], out: &mut [u32])
     let scale = 1.0 / (pixel_size * tiles.edge as f32);
     let [ox, oy] = tiles.origin.map(|o| o as f32 / tiles.edge as f32);
     let [w, h] = tiles.dims.map(|d| d as f32);
-    let width = tiles.dims[0] as u32;
+    let (width, out_of_view) = (tiles.dims[0] as u32, tiles.out_of_view());
     for i in 0..n {
         let (tx, ty) = (x[i] * scale - ox, y[i] * scale - oy);
         let inside = (tx >= 0.0) & (ty >= 0.0) & (tx < w) & (ty < h);
         let tile = truncated(ty, h) * width + truncated(tx, w);
-        out[i] = if inside { tile } else { OUT_OF_VIEW };
+        out[i] = if inside { tile } else { out_of_view };
     }
 }
 }

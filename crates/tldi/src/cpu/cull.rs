@@ -257,66 +257,76 @@ impl Default for Moved {
     }
 }
 
-/// Two rigid motions and two boxes, unpacked for the inner loop.
+/// Two rigid motions, `None` where nothing moves, and two boxes, unpacked for the inner loop.
 struct Kernel {
-    r: Mat3,
-    t: Vec3,
-    lo: Vec3,
-    hi: Vec3,
-    other_r: Mat3,
-    other_t: Vec3,
-    other_lo: Vec3,
-    other_hi: Vec3,
+    frame_from_cloud: Option<(Mat3, Vec3)>,
+    overlap: Aabb,
+    other_from_frame: Option<(Mat3, Vec3)>,
+    other_bounds: Aabb,
 }
 
 impl Kernel {
     fn new(frame_from_cloud: &Pose3, region: &Region) -> Self {
+        let motion = |pose: &Pose3| {
+            (*pose != Pose3::IDENTITY).then(|| (Mat3::from_quat(pose.rotation), pose.translation))
+        };
         Self {
-            r: Mat3::from_quat(frame_from_cloud.rotation),
-            t: frame_from_cloud.translation,
-            lo: region.overlap.min,
-            hi: region.overlap.max,
-            other_r: Mat3::from_quat(region.other_from_frame.rotation),
-            other_t: region.other_from_frame.translation,
-            other_lo: region.other_bounds.min,
-            other_hi: region.other_bounds.max,
+            frame_from_cloud: motion(frame_from_cloud),
+            overlap: region.overlap,
+            other_from_frame: motion(&region.other_from_frame),
+            other_bounds: region.other_bounds,
         }
     }
 }
 
 multiversioned! {
 fn classify(k: &Kernel, x: &[f32], y: &[f32], z: &[f32], moved: &mut Moved) {
+    let stay = |p: [f32; 3]| p;
+    let mover = |(r, t): (Mat3, Vec3)| move |[x, y, z]: [f32; 3]| [
+        r.x_axis.x * x + r.y_axis.x * y + r.z_axis.x * z + t.x,
+        r.x_axis.y * x + r.y_axis.y * y + r.z_axis.y * z + t.y,
+        r.x_axis.z * x + r.y_axis.z * y + r.z_axis.z * z + t.z,
+    ];
+    let points = [x, y, z];
+    let other = &k.other_bounds;
+    match (k.frame_from_cloud, k.other_from_frame) {
+        (None, None) => sort_out(points, stay, &k.overlap, stay, other, moved),
+        (None, Some(to)) => sort_out(points, stay, &k.overlap, mover(to), other, moved),
+        (Some(to), None) => sort_out(points, mover(to), &k.overlap, stay, other, moved),
+        (Some(to), Some(on)) => sort_out(points, mover(to), &k.overlap, mover(on), other, moved),
+    }
+}
+}
+
+/// Moves points to where `overlap` is, then on to where `other` is, and tells which are in both boxes.
+#[inline(always)]
+fn sort_out(
+    [x, y, z]: [&[f32]; 3],
+    to_frame: impl Fn([f32; 3]) -> [f32; 3],
+    overlap: &Aabb,
+    to_other: impl Fn([f32; 3]) -> [f32; 3],
+    other: &Aabb,
+    moved: &mut Moved,
+) {
     let n = x.len().min(y.len()).min(z.len()).min(BLOCK);
     let (x, y, z) = (&x[..n], &y[..n], &z[..n]);
     let (mx, my, mz) = (&mut moved.x[..n], &mut moved.y[..n], &mut moved.z[..n]);
     moved.inside[n..].fill(0);
     let inside = &mut moved.inside[..n];
-    let (r, t, o, ot) = (&k.r, k.t, &k.other_r, k.other_t);
+    let within = |[x, y, z]: [f32; 3], aabb: &Aabb| {
+        (x >= aabb.min.x)
+            & (x <= aabb.max.x)
+            & (y >= aabb.min.y)
+            & (y <= aabb.max.y)
+            & (z >= aabb.min.z)
+            & (z <= aabb.max.z)
+    };
     for i in 0..n {
-        let px = r.x_axis.x * x[i] + r.y_axis.x * y[i] + r.z_axis.x * z[i] + t.x;
-        let py = r.x_axis.y * x[i] + r.y_axis.y * y[i] + r.z_axis.y * z[i] + t.y;
-        let pz = r.x_axis.z * x[i] + r.y_axis.z * y[i] + r.z_axis.z * z[i] + t.z;
-        let qx = o.x_axis.x * px + o.y_axis.x * py + o.z_axis.x * pz + ot.x;
-        let qy = o.x_axis.y * px + o.y_axis.y * py + o.z_axis.y * pz + ot.y;
-        let qz = o.x_axis.z * px + o.y_axis.z * py + o.z_axis.z * pz + ot.z;
-        let within = (px >= k.lo.x)
-            & (px <= k.hi.x)
-            & (py >= k.lo.y)
-            & (py <= k.hi.y)
-            & (pz >= k.lo.z)
-            & (pz <= k.hi.z)
-            & (qx >= k.other_lo.x)
-            & (qx <= k.other_hi.x)
-            & (qy >= k.other_lo.y)
-            & (qy <= k.other_hi.y)
-            & (qz >= k.other_lo.z)
-            & (qz <= k.other_hi.z);
-        mx[i] = px;
-        my[i] = py;
-        mz[i] = pz;
-        inside[i] = u8::from(within);
+        let p = to_frame([x[i], y[i], z[i]]);
+        let is_inside = within(p, overlap) & within(to_other(p), other);
+        [mx[i], my[i], mz[i]] = p;
+        inside[i] = u8::from(is_inside);
     }
-}
 }
 
 #[cfg(test)]
@@ -347,6 +357,46 @@ mod tests {
         }
         // 64 rows × 8 columns / 16, five standard deviations of a binomial.
         assert!(in_strip.iter().all(|n| (5..60).contains(n)), "{in_strip:?}");
+    }
+
+    /// By brute force, wherever frames are the same and where they are not.
+    #[test]
+    fn keeps_what_is_in_both_boxes() {
+        let turned = Pose3::new(Vec3::new(0.2, -0.1, 0.3), Vec3::new(0.4, 0.9, -0.5));
+        let mut rng = fastrand::Rng::with_seed(4);
+        let point = |_| 2.0 * Vec3::new(rng.f32(), rng.f32(), rng.f32()) - 1.0;
+        let points: Vec<Vec3> = (0..3 * BLOCK).map(point).collect();
+        let cloud = PointCloud::builder(&points).radius(0.1).build().unwrap();
+        let aabb = |half: f32| Aabb {
+            min: Vec3::splat(-half),
+            max: Vec3::splat(half),
+        };
+        let mut counts = vec![];
+        for frame_from_cloud in [Pose3::IDENTITY, turned] {
+            for other_from_frame in [Pose3::IDENTITY, turned] {
+                let region = Region {
+                    overlap: aabb(0.6),
+                    other_from_frame,
+                    other_bounds: aabb(0.5),
+                };
+                let is_kept = |&p: &Vec3| {
+                    let [p, q] = [p, other_from_frame * p].map(Vec3::abs);
+                    p.max_element() <= 0.6 && q.max_element() <= 0.5
+                };
+                let moved = points.iter().map(|p| frame_from_cloud * *p);
+                let expected: Vec<Vec3> = moved.filter(is_kept).collect();
+                let (mut kept, mut scratch) = (Survivors::default(), CullScratch::default());
+                let frame = &frame_from_cloud;
+                cull(&cloud, frame, &region, 1, &mut scratch, &mut kept);
+                assert_eq!(kept.len(), expected.len());
+                for (k, &p) in expected.iter().enumerate() {
+                    // Rotations by quaternions and by matrices differ by rounding.
+                    assert!(kept.point(k).distance(p) < 1e-6);
+                }
+                counts.push(expected.len());
+            }
+        }
+        assert!(counts.iter().all(|&n| n > 20 && n < BLOCK), "{counts:?}");
     }
 
     #[test]

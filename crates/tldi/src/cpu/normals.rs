@@ -321,11 +321,12 @@ impl Batch {
     fn solve(&mut self, normals: &mut Vec<Vec3>) {
         solve_planar(self);
         for k in 0..self.count {
-            let [x, y, z] = self.normal.map(|c| c[k]);
+            let [x, y, z] = self.normal.each_ref().map(|c| c[k]);
             normals.push(match self.planar[k] {
                 true => Vec3::new(x, y, z),
                 false => {
-                    let [xx, xy, xz, yy, yz, zz] = self.covariance.map(|c| f64::from(c[k]));
+                    let [xx, xy, xz, yy, yz, zz] =
+                        self.covariance.each_ref().map(|c| f64::from(c[k]));
                     least_variance_axis(DMat3::from_cols(
                         DVec3::new(xx, xy, xz),
                         DVec3::new(xy, yy, yz),

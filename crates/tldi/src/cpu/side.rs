@@ -173,11 +173,7 @@ impl Side {
         imaging: &Imaging,
         touching: Option<&Touching>,
     ) {
-        match touching {
-            Some(touching) => self.columns.modelled(touching, &mut self.kept),
-            None => self.columns.in_view(&mut self.kept),
-        }
-        self.normals_of_kept(view, touching);
+        self.keep(view, imaging, touching);
         let points = SplatPoints {
             columns: &self.columns,
             kept: &self.kept,
@@ -204,9 +200,14 @@ impl Side {
         }
     }
 
-    fn normals_of_kept(&mut self, view: &CloudView, touching: Option<&Touching>) {
+    /// Fills `kept` and `kept_normals`.
+    fn keep(&mut self, view: &CloudView, imaging: &Imaging, touching: Option<&Touching>) {
         let rotation = view.camera.view_from_frame.rotation;
         if let Some(given) = view.cloud.normals() {
+            match touching {
+                Some(touching) => self.columns.modelled(touching, &mut self.kept),
+                None => self.columns.in_view(&imaging.tiles, &mut self.kept),
+            }
             let view_from_cloud = Mat3::from_quat(rotation * view.frame_from_cloud.rotation);
             let index = |i: u32| self.points.index[i as usize] as usize;
             let rotated = self.kept.iter().map(|&i| view_from_cloud * given[index(i)]);
@@ -216,7 +217,7 @@ impl Side {
         }
         match touching {
             Some(touching) => self.columns.around(touching, &mut self.support),
-            None => self.support.clone_from(&self.kept),
+            None => self.columns.in_view(&imaging.tiles, &mut self.support),
         }
         let support = &self.support;
         let wanted = |k: usize| {

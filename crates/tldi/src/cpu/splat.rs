@@ -317,6 +317,18 @@ fn make_splats(
 }
 }
 
+/// First and last pixel of an axis of the image whose middles are within `radius` of `centre`, or that hold it.
+#[inline(always)]
+fn covered(centre: f32, radius: f32, origin: i32, size: u32) -> (i32, i32) {
+    let own = centre.floor();
+    let lo = (centre - radius - 0.5).ceil().min(own);
+    let hi = (centre + radius - 0.5).floor().max(own);
+    // Both within the image but for an empty range: beyond its end, or before its start.
+    let first = truncated(lo - origin as f32, size as f32) as i32;
+    let end = truncated(hi - origin as f32 + 1.0, size as f32) as i32;
+    (origin + first, origin + end - 1)
+}
+
 impl Splat {
     #[inline(always)]
     fn new(view: Vec3, normal: Vec3, radius: f32, oriented: bool, imaging: &Imaging) -> Self {
@@ -342,22 +354,11 @@ impl Splat {
         let slope = [normal.x * inv_z, normal.y * inv_z];
         let centre = camera.pixel_from_view(view);
         let radius = splat_radius(radius, pixel_size) / pixel_size;
-        // Centres at i + 0.5 within reach, and the pixel that holds the point.
-        let covered = [0, 1].map(|k| {
-            let own = centre[k].floor();
-            let lo = (centre[k] - radius - 0.5).ceil().min(own);
-            let hi = (centre[k] + radius - 0.5).floor().max(own);
-            let (origin, size) = (rect.origin[k] as f32, rect.size[k] as f32);
-            // Both within the image but for an empty range: beyond its end, or before its start.
-            let first = truncated(lo - origin, size) as i32;
-            let end = truncated(hi - origin + 1.0, size) as i32;
-            [rect.origin[k] + first, rect.origin[k] + end - 1]
-        });
-        let first = covered.map(|[first, _]| first);
-        let mut last = covered.map(|[_, last]| last);
-        if last[0] < first[0] {
+        let (first_column, last_column) = covered(centre[0], radius, rect.origin[0], rect.size[0]);
+        let (first_row, mut last_row) = covered(centre[1], radius, rect.origin[1], rect.size[1]);
+        if last_column < first_column {
             // Beside the image: no rows either.
-            last[1] = first[1] - 1;
+            last_row = first_row - 1;
         }
         // Unoriented normals are taken as facing the camera.
         let sign = if !oriented && normal.z > 0.0 {
@@ -376,9 +377,13 @@ impl Splat {
             steps: params.slope_damping * pixel_size * scale.inv_step,
             facing: along.abs(),
             class: class << DEPTH_BITS | u32::from(along.abs() < STEEP),
-            normal: normal.to_array().map(|c| (sign * c * NORMAL_STEPS) as i16),
-            first,
-            last,
+            normal: [
+                (sign * normal.x * NORMAL_STEPS) as i16,
+                (sign * normal.y * NORMAL_STEPS) as i16,
+                (sign * normal.z * NORMAL_STEPS) as i16,
+            ],
+            first: [first_column, first_row],
+            last: [last_column, last_row],
             kept: 0,
         }
     }
