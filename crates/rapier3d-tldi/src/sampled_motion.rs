@@ -5,15 +5,20 @@
 //! steps in a row, is taken for its speed; a surface that is replaced by another one, or that stands
 //! still, has none.
 
-use rapier3d::glamx::{Mat3, Vec3};
+use nalgebra::{SMatrix, SVector};
+use rapier3d::glamx::Vec3;
 use rapier3d::math::Vector;
 use tldi::{Aabb, BLOCK, PointCloud};
 
 /// Radius about a contact, in mean radii, whose points tell the height of the surface: some thirty.
 const AROUND: f32 = 3.0;
 
-/// Fewest points that tell it.
-const LEAST_POINTS: usize = 6;
+/// Fewest points that tell it, for each term of what is fitted to them.
+const POINTS_PER_TERM: usize = 3;
+
+/// Terms of a plane and of a paraboloid.
+const PLANE: usize = 3;
+const PARABOLOID: usize = 6;
 
 /// Farthest that a surface moves in a step, in mean radii: beyond, the points of others are as near.
 const FARTHEST: f32 = 8.0;
@@ -23,7 +28,7 @@ const FARTHEST: f32 = 8.0;
 const SHORTEST: f32 = 0.2;
 
 /// Standard errors that a motion must exceed. Twice in a row, that of a surface at rest does so by
-/// chance once in 10⁸ steps.
+/// chance a few times in 10⁷ steps.
 const SURE: f32 = 4.0;
 
 /// The points that a cloud had, by blocks.
@@ -58,17 +63,17 @@ struct Probe {
 }
 
 impl Probe {
-    /// Height of the plane that fits the points around the line up to `reach` metres away best.
-    fn height(
+    /// The points around the line up to `reach` metres away: across it, in radii, and along it, metres.
+    fn around(
         &self,
         blocks: &[Aabb],
         point: impl Fn(usize) -> Vector,
         count: usize,
         reach: f32,
-    ) -> Option<Height> {
+    ) -> Vec<Vec3> {
         let (u, v) = self.normal.any_orthonormal_pair();
         let about = self.radius.hypot(reach);
-        let mut near: Vec<Vec3> = Vec::new();
+        let mut near = Vec::new();
         for (block, bounds) in blocks.iter().enumerate() {
             let nearest = self.point.clamp(bounds.min, bounds.max);
             if nearest.distance_squared(self.point) > about * about {
@@ -76,35 +81,42 @@ impl Probe {
             }
             let first = block * BLOCK;
             near.extend((first..(first + BLOCK).min(count)).filter_map(|i| {
-                let from = point(i) - self.point;
-                let (a, b, height) = (from.dot(u), from.dot(v), from.dot(self.normal));
-                let is_near = a * a + b * b <= self.radius * self.radius && height.abs() <= reach;
+                let from = (point(i) - self.point) / self.radius;
+                let (a, b) = (from.dot(u), from.dot(v));
+                let height = from.dot(self.normal) * self.radius;
+                let is_near = a * a + b * b <= 1.0 && height.abs() <= reach;
                 is_near.then_some(Vec3::new(a, b, height))
             }));
         }
-        if near.len() < LEAST_POINTS {
-            return None;
-        }
-        let (mut matrix, mut moments) = (Mat3::ZERO, Vec3::ZERO);
-        for p in &near {
-            let basis = Vec3::new(1.0, p.x / self.radius, p.y / self.radius);
-            matrix += Mat3::from_cols(basis * basis.x, basis * basis.y, basis * basis.z);
-            moments += p.z * basis;
-        }
-        let inverse = matrix.inverse();
-        let plane = inverse * moments;
-        if !plane.is_finite() {
-            return None; // points in a row
-        }
-        let residual =
-            |p: &Vec3| p.z - plane.dot(Vec3::new(1.0, p.x / self.radius, p.y / self.radius));
-        let squares: f32 = near.iter().map(|p| residual(p).powi(2)).sum();
-        let variance = squares / (near.len() - 3) as f32;
-        Some(Height {
-            value: plane.x,
-            standard_error: (variance * inverse.x_axis.x.max(0.0)).sqrt(),
-        })
+        near
     }
+}
+
+/// Height on the line of the surface through `points` that fits them best: the first `N` terms of a paraboloid.
+/// `None` where they are too few, or in a row.
+fn height<const N: usize>(points: &[Vec3]) -> Option<Height> {
+    if points.len() < POINTS_PER_TERM * N {
+        return None;
+    }
+    let terms = |p: &Vec3| {
+        let all = [1.0, p.x, p.y, p.x * p.x, p.x * p.y, p.y * p.y];
+        SVector::<f32, N>::from_fn(|k, _| all[k])
+    };
+    let (mut matrix, mut moments) = (SMatrix::<f32, N, N>::zeros(), SVector::<f32, N>::zeros());
+    for p in points {
+        let terms = terms(p);
+        matrix += terms * terms.transpose();
+        moments += p.z * terms;
+    }
+    let inverse = matrix.cholesky()?.inverse();
+    let fit = inverse * moments;
+    let squares = points.iter().map(|p| (p.z - fit.dot(&terms(p))).powi(2));
+    let variance = squares.sum::<f32>() / (points.len() - N) as f32;
+    let height = Height {
+        value: fit[0],
+        standard_error: (variance * inverse[(0, 0)]).sqrt(),
+    };
+    (height.value.is_finite() && height.standard_error.is_finite()).then_some(height)
 }
 
 /// How far the surface of `cloud` moved along the unit `normal` at `point` in the last step, metres,
@@ -123,7 +135,7 @@ pub(crate) fn way_along(
         radius: AROUND * radius,
     };
     let [x, y, z] = cloud.coordinates();
-    let now = probe.height(
+    let now = probe.around(
         cloud.blocks(),
         |i| Vector::new(x[i], y[i], z[i]),
         cloud.len(),
@@ -131,7 +143,25 @@ pub(crate) fn way_along(
     );
     let of = |old: &Snapshot, steps: f32| {
         let reach = (AROUND + steps * FARTHEST) * radius;
-        probe.height(&old.blocks, |i| old.points[i], old.points.len(), reach)
+        probe.around(&old.blocks, |i| old.points[i], old.points.len(), reach)
+    };
+    let points = [of(earlier, 2.0), of(before, 1.0), now];
+    // Few noisy points tell a plane best; what bends is no plane, and seems noisy.
+    steady_way(
+        points.each_ref().map(|points| height::<PLANE>(points)),
+        radius,
+    )
+    .or_else(|| {
+        let heights = points.each_ref().map(|points| height::<PARABOLOID>(points));
+        steady_way(heights, radius)
+    })
+    .unwrap_or(0.0)
+}
+
+/// The way of the last step, metres, where the heights of three tell two in the same direction: the shorter.
+fn steady_way(heights: [Option<Height>; 3], radius: f32) -> Option<f32> {
+    let [Some(earlier), Some(before), Some(now)] = heights else {
+        return None;
     };
     let way = |from: Height, to: Height| {
         let way = to.value - from.value;
@@ -139,16 +169,8 @@ pub(crate) fn way_along(
         let is_sure = way.abs() > noise.max(SHORTEST * radius);
         (is_sure && way.abs() <= FARTHEST * radius).then_some(way)
     };
-    let ways = || {
-        let (now, before, earlier) = (now?, of(before, 1.0)?, of(earlier, 2.0)?);
-        Some((way(before, now)?, way(earlier, before)?))
-    };
-    match ways() {
-        Some((last, previous)) if last * previous > 0.0 => {
-            last.signum() * last.abs().min(previous.abs())
-        }
-        _ => 0.0,
-    }
+    let (last, previous) = (way(before, now)?, way(earlier, before)?);
+    (last * previous > 0.0).then(|| last.signum() * last.abs().min(previous.abs()))
 }
 
 #[cfg(test)]
@@ -160,16 +182,19 @@ mod tests {
 
     /// A level sheet at a height, sampled anew with noise of `sigma` mean radii along y.
     fn sheet(height: f32, sigma: f32, rng: &mut Rng) -> PointCloud<'static> {
+        sampled(|_, _| height, sigma, rng)
+    }
+
+    /// The same of a surface that is as high as `height` tells of x and z.
+    fn sampled(height: impl Fn(f32, f32) -> f32, sigma: f32, rng: &mut Rng) -> PointCloud<'static> {
         let mut jitter = || SPACING * (rng.f32() - 0.5);
         let mut points = Vec::new();
         for k in 0..900 {
             // A sum of twelve has the variance of one.
             let noise: f32 = (0..12).map(|_| jitter()).sum();
-            points.push(Vector::new(
-                (k % 30 - 15) as f32 * SPACING + jitter(),
-                height + sigma * noise,
-                (k / 30 - 15) as f32 * SPACING + jitter(),
-            ));
+            let x = (k % 30 - 15) as f32 * SPACING + jitter();
+            let z = (k / 30 - 15) as f32 * SPACING + jitter();
+            points.push(Vector::new(x, height(x, z) + sigma * noise, z));
         }
         PointCloud::builder(points)
             .radius(SPACING)
@@ -178,7 +203,10 @@ mod tests {
     }
 
     fn way(heights: [f32; 3], sigma: f32, rng: &mut Rng) -> f32 {
-        let [earlier, before, now] = heights.map(|height| sheet(height, sigma, rng));
+        way_of(heights.map(|height| sheet(height, sigma, rng)))
+    }
+
+    fn way_of([earlier, before, now]: [PointCloud<'static>; 3]) -> f32 {
         let [earlier, before] = [earlier, before].map(|cloud| {
             let mut snapshot = Snapshot::default();
             snapshot.take(&cloud);
@@ -195,6 +223,24 @@ mod tests {
             assert!((up - 0.08).abs() < 0.5 * SPACING, "{up}");
             let down = way([0.1, 0.05, 0.0], 0.25, &mut rng);
             assert!((down + 0.05).abs() < 0.5 * SPACING, "{down}");
+        }
+    }
+
+    /// A trough as narrow as waves of fourteen radii rises slower than a plane's fit to it is wrong.
+    #[test]
+    fn a_trough_that_rises_is_told_from_one_that_does_not() {
+        let mut rng = Rng::with_seed(8);
+        let wave = |x: f32| -2.0 * SPACING * (std::f32::consts::TAU * x / (14.0 * SPACING)).cos();
+        let mut way = |step: f32| {
+            way_of([-2.0, -1.0, 0.0].map(|steps| {
+                let height = |x: f32, _| 2.0 * SPACING + wave(x) + steps * step;
+                sampled(height, 0.0, &mut rng)
+            }))
+        };
+        for _ in 0..20 {
+            let up = way(0.35 * SPACING);
+            assert!((up - 0.35 * SPACING).abs() < 0.1 * SPACING, "{up}");
+            assert_eq!(way(0.0), 0.0);
         }
     }
 
