@@ -40,6 +40,32 @@ fn a_box_that_lies_deeper_on_one_side_is_held_on_both() {
     assert!(mean < 1.42 * R, "{} radii from the corners", mean / R);
 }
 
+/// A box that lies flat rests on its corners, not on pixels that stand out beyond them.
+#[test]
+fn a_flat_box_rests_within_its_corners() {
+    let half = R * Vec3::new(7.3, 5.0, 6.1);
+    let (mut beyond, mut count) = (0.0, 0.0);
+    for seed in 0..40 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let floor = sampled_plane(40.0 * R, R, &mut rng).cloud(R);
+        let body = sampled_box(half, R, &mut rng).cloud(R);
+        let turn = Quat::from_rotation_y(TAU * rng.f32());
+        let (x, z) = (3.0 * R * rng.f32(), 3.0 * R * rng.f32());
+        let place = Vec3::new(x, half.y - 0.1 * R, z);
+        let found = compare_clouds(&floor, &body, Pose3::from_parts(place, turn), R);
+        assert_eq!(found.patches.len(), 1, "seed {seed}");
+        for point in &found.patches[0].points {
+            let from_middle = (turn.inverse() * (point.point_b - place)).abs();
+            beyond += from_middle.x - half.x + from_middle.z - half.z;
+            count += 2.0;
+            assert!((point.gap + 0.1 * R).abs() < 0.05 * R, "seed {seed}");
+        }
+    }
+    // Pixels themselves stand out by 0.3 R here, where samples end a little within the edges.
+    let beyond = beyond / count / R;
+    assert!(beyond.abs() < 0.25, "{beyond} radii beyond the corners");
+}
+
 /// A ball in a trough that is hardly wider, deep in one of its sides: wherever it is in it, a patch pushes
 /// along the normal there.
 #[test]

@@ -32,6 +32,11 @@ impl Plane {
         height - self.0.dot(place.extend(1.0))
     }
 
+    /// Its slopes along the places.
+    pub(crate) fn slopes(self) -> Vec2 {
+        self.0.truncate()
+    }
+
     /// `self` for a `share` of 0, `other` for 1.
     pub(crate) fn lerp(self, other: Self, share: f32) -> Self {
         Self(self.0.lerp(other.0, share))

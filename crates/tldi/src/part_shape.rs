@@ -1,6 +1,7 @@
 //! A part of a contact: its normal, its main direction, and the few points that stand for it.
 
 use crate::bowl::{Floor, GAP_PER_SLOPE, Lowest, relative_radius, slope_error};
+use crate::links::Links;
 use crate::patches::Smooth;
 use crate::supports::{longest_axis, supports};
 use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, Params};
@@ -43,6 +44,11 @@ const LEAST_RADIUS: f32 = 4.0;
 /// Most that a point of a flat contact may be off its plane to be moved onto it, in pixels: what estimated
 /// normals make of the rims of two faces. What is lower still is a bump under the face.
 const OFF_PLANE: f32 = 0.4;
+
+/// A pixel at the rim of a face stands out beyond the points of the face, by half a pixel on average. Support points
+/// of faces of at least so many pixels go to the mean of themselves and their linked neighbours, which is as far
+/// inwards at a rim or a corner, and nowhere within.
+const LEAST_INWARDS: usize = 12;
 
 /// Variance (1 − mean length) that a surface's normals are taken to have at least, 1.4°: keeps the weights
 /// of two perfectly flat surfaces finite. Were it 0.01, a box's sides, which a moving view sees as
@@ -119,26 +125,21 @@ impl Shape {
         members: &[u32],
         contacts: &[ContactPixel],
         smooth: &[Smooth],
+        links: &Links,
         points: &mut Vec<ContactPoint>,
         params: &Params,
     ) -> ContactPatch {
+        let can_support = |m: &u32| smooth[*m as usize].gap <= self.support_gap;
+        let in_band = || {
+            (members.iter().filter(|m| can_support(m)))
+                .map(|&m| (&contacts[m as usize], &smooth[m as usize]))
+        };
         points.clear();
-        points.extend(
-            members
-                .iter()
-                .map(|&m| m as usize)
-                .filter(|&m| smooth[m].gap <= self.support_gap)
-                .map(|m| self.point(contacts[m].middle(), smooth[m].gap)),
-        );
+        points.extend(in_band().map(|(contact, smooth)| self.point(contact.middle(), smooth.gap)));
         let supports = supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
         let rises = supports.roughness >= LEAST_RISE * params.pixel_size;
         let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
         let roughness = supports.roughness_about_bowl;
-        let in_band = || {
-            (members.iter().map(|&m| m as usize))
-                .filter(|&m| smooth[m].gap <= self.support_gap)
-                .map(|m| (&contacts[m], &smooth[m]))
-        };
         if let Some(lowest) = lowest_of_bowl {
             // Around it the surfaces have other normals: points there would stop what rolls. Where noise
             // leaves open where it is, points as far apart let a ball lie that would otherwise roll about.
@@ -185,9 +186,24 @@ impl Shape {
         let scatter = if rises { 0.0 } else { roughness };
         let off_plane = OFF_PLANE * params.pixel_size;
         let scatter = scatter + supports.flatness * (off_plane - scatter).max(0.0);
+        let inwards = match points.len() >= LEAST_INWARDS {
+            true if rises => supports.flatness,
+            true => 1.0,
+            false => 0.0,
+        };
         let in_plane = |(k, above): (usize, f32)| {
             let point = points[k];
-            self.point(point.middle(), point.gap - above.clamp(-scatter, scatter))
+            let member = members.iter().filter(|m| can_support(m)).nth(k);
+            let neighbors = member.map_or(&[][..], |&m| links.neighbors(m));
+            let (mut sum, mut count) = (point.middle(), 1.0);
+            for &l in neighbors.iter().filter(|l| can_support(l)) {
+                sum += contacts[l as usize].middle();
+                count += 1.0;
+            }
+            let off = (sum / count - point.middle()).reject_from_normalized(self.normal);
+            let aside = inwards * off;
+            let gap = point.gap - above.clamp(-scatter, scatter) + supports.slope.dot(aside);
+            self.point(point.middle() + aside, gap)
         };
         let chosen = supports.indices.into_iter().zip(supports.above_plane);
         let mut patch = ContactPatch {

@@ -214,7 +214,8 @@ impl PatchScratch {
         params: &Params,
     ) -> ContactPatch {
         let shape = Shape::of(members, contacts, &self.smooth, params);
-        shape.patch(members, contacts, &self.smooth, &mut self.points, params)
+        let (smooth, links) = (&self.smooth, &self.links);
+        shape.patch(members, contacts, smooth, links, &mut self.points, params)
     }
 
     /// Averages normals over linked neighbours and fits the gaps to them: what is left of a sensor's

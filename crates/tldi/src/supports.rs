@@ -15,6 +15,8 @@ pub struct Supports {
     /// Their gaps, in metres, about the plane that fits all gaps best or, the flatter they are, about the
     /// one on which most of them lie.
     pub above_plane: ArrayVec<f32, PATCH_POINTS>,
+    /// How steeply the gaps of that plane rise along the surface, metres per metre; 0 across points in a row.
+    pub slope: Vec3,
     /// 1 if so many of the gaps lie on one plane that the others are taken for errors, as at the rim of a
     /// face whose normals are estimated; 0 if the gaps bend, or too few are on any plane.
     pub flatness: f32,
@@ -38,6 +40,9 @@ const LOWEST: f32 = 2.5;
 
 /// Least extent across the longest direction, as a share of that along it: less is rounding.
 const LEAST_WIDTH: f32 = 1e-6;
+
+/// The same from which on points tell how steeply their gaps rise across: not those in a row.
+const LEAST_KNOWN_WIDTH: f32 = 0.1;
 
 /// Share of points on one plane from which on gaps begin to count as flat, and from which on they do.
 /// Measured: faces of 10 × 10 points have 0.6 on a plane and 0.43 on each other, where their rims meet.
@@ -175,7 +180,14 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
             indices.push(k);
         }
     }
+    let slopes = main_plane.slopes() / sigma;
+    let known_across = if sigma.y > LEAST_KNOWN_WIDTH * sigma.x {
+        across
+    } else {
+        Vec3::ZERO
+    };
     Supports {
+        slope: slopes.x * longest + slopes.y * known_across,
         above_plane: indices
             .iter()
             .map(|&k: &usize| main_plane.residual((place(&points[k]), points[k].gap)))
