@@ -186,10 +186,12 @@ impl Shape {
         let scatter = if rises { 0.0 } else { roughness };
         let off_plane = OFF_PLANE * params.pixel_size;
         let scatter = scatter + supports.flatness * (off_plane - scatter).max(0.0);
-        let inwards = match points.len() >= LEAST_INWARDS {
-            true if rises => supports.flatness,
-            true => 1.0,
-            false => 0.0,
+        let inwards = if points.len() < LEAST_INWARDS {
+            0.0
+        } else if rises {
+            supports.flatness
+        } else {
+            1.0
         };
         let in_plane = |(k, above): (usize, f32)| {
             let point = points[k];
