@@ -125,6 +125,7 @@ fn casts(criterion: &mut Criterion) {
             motion: -2.0 * Vec3::X,
             touching: 0.0,
             core_only: false,
+            penetration: None,
             params: Params::for_radius(radius),
         };
         group.bench_function(BenchmarkId::new("head on", count), |b| {

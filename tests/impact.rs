@@ -3,7 +3,7 @@
 use rapier3d::prelude::{Ball, Cuboid, HalfSpace, SharedShape, Vector};
 use rapier3d_tldi::ExactShape;
 use tldi::glamx::{Pose3, Quat, Vec3};
-use tldi::{CpuBackend, Impact, ImpactQuery, Params, PointCloud, Surface};
+use tldi::{CpuBackend, Impact, ImpactQuery, Params, Penetration, PointCloud, Surface};
 use tldi_tests::{Samples, random_pose, random_unit, sampled_box, sampled_plane, sampled_sphere};
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
@@ -17,6 +17,7 @@ fn query<'a>(a: Surface<'a>, b: Surface<'a>, a_from_b: Pose3, motion: Vec3) -> I
         motion,
         touching: 0.0,
         core_only: false,
+        penetration: None,
         params: Params::for_radius(R),
     }
 }
@@ -349,4 +350,47 @@ fn the_rim_of_what_is_fast_is_met() {
         )
     });
     assert_eq!(passed, None);
+}
+
+/// What is in a sheet passes it on the way to the side where it belongs, if it is no farther from it than it
+/// is in it, and meets what is behind.
+#[test]
+fn what_is_in_a_sheet_leaves_it() {
+    let mut rng = fastrand::Rng::with_seed(7);
+    let radius = 5.0 * R;
+    let ball = sampled_sphere(radius, R);
+    let sheet = sampled_plane(1.0, R, &mut rng);
+    let above = sheet.points.iter().map(|p| p + 0.4 * Vec3::Y);
+    let both: Vec<Vec3> = sheet.points.iter().copied().chain(above).collect();
+    let sheets = PointCloud::builder(both).radius(R).build();
+    let sheets = sheets.expect("a valid cloud");
+    for ball in [ball.cloud(R), ball.bare_cloud(R)] {
+        let way = |from: f32, direction: Vec3, penetration: Option<Penetration>| {
+            let found = impact(&ImpactQuery {
+                penetration,
+                ..query(
+                    Surface::Cloud(&sheets),
+                    Surface::Cloud(&ball),
+                    Pose3::translation(0.0, from, 0.0),
+                    direction,
+                )
+            });
+            found.expect("there is a sheet").distance
+        };
+        let deep = |normal: Vec3, depth: f32| Some(Penetration { normal, depth });
+        let below = -2.0 * radius;
+        let in_it = deep(Vec3::Y, 3.0 * radius);
+        for (from, direction, penetration, expected) in [
+            (below, Vec3::Y, None, radius),
+            (below, Vec3::Y, in_it, 0.4 + radius),
+            // It is farther from this sheet than it is in one.
+            (below, Vec3::Y, deep(Vec3::Y, 0.5 * radius), radius),
+            // It belongs on the other side, or comes from the right one.
+            (below, Vec3::Y, deep(-Vec3::Y, 3.0 * radius), radius),
+            (-below, -Vec3::Y, in_it, radius),
+        ] {
+            let off = way(from, direction, penetration) - expected;
+            assert!(off.abs() < 0.3 * R, "{off}: {direction}, {penetration:?}");
+        }
+    }
 }

@@ -160,6 +160,7 @@ impl CloudQuery {
                 motion,
                 touching: 0.0,
                 core_only: false,
+                penetration: None,
                 params,
             })
             .context("the motion cannot be followed: is the velocity sensible?")?;

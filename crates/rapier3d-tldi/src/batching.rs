@@ -34,7 +34,8 @@ impl<'a> Frame<'a> {
         let colliders = [candidate.collider1, candidate.collider2];
         let [collider1, collider2] = colliders.map(|handle| &self.colliders[handle]);
         let pose1 = pose_of(collider1, self.bodies);
-        let pos12 = pose1.inv_mul(&pose_of(collider2, self.bodies));
+        let pose2 = pose_of(collider2, self.bodies);
+        let pos12 = pose1.inv_mul(&pose2);
         let prediction = effective_prediction(collider1, collider2, self.bodies, self.integration);
         let (shape1, shape2) = (collider1.shape(), collider2.shape());
         let reach = contact_reach(collider1, collider2, self.bodies, self.integration);
@@ -66,13 +67,13 @@ impl<'a> Frame<'a> {
             PairKey::new(shape1, shape2, &pos12),
             PreparedPair {
                 colliders,
-                rotation1: pose1.rotation,
+                poses: [pose1, pose2],
                 prediction,
                 parts: first_part..batch.parts.len(),
                 used: AtomicBool::new(false),
                 is_kept: kept.is_some(),
                 measured: kept.or_else(|| Measured::new(&pair, self.config)),
-                _shapes: [collider1, collider2].map(|c| c.shared_shape().clone()),
+                shapes: [collider1, collider2].map(|c| c.shared_shape().clone()),
             },
         );
     }
@@ -219,7 +220,7 @@ impl PairMemory {
                     false => result.axes.first().map(|&axis| {
                         let in_collider = part.poses[0].map_or(axis, |pose| pose.rotation * axis);
                         LastAxis {
-                            axis: pair.rotation1 * in_collider,
+                            axis: pair.poses[0].rotation * in_collider,
                             lost_for: 0,
                         }
                     }),
@@ -279,13 +280,13 @@ mod tests {
             });
             let prepared = PreparedPair {
                 colliders,
-                rotation1: turned.rotation,
+                poses: [turned; 2],
                 prediction: pair.prediction,
                 parts: 0..1,
                 used: AtomicBool::new(true),
                 is_kept: false,
                 measured: None,
-                _shapes: [shape.clone(), shape.clone()],
+                shapes: [shape.clone(), shape.clone()],
             };
             batch.push(
                 PairKey::new(pair.shape1, pair.shape2, &pair.pos12),

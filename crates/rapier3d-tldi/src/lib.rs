@@ -74,6 +74,7 @@ mod shape;
 mod shape_casts;
 mod surface_motion;
 mod surface_push;
+mod sweeps;
 
 pub use collider::cloud_collider;
 pub use config::TldiConfig;

@@ -100,6 +100,14 @@ pub(crate) struct Comparison {
 }
 
 impl Comparison {
+    /// The side on which the parts are by earlier steps, as an axis from the second to the first.
+    pub(crate) fn last_axis(&self) -> Option<Vector> {
+        match self.view {
+            View::Aim { last_axis, .. } => last_axis,
+            View::Fixed(_) => None,
+        }
+    }
+
     /// Distance in metres up to which a contact point counts as the one of the step before.
     pub(crate) fn match_distance(&self) -> f32 {
         self.params.prediction.max(2.0 * self.params.pixel_size)

@@ -5,7 +5,7 @@ use crate::measured::{Measured, rolls};
 use crate::parts::{Hint, PartPair, ShapePair, append_part_pairs, append_queries, within_reach};
 use crate::{TldiConfig, TldiError};
 use rapier3d::geometry::{ColliderHandle, SharedShape};
-use rapier3d::math::{Pose, Rotation};
+use rapier3d::math::Pose;
 use rapier3d::parry::shape::{Ball, Shape};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -24,9 +24,13 @@ pub(crate) struct PairKey {
     pos12: [u32; 7],
 }
 
+/// What a shape is known by.
+pub(crate) fn address(shape: &dyn Shape) -> usize {
+    std::ptr::from_ref(shape).cast::<()>() as usize
+}
+
 impl PairKey {
     pub(crate) fn new(shape1: &dyn Shape, shape2: &dyn Shape, pos12: &Pose) -> Self {
-        let address = |shape: &dyn Shape| std::ptr::from_ref(shape).cast::<()>() as usize;
         let [x, y, z] = pos12.translation.to_array();
         let [i, j, k, w] = pos12.rotation.to_array();
         Self {
@@ -39,8 +43,8 @@ impl PairKey {
 /// A pair of the batch.
 pub(crate) struct PreparedPair {
     pub(crate) colliders: [ColliderHandle; 2],
-    /// Of the first collider in world space.
-    pub(crate) rotation1: Rotation,
+    /// Of the colliders in world space.
+    pub(crate) poses: [Pose; 2],
     /// Contacts up to this gap were sought, metres.
     pub(crate) prediction: f32,
     /// Its parts, in [`Batch::parts`].
@@ -53,7 +57,7 @@ pub(crate) struct PreparedPair {
     pub(crate) measured: Option<Measured>,
     /// Keeps the shapes alive, so that no other can come to lie at their addresses, and shared, so
     /// that a change of theirs in place moves them to other ones.
-    pub(crate) _shapes: [SharedShape; 2],
+    pub(crate) shapes: [SharedShape; 2],
 }
 
 /// The pairs of a step and their results.

@@ -10,6 +10,7 @@
 use crate::exact::ExactShape;
 use crate::parts::{ShapePair, has_cloud, part, part_count, surface};
 use crate::prepared::Shared;
+use crate::sweeps::SweptPair;
 use crate::{TldiConfig, queries};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::details::ShapeCastOptions;
@@ -18,7 +19,7 @@ use rapier3d::parry::query::{
     Unsupported,
 };
 use rapier3d::parry::shape::Shape;
-use tldi::{Impact, ImpactQuery, Params};
+use tldi::{Impact, ImpactQuery, Params, Penetration};
 
 /// Most pieces of the motion of a body that turns.
 const MAX_PIECES: f32 = 64.0;
@@ -95,7 +96,7 @@ pub(crate) fn cast_shapes(
             return Ok(overlap);
         }
     }
-    first_of_parts(pair, |parts, [pose1, pose2]| {
+    first_of_parts(pair, |parts, _, [pose1, pose2]| {
         let pos12 = pose1.inv_mul(&(pair.pos12 * pose2));
         let velocity = pose1.rotation.inverse() * velocity12;
         if has_cloud(parts[0]) || has_cloud(parts[1]) {
@@ -132,12 +133,22 @@ pub(crate) fn cast_shapes_nonlinear(
         hit.time_of_impact = start;
         return Ok(Some(hit));
     }
-    first_of_parts(&pair, |parts, [pose1, pose2]| {
+    let swept = SweptPair {
+        shapes,
+        pose1: motions[0].start,
+    };
+    first_of_parts(&pair, |parts, indices, [pose1, pose2]| {
         let motions = [motions[0].prepend(pose1), motions[1].prepend(pose2)];
         if has_cloud(parts[0]) || has_cloud(parts[1]) {
             let moving = Moving::new(parts);
             let motions = moving.order(motions);
-            let hit = turning_impact(shared, &moving, &motions, start, end);
+            let from_1_to_2 = if moving.is_swapped { -1.0 } else { 1.0 };
+            let found = shared.batch().penetration(&swept, indices);
+            let penetration = found.map(|found| Penetration {
+                normal: from_1_to_2 * (motions[0].start.rotation.inverse() * found.normal),
+                ..found
+            });
+            let hit = turning_impact(shared, &moving, &motions, penetration, (start, end));
             return Ok(hit.map(|hit| moving.restore(hit)));
         }
         DefaultQueryDispatcher.cast_shapes_nonlinear(
@@ -153,17 +164,17 @@ pub(crate) fn cast_shapes_nonlinear(
 }
 
 /// The earliest hit over all pairs of parts, in the frames of the wholes; `cast` gets the shapes of
-/// two parts and their poses.
+/// two parts, their indices and their poses.
 fn first_of_parts(
     pair: &ShapePair<'_>,
-    cast: impl Fn([&dyn Shape; 2], [Pose; 2]) -> Result<Option<ShapeCastHit>, Unsupported>,
+    cast: impl Fn([&dyn Shape; 2], [u32; 2], [Pose; 2]) -> Result<Option<ShapeCastHit>, Unsupported>,
 ) -> Result<Option<ShapeCastHit>, Unsupported> {
     let mut first: Option<ShapeCastHit> = None;
     for i in 0..part_count(pair.shape1) {
         for j in 0..part_count(pair.shape2) {
             let ((pose1, part1), (pose2, part2)) = (part(pair.shape1, i), part(pair.shape2, j));
             let [pose1, pose2] = [pose1, pose2].map(|p| p.copied().unwrap_or(Pose::IDENTITY));
-            let Some(hit) = cast([part1, part2], [pose1, pose2])? else {
+            let Some(hit) = cast([part1, part2], [i, j], [pose1, pose2])? else {
                 continue;
             };
             if first.is_none_or(|first| hit.time_of_impact < first.time_of_impact) {
@@ -236,6 +247,7 @@ fn straight_impact(
             false => TOUCHING * params.pixel_size,
         },
         core_only: !options.stop_at_penetration,
+        penetration: None,
         params,
     })?;
     let cosine = -impact.normal.dot(velocity) / speed;
@@ -251,8 +263,8 @@ fn turning_impact(
     shared: &Shared,
     moving: &Moving<'_>,
     motions: &[NonlinearRigidMotion; 2],
-    start: f32,
-    end: f32,
+    penetration: Option<Penetration>,
+    (start, end): (f32, f32),
 ) -> Option<ShapeCastHit> {
     let params = moving.params(&shared.config())?;
     let turning = Turning {
@@ -260,6 +272,7 @@ fn turning_impact(
         moving,
         motions,
         params,
+        penetration,
         end,
     };
     let fine = MAX_DISPLACEMENT * params.pixel_size;
@@ -284,6 +297,8 @@ struct Turning<'a> {
     moving: &'a Moving<'a>,
     motions: &'a [NonlinearRigidMotion; 2],
     params: Params,
+    /// How they are in each other at first, in the frame of the first part.
+    penetration: Option<Penetration>,
     /// The time until which it lasts.
     end: f32,
 }
@@ -369,6 +384,7 @@ impl Turning<'_> {
             motion: way + beyond * direction,
             touching,
             core_only: true,
+            penetration: self.penetration,
             params: self.params,
         })?;
         // Not at the very start, which a solver takes for a contact that it has.

@@ -191,3 +191,44 @@ fn what_gives_way_slowly_stops_what_is_fast() -> TestResult {
     assert!(speed < 1.5 * of_wall, "{speed} m/s behind {of_wall} m/s");
     Ok(())
 }
+
+/// A plate with one end under a sheet without an inside is not held there by a sweep, once its contacts
+/// have seen on which side it is; nor is the sheet.
+#[test]
+fn what_is_in_a_sheet_leaves_it() -> TestResult {
+    let half = Vector::new(0.3, 0.02, 0.15);
+    let tilt: f32 = 0.35;
+    let end = half.x * tilt.sin() + half.y * tilt.cos();
+    let speed = 8.0;
+    for sheet_moves in [false, true] {
+        let (mut world, mut tldi) = attached();
+        world.gravity = Vector::ZERO;
+        let builder = |moves: bool| match moves {
+            true => RigidBodyBuilder::dynamic(),
+            false => RigidBodyBuilder::fixed(),
+        };
+        let sheet = cloud_collider(shape(&square(1.0)));
+        let (sheet, _) = world.insert(builder(sheet_moves), sheet.friction(0.0));
+        let tilted = builder(!sheet_moves)
+            .translation(Vector::new(0.0, end - 0.1 * SPACING, 0.0))
+            .rotation(tilt * Vector::Z);
+        let plate = ColliderBuilder::cuboid(half.x, half.y, half.z);
+        let (plate, _) = world.insert(tilted, plate.friction(0.0));
+        tldi.step(&mut world)?;
+        let (moving, away) = if sheet_moves {
+            (sheet, -Vector::Y)
+        } else {
+            (plate, Vector::Y)
+        };
+        let start = world.bodies[moving].translation() - 0.8 * end * away;
+        let body = &mut world.bodies[moving];
+        body.set_translation(start, true);
+        body.set_linvel(speed * away, true);
+        body.set_angvel(Vector::ZERO, true);
+        tldi.step(&mut world)?;
+        let way = (world.bodies[moving].translation() - start).dot(away);
+        let free = speed * world.integration_parameters.dt;
+        assert!(way > 0.9 * free, "{way} of {free} m, sheet {sheet_moves}");
+    }
+    Ok(())
+}

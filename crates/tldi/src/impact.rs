@@ -23,8 +23,20 @@ pub struct ImpactQuery<'a> {
     /// stopped by it. It is two pixels wide, and a third one where the motion does not go on by more
     /// than three towards what is there; less where `b` is not wider than that.
     pub core_only: bool,
+    /// How `b` is in `a` before the motion, if it is known on which side of `a` it belongs: on its way there it
+    /// passes what it is in.
+    pub penetration: Option<Penetration>,
     /// Parameters of the images; `prediction` adds to the region that is looked at.
     pub params: Params,
+}
+
+/// How a surface is in another one that has no inside. Vectors are in the frame of the first surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Penetration {
+    /// Unit normal from the first surface towards where the second one belongs.
+    pub normal: Vec3,
+    /// How far the second surface has to move along the normal, metres.
+    pub depth: f32,
 }
 
 /// The first meeting of an [`ImpactQuery`]. Vectors are in the frame of the first surface.

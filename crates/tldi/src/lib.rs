@@ -49,7 +49,7 @@ pub use contacts::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS};
 pub use cpu::{CpuBackend, build};
 pub use error::CloudError;
 pub use glamx;
-pub use impact::{Impact, ImpactQuery};
+pub use impact::{Impact, ImpactQuery, Penetration};
 pub use knn::{KdTree, Neighbor};
 pub use params::{Params, Variant};
 pub use patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};

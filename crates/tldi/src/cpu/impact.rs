@@ -14,7 +14,9 @@ use super::splat::splat_radius;
 use super::sweep::is_edge_on;
 use crate::lone_points::is_alone;
 use crate::plan::{ring, stride};
-use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Params, Surface, Tldi, VirtualCamera};
+use crate::{
+    Aabb, Facing, Impact, ImpactQuery, Layer, Params, Penetration, Surface, Tldi, VirtualCamera,
+};
 use glamx::{Pose3, Vec3};
 
 /// Width in pixels of the rim that [`ImpactQuery::core_only`] spares: splats stand out by one on
@@ -31,6 +33,9 @@ pub(super) const BORDER: i32 = RIM + 1;
 
 /// Band above the least distance, in pixels, whose normals are averaged.
 const NORMAL_BAND: f32 = 0.5;
+
+/// Least cosine between the normal of a penetration and that of its surface, seen from behind.
+const FROM_BEHIND: f32 = 0.5;
 
 /// Where a pixel is in a moving surface.
 const OUTSIDE: u8 = 0;
@@ -113,7 +118,8 @@ impl Scratch {
             };
             let in_way = |meeting: &Meeting| {
                 let approach = meeting.facing * (length - meeting.distance);
-                (place == CORE || approach > RIM as f32 * query.params.pixel_size)
+                !query.leaves_at(meeting, &camera)
+                    && (place == CORE || approach > RIM as f32 * query.params.pixel_size)
                     && (0.0..=length).contains(&meeting.distance)
                     && (meeting.distance >= query.touching || approach > query.params.pixel_size)
             };
@@ -279,6 +285,18 @@ impl Scratch {
             }
             _ => None, // refused
         }
+    }
+}
+
+impl ImpactQuery<'_> {
+    /// Whether `b` leaves there, from behind and from no deeper than it is, what it is in.
+    fn leaves_at(&self, meeting: &Meeting, camera: &VirtualCamera) -> bool {
+        self.penetration
+            .is_some_and(|Penetration { normal, depth }| {
+                let normal = camera.view_from_frame.rotation * normal;
+                normal.dot(meeting.normal) <= -FROM_BEHIND
+                    && normal.z * meeting.distance <= depth + self.params.pixel_size
+            })
     }
 }
 

@@ -98,6 +98,7 @@ impl CpuBackend {
     ///     motion: Vec3::new(0.0, -5.0, 0.0),
     ///     touching: 0.0,
     ///     core_only: false,
+    ///     penetration: None,
     ///     params: Params::for_radius(0.05),
     /// })?;
     /// let impact = impact.expect("the sheets meet");
