@@ -42,7 +42,8 @@ use tldi::PairResult;
 /// distance counts along the motion. With `stop_at_penetration` off, and in turning casts, what touches
 /// at the start is passed unless the motion goes on towards it by more than a pixel, and so is what
 /// only the outer two pixels of the moving shape would meet, or three where it goes on by no more. Turning casts are early by up to a
-/// pixel; what a shape touches for less than it takes to turn by half its CCD thickness may be passed.
+/// pixel; what a shape touches for less than it takes to turn by half its CCD thickness may be passed. In a step
+/// of the pipeline they do not stop a shape, from behind, at a sheet that its contacts push it out of.
 /// Cost: reading both clouds and the layers in the way, for each piece in which the shape turns by that
 /// and, of pieces in which something is met, for each in which it displaces no point by more than half a
 /// pixel (64 of either at the most).
