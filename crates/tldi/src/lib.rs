@@ -14,6 +14,7 @@ mod camera_policy;
 mod cloud;
 mod contacts;
 mod cpu;
+mod crease;
 mod error;
 mod gap_fit;
 mod gather;

@@ -1,6 +1,7 @@
 //! A part of a contact: its normal, its main direction, and the few points that stand for it.
 
 use crate::bowl::{Floor, GAP_PER_SLOPE, Lowest, relative_radius, slope_error};
+use crate::crease::{Frame, lower_by};
 use crate::links::Links;
 use crate::patches::Smooth;
 use crate::supports::{longest_axis, supports};
@@ -66,6 +67,8 @@ pub(crate) struct Shape {
     centre: Vec3,
     /// Across the normal: the direction of largest extent.
     longest: Vec3,
+    /// Whether the normals of both surfaces are their own: estimated ones turn steadily where faces meet.
+    pub(crate) knows_normals: bool,
 }
 
 impl Shape {
@@ -105,6 +108,7 @@ impl Shape {
             support_gap,
             centre,
             longest: longest_axis(in_band(), centre, normal),
+            knows_normals: false,
         }
     }
 
@@ -222,6 +226,19 @@ impl Shape {
         if deepest.gap < patch.points[0].gap - deeper {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
+        }
+        if self.knows_normals && rises {
+            let frame = Frame {
+                origin: self.centre,
+                axes: [self.longest, self.normal.cross(self.longest)],
+                normal: self.normal,
+            };
+            let pixels = in_band().map(|(contact, _)| contact);
+            let lower = lower_by(pixels, &frame, &deepest, params.pixel_size);
+            for point in &mut patch.points {
+                let gap = point.gap - (1.0 - supports.flatness) * lower;
+                *point = self.point(point.middle(), gap);
+            }
         }
         patch
     }
