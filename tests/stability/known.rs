@@ -47,12 +47,12 @@ const fn known(
 }
 
 /// Several rows fail for each of these.
-const DEEP_IN_WAVES: &str = "Six of 10,000 hits: of small bodies in troughs hardly wider than they are, \
+const DEEP_IN_WAVES: &str = "Five of 10,000 hits: of small bodies in troughs hardly wider than they are, \
                              where a wave rises faster than rapier undoes penetrations, or sweeps stop at a \
                              crest that contacts, deep below it, do not face.";
 const SOLVER_SPINS: &str = "Rapier solves the corners of a box that lands flat one after the other: \
-                            it spins off, as the primitive does. Of forty seeds three land again with up to \
-                            26 % more energy, and three rebound 3 cm too high.";
+                            it spins off, as the primitive does. Of 200 seeds twenty land again with up to \
+                            48 % more energy, and sixteen rebound up to 4 cm too high.";
 const SOFT_COLUMN: &str = "Of 600 stacks one drifts by 1.5 r̄ with rapier's default of 4 solver iterations, in which its \
                            own cuboids lean by 0.5 r̄.";
 
@@ -72,7 +72,7 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     .no_worse_than("angle_rad", 1.0),
     known("stack", "10 boxes, bare", SOFT_COLUMN).no_worse_than("top_drift_mean_radii", 1.6),
     known("bounce", "box, restitution 1", SOLVER_SPINS)
-        .no_worse_than("most_energy_over_initial", 1.3),
+        .no_worse_than("most_energy_over_initial", 1.5),
     known(
         "tunnelling",
         "scan",
