@@ -67,6 +67,13 @@ pub(crate) struct Shape {
     centre: Vec3,
     /// Across the normal: the direction of largest extent.
     longest: Vec3,
+}
+
+/// The contact pixels of a pair, of which some are a part.
+pub(crate) struct Pixels<'a> {
+    pub(crate) contacts: &'a [ContactPixel],
+    pub(crate) smooth: &'a [Smooth],
+    pub(crate) links: &'a Links,
     /// Whether the normals of both surfaces are their own: estimated ones turn steadily where faces meet.
     pub(crate) knows_normals: bool,
 }
@@ -108,7 +115,6 @@ impl Shape {
             support_gap,
             centre,
             longest: longest_axis(in_band(), centre, normal),
-            knows_normals: false,
         }
     }
 
@@ -127,12 +133,16 @@ impl Shape {
     pub(crate) fn patch(
         &self,
         members: &[u32],
-        contacts: &[ContactPixel],
-        smooth: &[Smooth],
-        links: &Links,
+        pixels: &Pixels<'_>,
         points: &mut Vec<ContactPoint>,
         params: &Params,
     ) -> ContactPatch {
+        let Pixels {
+            contacts,
+            smooth,
+            links,
+            knows_normals,
+        } = *pixels;
         let can_support = |m: &u32| smooth[*m as usize].gap <= self.support_gap;
         let in_band = || {
             (members.iter().filter(|m| can_support(m)))
@@ -227,7 +237,7 @@ impl Shape {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
         }
-        if self.knows_normals && rises {
+        if knows_normals && rises {
             let frame = Frame {
                 origin: self.centre,
                 axes: [self.longest, self.normal.cross(self.longest)],

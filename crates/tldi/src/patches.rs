@@ -9,7 +9,7 @@ use crate::gap_fit::fitted_gap;
 use crate::links::{Groups, Links, join, root};
 use crate::lone_points::LonePoints;
 use crate::noise::allow_for_noise;
-use crate::part_shape::{Shape, common_normal};
+use crate::part_shape::{Pixels, Shape, common_normal};
 use crate::{
     ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, PairQuery, PairResult, Params,
 };
@@ -217,10 +217,14 @@ impl PatchScratch {
         contacts: &[ContactPixel],
         params: &Params,
     ) -> ContactPatch {
-        let mut shape = Shape::of(members, contacts, &self.smooth, params);
-        shape.knows_normals = self.knows_normals;
-        let (smooth, links) = (&self.smooth, &self.links);
-        shape.patch(members, contacts, smooth, links, &mut self.points, params)
+        let shape = Shape::of(members, contacts, &self.smooth, params);
+        let pixels = Pixels {
+            contacts,
+            smooth: &self.smooth,
+            links: &self.links,
+            knows_normals: self.knows_normals,
+        };
+        shape.patch(members, &pixels, &mut self.points, params)
     }
 
     /// Averages normals over linked neighbours and fits the gaps to them: what is left of a sensor's
