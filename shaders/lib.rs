@@ -36,6 +36,13 @@ const NORMALS: &str = shader!(
     "shared/modelled.wgsl",
     "normals.wgsl"
 );
+const NORMALS_SHARPEN: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/eigen.wgsl",
+    "shared/bare_normal.wgsl",
+    "normals_sharpen.wgsl"
+);
 const SAMPLE: &str = shader!(
     "shared/types.wgsl",
     "shared/math.wgsl",
@@ -114,6 +121,16 @@ pub const STAGES: &[Stage] = &[
     stage("columns_touch", COLUMNS, &[0, 1, 7, 8]),
     stage("columns_pixels", COLUMNS, &[0, 7, 8, 15]),
     stage("normals", NORMALS, &[0, 1, 2, 6, 7, 8, 9, 17]),
+    stage(
+        "normals_sharpen",
+        NORMALS_SHARPEN,
+        &[0, 1, 2, 6, 8, 9, 17, 18],
+    ),
+    stage(
+        "normals_settle",
+        NORMALS_SHARPEN,
+        &[0, 1, 2, 6, 8, 9, 17, 18],
+    ),
     stage("mark", MARK, &[0, 1, 2, 5, 6, 7, 8, 11, 17]),
     stage("alloc", ALLOC, &[0, 8, 16]),
     stage("splat", SPLAT, &[0, 7, 8, 11, 12]),

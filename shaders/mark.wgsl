@@ -8,7 +8,7 @@
 @group(0) @binding(7) var<storage, read_write> views: array<View>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
 @group(0) @binding(11) var<storage, read_write> splats: array<Splat>;
-@group(0) @binding(17) var<storage, read_write> estimated: array<vec4f>;
+@group(0) @binding(17) var<storage, read_write> planes: array<Plane>;
 
 var<workgroup> total: atomic<u32>;
 var<workgroup> base: u32;
@@ -16,7 +16,7 @@ var<workgroup> base: u32;
 fn normal_of(i: u32) -> vec3f {
     let side = survivors[i].side;
     if (sides[side].flags & HAS_NORMALS) == 0u {
-        return estimated[i].xyz;
+        return planes[i].normal;
     }
     let at = 3u * (sides[side].first_normal + survivors[i].index);
     return turned(

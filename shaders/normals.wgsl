@@ -1,4 +1,4 @@
-// Stage `normals`, second half: normals of the points that are modelled. Threads take the points in
+// Stage `normals`, second part: planes of the points that are modelled. Threads take the points in
 // the order of their cells, so that neighbours read the same ones.
 
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
@@ -7,7 +7,7 @@
 @group(0) @binding(7) var<storage, read_write> views: array<View>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
 @group(0) @binding(9) var<storage, read_write> entries: array<Entry>;
-@group(0) @binding(17) var<storage, read_write> estimated: array<vec4f>;
+@group(0) @binding(17) var<storage, read_write> planes: array<Plane>;
 
 @compute @workgroup_size(256)
 fn normals(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
@@ -27,7 +27,11 @@ fn normals(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         }
         is_needed = is_needed || is_modelled(view, position_in(view, i), pixel_size);
     }
+    var plane: Plane;
+    plane.variance = INFINITE;
     if is_needed {
-        estimated[i] = vec4f(bare_normal(side, entries[k].position, false), 0.0);
+        plane = bare_plane(side, entries[k].position, false);
+        plane.is_needed = 1u;
     }
+    planes[i] = plane;
 }

@@ -1,4 +1,4 @@
-// Stage `normals`, first half: places for the points of clouds without normals in the order of cells
+// Stage `normals`, first part: places for the points of clouds without normals in the order of cells
 // of the neighbourhood's size. `zone` has counted them.
 
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;

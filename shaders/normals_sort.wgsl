@@ -1,4 +1,4 @@
-// Stage `normals`, first half: the points go to their places.
+// Stage `normals`, first part: the points go to their places.
 
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;

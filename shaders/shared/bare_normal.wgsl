@@ -1,4 +1,4 @@
-// The normal of a point without one: the direction of least covariance of the points around it.
+// The plane of a point without a normal: across the direction of least covariance of the points around it.
 // Sums are integers, so that they do not depend on the order in which points were found.
 
 // Steps of an offset within the neighbourhood's radius: the squares of MAX_CANDIDATES = 512 of them
@@ -28,25 +28,31 @@ fn cell_of(side: u32, position: vec3f) -> vec3u {
     );
 }
 
-// In the frame of the query; the sign is arbitrary.
-fn bare_normal(side: u32, position: vec3f, near_only: bool) -> vec3f {
+// Of how many points in these cells one is taken: of a crowd, a selection represents it.
+fn selection_step(side: u32, low: vec3u, high: vec3u) -> u32 {
+    let dims = sides[side].cell_dims;
+    let begins = batch.cells_at + sides[side].cell_first;
+    var total = 0u;
+    for (var z = low.z; z <= high.z; z++) {
+        for (var y = low.y; y <= high.y; y++) {
+            for (var x = low.x; x <= high.x; x++) {
+                let cell = begins + (z * dims.y + y) * dims.x + x;
+                total += atomicLoad(&work[batch.cells + cell]) - atomicLoad(&work[cell]);
+            }
+        }
+    }
+    return max((total + MAX_CANDIDATES - 1u) / MAX_CANDIDATES, 1u);
+}
+
+// In the frame of the query; the normal's sign is arbitrary.
+fn bare_plane(side: u32, position: vec3f, near_only: bool) -> Plane {
     let radius = support_radius(side);
     let dims = sides[side].cell_dims;
     let low = cell_of(side, position - radius);
     let high = cell_of(side, position + radius);
     let begins = batch.cells_at + sides[side].cell_first;
     let ends = begins + batch.cells;
-    var total = 0u;
-    for (var z = low.z; z <= high.z; z++) {
-        for (var y = low.y; y <= high.y; y++) {
-            for (var x = low.x; x <= high.x; x++) {
-                let cell = (z * dims.y + y) * dims.x + x;
-                total += atomicLoad(&work[ends + cell]) - atomicLoad(&work[begins + cell]);
-            }
-        }
-    }
-    // Of a crowd, a selection represents it.
-    let step = max((total + MAX_CANDIDATES - 1u) / MAX_CANDIDATES, 1u);
+    let step = selection_step(side, low, high);
     var count = 0;
     var sum = vec3i();
     var squares = vec3i();
@@ -76,23 +82,37 @@ fn bare_normal(side: u32, position: vec3f, near_only: bool) -> vec3f {
             }
         }
     }
+    var plane: Plane;
+    plane.normal = vec3f(0.0, 0.0, 1.0);
+    plane.variance = INFINITE;
     if count == 0 {
-        return vec3f(0.0, 0.0, 1.0);
+        return plane;
     }
     let s = vec3f(sum);
     let mean = s / f32(count);
-    return least_variance(Symmetric(
+    let covariance = Symmetric(
         vec3f(squares) - s * mean,
         vec3f(products) - vec3f(s.x * mean.y, s.x * mean.z, s.y * mean.z),
-    ));
+    );
+    let found = least_variance(covariance);
+    plane.normal = found.xyz;
+    if found.w > 0.0 && count > 3 {
+        let n = plane.normal;
+        let mixed = vec3f(n.x * n.y, n.x * n.z, n.y * n.z);
+        let off = dot(n * n, covariance.diagonal) + 2.0 * dot(mixed, covariance.rest);
+        let step = radius / OFFSET_STEPS;
+        plane.variance = max(off, 0.0) / f32(count - 3) * step * step;
+        plane.height = -dot(n, mean) * step;
+    }
+    return plane;
 }
 
 // The direction of least variance: powers of the adjugate, as on the CPU; where points lie on a
-// line, its eigenvector.
-fn least_variance(covariance: Symmetric) -> vec3f {
+// line, its eigenvector. Last whether they do not.
+fn least_variance(covariance: Symmetric) -> vec4f {
     let trace = covariance.diagonal.x + covariance.diagonal.y + covariance.diagonal.z;
     if !(trace > 0.0) {
-        return vec3f(0.0, 0.0, 1.0);
+        return vec4f(0.0, 0.0, 1.0, 0.0);
     }
     let xx = covariance.diagonal.x / trace;
     let yy = covariance.diagonal.y / trace;
@@ -104,7 +124,7 @@ fn least_variance(covariance: Symmetric) -> vec3f {
     // xy, xz, yz
     var r = vec3f(xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
     if d.x + d.y + d.z < LEAST_PLANAR {
-        return eigenvector(covariance, false);
+        return vec4f(eigenvector(covariance, false), 0.0);
     }
     for (var k = 0u; k < 4u; k++) {
         let inverse = 1.0 / (d.x + d.y + d.z);
@@ -122,10 +142,10 @@ fn least_variance(covariance: Symmetric) -> vec3f {
         );
     }
     if d.x >= d.y && d.x >= d.z {
-        return normalize(vec3f(d.x, r.x, r.y));
+        return vec4f(normalize(vec3f(d.x, r.x, r.y)), 1.0);
     }
     if d.y >= d.z {
-        return normalize(vec3f(r.x, d.y, r.z));
+        return vec4f(normalize(vec3f(r.x, d.y, r.z)), 1.0);
     }
-    return normalize(vec3f(r.y, r.z, d.z));
+    return vec4f(normalize(vec3f(r.y, r.z, d.z)), 1.0);
 }

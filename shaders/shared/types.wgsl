@@ -7,6 +7,10 @@ override AIM_SAMPLES: u32;
 override SUPPORT: f32;
 override MAX_CANDIDATES: u32;
 override LEAST_PLANAR: f32;
+override ON_PLANE: f32;
+override OF_NOISE: f32;
+override OFF_PLANE: f32;
+override FLAT_PLANE: f32;
 override LEAST_RADIUS_PX: f32;
 override EDGE_ON: f32;
 override NORMAL_STEPS: f32;
@@ -162,7 +166,8 @@ struct Side {
     cell_inv: f32,
     mean_radius: f32,
     merge_steps: u32,
-    padding_a: u32,
+    // Told standard deviation of the points, metres.
+    noise: f32,
 }
 
 // Bits of `Side.flags`.
@@ -181,6 +186,17 @@ struct Survivor {
     index: u32,
     cell: u32,
     is_near: u32,
+}
+
+// The plane of a point's neighbourhood, as on the CPU.
+struct Plane {
+    normal: vec3f,
+    variance: f32,
+    height: f32,
+    // Whether the point is modelled.
+    is_needed: u32,
+    padding_a: u32,
+    padding_b: u32,
 }
 
 struct View {

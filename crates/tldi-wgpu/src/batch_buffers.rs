@@ -2,8 +2,8 @@
 
 use crate::buffers::Growable;
 use crate::layout::{
-    BatchData, CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, NORMAL_BYTES,
-    PAIR_WORDS, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, VIEW_BYTES,
+    BatchData, CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, PAIR_WORDS,
+    PLANE_BYTES, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, VIEW_BYTES,
 };
 use crate::resident::Resident;
 use crate::upload::Upload;
@@ -21,7 +21,8 @@ pub(crate) struct BatchBuffers {
     pub(crate) views: Growable,
     pub(crate) work: Growable,
     pub(crate) entries: Growable,
-    pub(crate) estimated: Growable,
+    pub(crate) planes: Growable,
+    pub(crate) adopted: Growable,
     pub(crate) samples: Growable,
     pub(crate) splats: Growable,
     pub(crate) fragments: Growable,
@@ -45,7 +46,8 @@ impl Default for BatchBuffers {
             views: Growable::new("views", storage | to),
             work: Growable::new("work", storage | to | from),
             entries: Growable::new("entries", storage),
-            estimated: Growable::new("estimated normals", storage),
+            planes: Growable::new("planes", storage),
+            adopted: Growable::new("adopted planes", storage),
             samples: Growable::new("samples", storage),
             splats: Growable::new("splats", storage),
             fragments: Growable::new("fragments", storage),
@@ -84,7 +86,8 @@ impl BatchBuffers {
                 4 * u64::from(data.pixels_at) + 16 * u64::from(data.pixels),
             ),
             (&mut self.entries, ENTRY_BYTES * u64::from(bare)),
-            (&mut self.estimated, NORMAL_BYTES * u64::from(bare)),
+            (&mut self.planes, PLANE_BYTES * u64::from(bare)),
+            (&mut self.adopted, PLANE_BYTES * u64::from(bare)),
             (&mut self.samples, 2 * 16 * SAMPLE_SLOTS * pairs),
             (&mut self.splats, SPLAT_BYTES * u64::from(data.splats)),
             (
@@ -123,7 +126,8 @@ impl BatchBuffers {
             grown(&self.found),
             grown(&self.groups),
             grown(&self.splat_groups),
-            grown(&self.estimated),
+            grown(&self.planes),
+            grown(&self.adopted),
         ]
     }
 }

@@ -8,7 +8,7 @@ use tldi::{CameraPolicy, PairQuery, Params, Projection, Radii, Surface, Variant,
 /// Words of 32 bits, and bytes, of what only lives on the device.
 pub(crate) const SURVIVOR_BYTES: u64 = 32;
 pub(crate) const ENTRY_BYTES: u64 = 16;
-pub(crate) const NORMAL_BYTES: u64 = 16;
+pub(crate) const PLANE_BYTES: u64 = 32;
 pub(crate) const VIEW_BYTES: u64 = 144;
 pub(crate) const SPLAT_BYTES: u64 = 64;
 pub(crate) const LAYER_BYTES: u64 = 32;
@@ -196,7 +196,7 @@ pub(crate) struct SideData {
     cell_inv: f32,
     mean_radius: f32,
     merge_steps: u32,
-    padding: u32,
+    noise: f32,
 }
 
 impl SideData {
@@ -240,7 +240,7 @@ impl SideData {
             cell_inv: 1.0 / cell,
             mean_radius: cloud.mean_radius,
             merge_steps: DepthScale::new(0.0, params).merge_steps(params, cloud.noise),
-            padding: 0,
+            noise: cloud.noise,
         }
     }
 
@@ -371,7 +371,7 @@ mod tests {
             flags flags, first_point first_point, first_normal first_normal,
             radius_scale radius_scale, max_radius max_radius, cell_dims cell_dims,
             cell_first cell_first, cell_inv cell_inv, mean_radius mean_radius,
-            merge_steps merge_steps,
+            merge_steps merge_steps, noise noise,
         ]);
     }
 
@@ -381,6 +381,7 @@ mod tests {
         for (name, bytes) in [
             ("Survivor", SURVIVOR_BYTES),
             ("Entry", ENTRY_BYTES),
+            ("Plane", PLANE_BYTES),
             ("View", VIEW_BYTES),
             ("Splat", SPLAT_BYTES),
             ("Layer", LAYER_BYTES),

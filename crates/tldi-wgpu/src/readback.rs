@@ -1,7 +1,7 @@
 //! What a batch found, as it is read back.
 
 use crate::layout::{
-    CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, NORMAL_BYTES, PAIR_WORDS,
+    CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, PAIR_WORDS, PLANE_BYTES,
     SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES,
 };
 use crate::upload::Upload;
@@ -46,7 +46,7 @@ impl Counters {
         let layers = times(self.layers, LAYER_BYTES);
         let bare = upload.has_bare_sides();
         let entries = times(if bare { self.survivors } else { 0 }, ENTRY_BYTES);
-        let normals = times(self.survivors, if bare { NORMAL_BYTES } else { 12 });
+        let normals = times(self.survivors, if bare { PLANE_BYTES } else { 12 });
         let all = [
             ("cull", 16 * upload.points() as u64 + survivors),
             ("zone", 2 * survivors),
@@ -60,6 +60,8 @@ impl Counters {
             ("columns_touch", 3 * tiles),
             ("columns_pixels", 0),
             ("normals", survivors + entries + normals),
+            ("normals_sharpen", survivors + entries + 2 * normals),
+            ("normals_settle", survivors + entries + 2 * normals),
             ("mark", survivors + normals + splats + pixels),
             ("alloc", 2 * pixels),
             ("splat", splats + fragments),

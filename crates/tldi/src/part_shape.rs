@@ -74,8 +74,6 @@ pub(crate) struct Pixels<'a> {
     pub(crate) contacts: &'a [ContactPixel],
     pub(crate) smooth: &'a [Smooth],
     pub(crate) links: &'a Links,
-    /// Whether the normals of both surfaces are their own: estimated ones turn steadily where faces meet.
-    pub(crate) knows_normals: bool,
 }
 
 impl Shape {
@@ -141,7 +139,6 @@ impl Shape {
             contacts,
             smooth,
             links,
-            knows_normals,
         } = *pixels;
         let can_support = |m: &u32| smooth[*m as usize].gap <= self.support_gap;
         let in_band = || {
@@ -237,7 +234,7 @@ impl Shape {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
         }
-        if knows_normals && rises {
+        if rises {
             let frame = Frame {
                 origin: self.centre,
                 axes: [self.longest, self.normal.cross(self.longest)],

@@ -63,8 +63,6 @@ pub struct PatchScratch {
     patch: Vec<u32>,
     spot: Vec<u32>,
     points: Vec<ContactPoint>,
-    /// Whether the normals of both surfaces are their own.
-    knows_normals: bool,
 }
 
 /// Some of the members, and what decides which patch they belong to.
@@ -83,7 +81,6 @@ impl PatchScratch {
     /// gap, as the stage `compare` finds them. Cost: linear in them but for sorting the groups, and
     /// them if need be.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
-        self.knows_normals = true;
         self.link(result, params);
         self.reduce_linked(result, params, true);
     }
@@ -93,7 +90,6 @@ impl PatchScratch {
     /// far away as that of one of these four is from it. Cost beside that of `reduce`: where there
     /// are components of few contact pixels, a pass over the points of the blocks around them.
     pub fn reduce_pair(&mut self, result: &mut PairResult, query: &PairQuery) {
-        self.knows_normals = query.a.knows_normals() && query.b.knows_normals();
         self.link(result, &query.params);
         if self.lone_points.drop(result, &self.links, query) {
             self.links.find(&result.contacts, &query.params);
@@ -222,7 +218,6 @@ impl PatchScratch {
             contacts,
             smooth: &self.smooth,
             links: &self.links,
-            knows_normals: self.knows_normals,
         };
         shape.patch(members, &pixels, &mut self.points, params)
     }

@@ -1,7 +1,7 @@
 //! What is known of a pair before any of its points is looked at; and the numbers that decide the
 //! stages. All backends start from here.
 
-use crate::cpu::{columns, compare, normals, splat, sweep};
+use crate::cpu::{columns, compare, normals, normals_sharpen, planes, splat, sweep};
 use crate::{Aabb, BLOCK, PairQuery, Params, Surface, View};
 use crate::{approach, camera_policy};
 use glamx::{Pose3, Vec3};
@@ -215,6 +215,8 @@ fn middles(query: &PairQuery) -> [Option<Vec3>; 2] {
 pub fn stage_constants() -> Vec<(&'static str, f64)> {
     let mut all = vec![("BLOCK", BLOCK as f64), ("AIM_SAMPLES", AIM_SAMPLES as f64)];
     all.extend(normals::CONSTANTS);
+    all.extend(planes::CONSTANTS);
+    all.extend(normals_sharpen::CONSTANTS);
     all.extend(splat::CONSTANTS);
     all.extend(sweep::CONSTANTS);
     all.extend(columns::CONSTANTS);

@@ -77,15 +77,6 @@ impl Surface<'_> {
         }
     }
 
-    /// Whether the surface's normals are its own, and not estimated from neighbours.
-    pub(crate) fn knows_normals(&self) -> bool {
-        match self {
-            Surface::Cloud(cloud) => cloud.normals().is_some(),
-            Surface::Exact(_) => true,
-            Surface::Device(_) => false,
-        }
-    }
-
     /// Standard deviation of the points along the surface's normal in metres; 0 where it is not told.
     pub(crate) fn noise(&self) -> f32 {
         match self {

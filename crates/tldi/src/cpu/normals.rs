@@ -6,8 +6,10 @@
 //! moments are summed in lanes.
 
 use super::lanes::multiversioned;
-use crate::normals::least_variance_axis;
-use glamx::{DMat3, DVec3, Vec3};
+use super::normals_sharpen::SharpenScratch;
+use super::planes::{Batch, Moments, Plane};
+use glamx::Vec3;
+use std::ops::Range;
 
 /// Radius of the neighbourhood whose covariance gives the normal, in mean radii of the points.
 /// With 0.65 × the 7th neighbour's distance it holds about 25 neighbours on a surface.
@@ -19,34 +21,37 @@ const CELLS_PER_POINT: usize = 16;
 
 /// Most candidates whose distances are looked at, for all points of a cell: five times what a
 /// surface has. Of more, an even selection represents them.
-const MAX_CANDIDATES: usize = 512;
+pub(super) const MAX_CANDIDATES: usize = 512;
 
 /// Candidates that are summed side by side.
-const LANES: usize = 8;
-
-/// Normals that are solved for side by side.
-const BATCH: usize = 64;
-
-/// Share of the squared variance that the two larger axes of a neighbourhood must have for a
-/// normal in single precision: below it the points are on a line or coincide.
-const LEAST_PLANAR: f32 = 1e-4;
+pub(super) const LANES: usize = 8;
 
 /// For [`stage_constants`](crate::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 3] = [
+pub(crate) const CONSTANTS: [(&str, f64); 2] = [
     ("SUPPORT", SUPPORT as f64),
     ("MAX_CANDIDATES", MAX_CANDIDATES as f64),
-    ("LEAST_PLANAR", LEAST_PLANAR as f64),
 ];
 
 /// Memory of the stage, kept from call to call.
 #[derive(Default)]
 pub(crate) struct NormalScratch {
     cells: Vec<u32>,
-    /// First point of each cell; one entry more than cells.
-    offsets: Vec<u32>,
-    sorted: Vec<Entry>,
+    pub(super) sorted: Sorted,
     candidates: Candidates,
     batch: Batch,
+    /// Of each sorted point the plane of its neighbourhood, where it was wanted.
+    pub(super) planes: Vec<Plane>,
+    pub(super) sharpen: SharpenScratch,
+}
+
+/// Points in the order of their cells.
+#[derive(Default)]
+pub(super) struct Sorted {
+    pub(super) entries: Vec<Entry>,
+    /// First point of each cell; one entry more than cells.
+    offsets: Vec<u32>,
+    /// Numbers of cells along x and y.
+    dims: [usize; 2],
 }
 
 /// Coordinates of the points around a cell, in whole lanes.
@@ -70,11 +75,11 @@ impl Default for Candidates {
 
 /// A point in the order of the cells.
 #[derive(Clone, Copy, Default)]
-struct Entry {
-    position: Vec3,
+pub(super) struct Entry {
+    pub(super) position: Vec3,
     id: u32,
-    cell: u32,
-    wanted: bool,
+    pub(super) cell: u32,
+    pub(super) wanted: bool,
 }
 
 /// Cells of the neighbourhood's size; a rim of empty cells spares bounds checks.
@@ -137,30 +142,35 @@ pub(crate) fn estimate(
                 (min.min(p), max.max(p))
             });
     if support.is_empty() {
+        scratch.sorted.entries.clear();
         return;
     }
     let grid = Grid::new(min, max, radius, support.len());
     scratch.sort(support, position, wanted, &grid);
     let NormalScratch {
-        offsets,
         sorted,
         candidates,
         batch,
+        planes,
         ..
     } = scratch;
+    planes.clear();
+    planes.resize(sorted.entries.len(), Plane::UNKNOWN);
     let mut cell = u32::MAX;
-    for entry in sorted.iter().filter(|e| e.wanted) {
+    for k in sorted.wanted() {
+        let entry = &sorted.entries[k as usize];
         if entry.cell != cell {
             cell = entry.cell;
-            gather(&grid, cell as usize, offsets, sorted, candidates);
+            candidates.gather(sorted, cell as usize);
         }
         targets.push(entry.id);
-        batch.push(moments(entry.position, radius * radius, candidates));
-        if batch.count == BATCH {
-            batch.solve(normals);
+        batch.push(k, moments(entry.position, radius * radius, candidates));
+        if batch.is_full() {
+            batch.solve(planes);
         }
     }
-    batch.solve(normals);
+    batch.solve(planes);
+    normals.extend(sorted.wanted().map(|k| planes[k as usize].normal));
 }
 
 impl NormalScratch {
@@ -172,26 +182,32 @@ impl NormalScratch {
         wanted: impl Fn(usize) -> bool,
         grid: &Grid,
     ) {
-        self.offsets.clear();
-        self.offsets.resize(grid.cells() + 1, 0);
-        self.cells.clear();
-        self.cells
-            .extend(support.iter().map(|&id| grid.cell(position(id))));
+        let Self { cells, sorted, .. } = self;
+        let Sorted {
+            entries,
+            offsets,
+            dims,
+        } = sorted;
+        *dims = [grid.dims[0], grid.dims[1]];
+        offsets.clear();
+        offsets.resize(grid.cells() + 1, 0);
+        cells.clear();
+        cells.extend(support.iter().map(|&id| grid.cell(position(id))));
         // Counts go one further, so that after the prefix sum an entry is its cell's cursor, and
         // after the sort its end: the next cell's first point.
-        for &cell in &self.cells {
-            self.offsets[cell as usize + 1] += 1;
+        for &cell in &*cells {
+            offsets[cell as usize + 1] += 1;
         }
         let mut sum = 0;
-        for offset in &mut self.offsets {
+        for offset in &mut *offsets {
             sum += *offset;
             *offset = sum;
         }
-        self.sorted.resize(support.len(), Entry::default());
-        for (k, (&id, &cell)) in support.iter().zip(&self.cells).enumerate().rev() {
-            let cursor = &mut self.offsets[cell as usize + 1];
+        entries.resize(support.len(), Entry::default());
+        for (k, (&id, &cell)) in support.iter().zip(&*cells).enumerate().rev() {
+            let cursor = &mut offsets[cell as usize + 1];
             *cursor -= 1;
-            self.sorted[*cursor as usize] = Entry {
+            entries[*cursor as usize] = Entry {
                 position: position(id),
                 id,
                 cell,
@@ -199,55 +215,66 @@ impl NormalScratch {
             };
         }
         // Every entry has moved to its cell's first point, one index too far.
-        self.offsets.copy_within(1.., 0);
-        if let Some(end) = self.offsets.last_mut() {
+        offsets.copy_within(1.., 0);
+        if let Some(end) = offsets.last_mut() {
             *end = support.len() as u32;
         }
     }
 }
 
-/// Collects the points of a cell and its neighbours, filled up to whole lanes with points out of
-/// reach.
-fn gather(
-    grid: &Grid,
-    cell: usize,
-    offsets: &[u32],
-    sorted: &[Entry],
-    candidates: &mut Candidates,
-) {
-    let [row, slice] = [grid.dims[0], grid.dims[0] * grid.dims[1]];
-    // Three cells in a row along x are consecutive.
-    let rows: [&[Entry]; 9] = std::array::from_fn(|k| {
-        let first = cell + k / 3 * slice + k % 3 * row - slice - row - 1;
-        &sorted[offsets[first] as usize..offsets[first + 3] as usize]
-    });
-    let total: usize = rows.iter().map(|row| row.len()).sum();
-    let step = total.div_ceil(MAX_CANDIDATES);
-    let Candidates { x, y, z, count } = candidates;
-    let mut n = 0;
-    let mut put = |p: Vec3| {
-        (x[n], y[n], z[n]) = (p.x, p.y, p.z);
-        n += 1;
-    };
-    if step == 1 {
+impl Sorted {
+    /// The points whose normals are wanted.
+    pub(super) fn wanted(&self) -> impl Iterator<Item = u32> {
+        let all = self.entries.iter().zip(0..);
+        all.filter(|(entry, _)| entry.wanted).map(|(_, k)| k)
+    }
+
+    /// Tells `put` which points are in a cell and its neighbours: all, or of more than
+    /// [`MAX_CANDIDATES`] an even selection. Returns how many.
+    #[inline(always)]
+    pub(super) fn around(&self, cell: usize, mut put: impl FnMut(usize)) -> usize {
+        let [row, slice] = [self.dims[0], self.dims[0] * self.dims[1]];
+        // Three cells in a row along x are consecutive.
+        let rows: [Range<usize>; 9] = std::array::from_fn(|k| {
+            let first = cell + k / 3 * slice + k % 3 * row - slice - row - 1;
+            self.offsets[first] as usize..self.offsets[first + 3] as usize
+        });
+        let total: usize = rows.iter().map(|row| row.len()).sum();
+        let step = total.div_ceil(MAX_CANDIDATES).max(1);
+        let mut skip = 0;
         for row in rows {
-            row.iter().for_each(|e| put(e.position));
+            let mut k = row.start + skip;
+            while k < row.end {
+                put(k);
+                k += step;
+            }
+            skip = k - row.end;
         }
-    } else {
-        let all = rows.into_iter().flatten();
-        all.step_by(step).for_each(|e| put(e.position));
+        total.div_ceil(step)
     }
-    let used = total.div_ceil(step);
-    for _ in used..used.next_multiple_of(LANES) {
-        put(Vec3::INFINITY);
+}
+
+impl Candidates {
+    /// Collects the points of a cell and its neighbours, filled up to whole lanes with points out of
+    /// reach.
+    fn gather(&mut self, sorted: &Sorted, cell: usize) {
+        let Self { x, y, z, count } = self;
+        let mut n = 0;
+        let mut put = |p: Vec3| {
+            (x[n], y[n], z[n]) = (p.x, p.y, p.z);
+            n += 1;
+        };
+        let used = sorted.around(cell, |k| put(sorted.entries[k].position));
+        for _ in used..used.next_multiple_of(LANES) {
+            put(Vec3::INFINITY);
+        }
+        *count = n;
     }
-    *count = n;
 }
 
 multiversioned! {
-/// Covariance (xx, xy, xz, yy, yz, zz; not divided by their number) of the candidates within the
-/// neighbourhood of `p`.
-fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> [f32; 6] {
+/// Of the candidates within the neighbourhood of `p`.
+fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> Moments {
     let mut sums = [[0.0f32; LANES]; 10];
     let [x, y, z] = [&candidates.x, &candidates.y, &candidates.z].map(|c| c.as_chunks::<LANES>().0);
     let chunks = x.iter().zip(y).zip(z).take(candidates.count / LANES);
@@ -275,125 +302,15 @@ fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> [f32; 6] {
             half[l] = sum[l] + sum[l + LANES / 2];
         }
     }
-    let [count, sx, sy, sz, xx, xy, xz, yy, yz, zz] =
-        half.map(|s| (s[0] + s[2]) + (s[1] + s[3]));
-    let (mx, my, mz) = (sx / count, sy / count, sz / count);
-    [
-        xx - sx * mx,
-        xy - sx * my,
-        xz - sx * mz,
-        yy - sy * my,
-        yz - sy * mz,
-        zz - sz * mz,
-    ]
-}
-}
-
-/// Covariances whose normals are solved for together, as structure of arrays.
-struct Batch {
-    covariance: [[f32; BATCH]; 6],
-    normal: [[f32; BATCH]; 3],
-    /// Whether the neighbourhood is one that `solve_planar` can tell the normal of.
-    planar: [bool; BATCH],
-    count: usize,
-}
-
-impl Default for Batch {
-    fn default() -> Self {
-        Self {
-            covariance: [[0.0; BATCH]; 6],
-            normal: [[0.0; BATCH]; 3],
-            planar: [false; BATCH],
-            count: 0,
-        }
-    }
-}
-
-impl Batch {
-    fn push(&mut self, covariance: [f32; 6]) {
-        for (to, from) in self.covariance.iter_mut().zip(covariance) {
-            to[self.count] = from;
-        }
-        self.count += 1;
-    }
-
-    /// Appends the normals of what was pushed.
-    fn solve(&mut self, normals: &mut Vec<Vec3>) {
-        solve_planar(self);
-        for k in 0..self.count {
-            let [x, y, z] = self.normal.each_ref().map(|c| c[k]);
-            normals.push(match self.planar[k] {
-                true => Vec3::new(x, y, z),
-                false => {
-                    let [xx, xy, xz, yy, yz, zz] =
-                        self.covariance.each_ref().map(|c| f64::from(c[k]));
-                    least_variance_axis(DMat3::from_cols(
-                        DVec3::new(xx, xy, xz),
-                        DVec3::new(xy, yy, yz),
-                        DVec3::new(xz, yz, zz),
-                    ))
-                    .as_vec3()
-                }
-            });
-        }
-        self.count = 0;
-    }
-}
-
-multiversioned! {
-/// Power iteration by squaring on the adjugate of the covariance: its eigenvectors are the same,
-/// and its eigenvalues are the products of the other two, so that the least variance becomes the
-/// greatest.
-fn solve_planar(batch: &mut Batch) {
-    let [cxx, cxy, cxz, cyy, cyz, czz] = &batch.covariance;
-    for k in 0..BATCH {
-        let trace = cxx[k] + cyy[k] + czz[k];
-        let inv = 1.0 / trace;
-        let (xx, xy, xz) = (cxx[k] * inv, cxy[k] * inv, cxz[k] * inv);
-        let (yy, yz, zz) = (cyy[k] * inv, cyz[k] * inv, czz[k] * inv);
-        let mut a = [
-            yy * zz - yz * yz,
-            xz * yz - xy * zz,
-            xy * yz - xz * yy,
-            xx * zz - xz * xz,
-            xy * xz - xx * yz,
-            xx * yy - xy * xy,
-        ];
-        batch.planar[k] = a[0] + a[3] + a[5] >= LEAST_PLANAR;
-        // The fourth square is the 16th power: eigenvalues that differ by half are 10⁻⁵ apart.
-        for _ in 0..4 {
-            let inv = 1.0 / (a[0] + a[3] + a[5]);
-            let [xx, xy, xz, yy, yz, zz] = a.map(|c| c * inv);
-            a = [
-                xx * xx + xy * xy + xz * xz,
-                xx * xy + xy * yy + xz * yz,
-                xx * xz + xy * yz + xz * zz,
-                xy * xy + yy * yy + yz * yz,
-                xy * xz + yy * yz + yz * zz,
-                xz * xz + yz * yz + zz * zz,
-            ];
-        }
-        // The longest column.
-        let [xx, xy, xz, yy, yz, zz] = a;
-        let x_longest = (xx >= yy) & (xx >= zz);
-        let y_longest = yy >= zz;
-        let pick = |x: f32, y: f32, z: f32| {
-            let other = if y_longest { y } else { z };
-            if x_longest { x } else { other }
-        };
-        let (x, y, z) = (pick(xx, xy, xz), pick(xy, yy, yz), pick(xz, yz, zz));
-        let inv = 1.0 / (x * x + y * y + z * z).sqrt();
-        batch.normal[0][k] = x * inv;
-        batch.normal[1][k] = y * inv;
-        batch.normal[2][k] = z * inv;
-    }
+    half.map(|s| (s[0] + s[2]) + (s[1] + s[3]))
 }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::normals::covariance;
+    use crate::normals::{covariance, least_variance_axis};
+    use glamx::DVec3;
 
     /// Normals equal those of all neighbours by brute force in f64, and only those that are wanted
     /// are there.

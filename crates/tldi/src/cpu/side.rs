@@ -6,6 +6,7 @@ use super::cull::{CullScratch, PointRadii, Survivors};
 use super::impact::BORDER;
 use super::near_exact::{CellDistances, Placed};
 use super::normals::{self, NormalScratch};
+use super::normals_sharpen::sharpen;
 use super::rect::{Footprint, Rect};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
 use super::sweep;
@@ -223,15 +224,18 @@ impl Side {
         let wanted = |k: usize| {
             touching.is_none_or(|touching| self.columns.is_modelled(touching, support[k]))
         };
+        let radius = normals::SUPPORT * self.mean_radius(view.cloud);
         normals::estimate(
             support,
             |i| self.columns.view(i as usize),
             wanted,
-            normals::SUPPORT * self.mean_radius(view.cloud),
+            radius,
             &mut self.normals,
             &mut self.kept,
             &mut self.kept_normals,
         );
+        let noise = view.cloud.noise();
+        sharpen(radius, noise, &mut self.normals, &mut self.kept_normals);
     }
 
     /// Image of this cloud, and of an exact surface into `image` over the same pixels; `None`

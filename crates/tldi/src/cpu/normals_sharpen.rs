@@ -1,0 +1,296 @@
+//! Stage `normals`, last part: beside an edge or a corner, a normal is that of the face.
+//!
+//! A neighbourhood that reaches over an edge has a plane between the faces, and pixels there would be
+//! on neither. A point whose neighbours are not on a plane adopts the planes of those of them that are flat, and that
+//! it is on; at a corner, where none is near enough, in a second pass what its neighbours have adopted. Where a
+//! surface bends or is noisy nothing is flat, and normals stay.
+
+use super::lanes::multiversioned;
+use super::normals::{LANES, MAX_CANDIDATES, NormalScratch, SUPPORT, Sorted};
+use super::planes::Plane;
+use crate::supports::ramp;
+use glamx::Vec3;
+
+/// Standard deviation of neighbours from their plane, in mean radii, up to which they are on it: a tenth of
+/// a pixel, which contacts may err by.
+const ON_PLANE: f32 = 0.1;
+
+/// Variance that noise explains, in its own: that of 20 points scatters by a third.
+const OF_NOISE: f32 = 2.0;
+
+/// Variance from which on neighbours are plainly not on a plane, in that up to which they are.
+const OFF_PLANE: f32 = 4.0;
+
+/// Misfit of a plane, as a deviation in mean radii, from which on it is not flat, or a point not on it.
+const FLAT: f32 = 0.05;
+
+/// For [`stage_constants`](crate::plan::stage_constants).
+pub(crate) const CONSTANTS: [(&str, f64); 4] = [
+    ("ON_PLANE", ON_PLANE as f64),
+    ("OF_NOISE", OF_NOISE as f64),
+    ("OFF_PLANE", OFF_PLANE as f64),
+    ("FLAT_PLANE", FLAT as f64),
+];
+
+/// Memory of the stage, kept from call to call.
+#[derive(Default)]
+pub(super) struct SharpenScratch {
+    flat: FlatPlanes,
+    /// Sorted points that are not on their planes.
+    rough: Vec<u32>,
+    /// Those that adopt a plane, and which.
+    adopted: Vec<(u32, Plane)>,
+}
+
+/// Flat planes of points around a cell, in whole lanes.
+struct FlatPlanes {
+    position: [[f32; MAX_CANDIDATES]; 3],
+    normal: [[f32; MAX_CANDIDATES]; 3],
+    variance: [f32; MAX_CANDIDATES],
+    height: [f32; MAX_CANDIDATES],
+    count: usize,
+}
+
+impl Default for FlatPlanes {
+    fn default() -> Self {
+        Self {
+            position: [[0.0; MAX_CANDIDATES]; 3],
+            normal: [[0.0; MAX_CANDIDATES]; 3],
+            variance: [0.0; MAX_CANDIDATES],
+            height: [0.0; MAX_CANDIDATES],
+            count: 0,
+        }
+    }
+}
+
+impl FlatPlanes {
+    /// Collects those with less than a `misfit`.
+    fn gather(&mut self, sorted: &Sorted, planes: &[Plane], cell: u32, misfit: f32) {
+        let mut n = 0;
+        let mut put = |position: Vec3, plane: &Plane| {
+            let [x, y, z] = &mut self.position;
+            (x[n], y[n], z[n]) = (position.x, position.y, position.z);
+            let [x, y, z] = &mut self.normal;
+            (x[n], y[n], z[n]) = (plane.normal.x, plane.normal.y, plane.normal.z);
+            self.variance[n] = plane.variance;
+            self.height[n] = plane.height;
+            n += 1;
+        };
+        let mut count = 0;
+        sorted.around(cell as usize, |k| {
+            if planes[k].variance < misfit {
+                put(sorted.entries[k].position, &planes[k]);
+                count += 1;
+            }
+        });
+        for _ in count..usize::next_multiple_of(count, LANES) {
+            put(Vec3::INFINITY, &Plane::UNKNOWN);
+        }
+        self.count = n;
+    }
+}
+
+/// Sharpens the normals that were just estimated; `radius` is that of the neighbourhood and `noise` the told
+/// standard deviation of the points, in metres. Cost: less than that of estimating, for each point whose
+/// neighbours are not on a plane.
+pub(crate) fn sharpen(radius: f32, noise: f32, scratch: &mut NormalScratch, normals: &mut [Vec3]) {
+    let NormalScratch {
+        sorted,
+        planes,
+        sharpen,
+        ..
+    } = scratch;
+    let SharpenScratch {
+        flat,
+        rough,
+        adopted,
+    } = sharpen;
+    let square = |of_radii: f32| (of_radii / SUPPORT * radius).powi(2);
+    let on_plane = square(ON_PLANE) + OF_NOISE * noise * noise;
+    let limits = [radius * radius, square(FLAT)];
+    let is_rough = |k: &u32, planes: &[Plane]| planes[*k as usize].variance > on_plane;
+    rough.clear();
+    rough.extend(sorted.wanted().filter(|k| is_rough(k, planes)));
+    for _ in 0..2 {
+        adopted.clear();
+        let cell = |k: &u32| sorted.entries[*k as usize].cell;
+        for in_cell in rough.chunk_by(|k, l| cell(k) == cell(l)) {
+            flat.gather(sorted, planes, cell(&in_cell[0]), limits[1]);
+            if flat.count == 0 {
+                continue;
+            }
+            for &k in in_cell {
+                let (point, own) = (sorted.entries[k as usize].position, &planes[k as usize]);
+                let Some((face, weight)) = mean(point, own, limits, flat) else {
+                    continue;
+                };
+                let share = ramp(own.variance / on_plane, [1.0, OFF_PLANE]) * weight.min(1.0);
+                adopted.push((k, own.towards(&face, share)));
+            }
+        }
+        for &(k, plane) in &*adopted {
+            planes[k as usize] = plane;
+        }
+        rough.retain(|k| is_rough(k, planes));
+    }
+    for (normal, k) in normals.iter_mut().zip(sorted.wanted()) {
+        *normal = planes[k as usize].normal;
+    }
+}
+
+/// The mean plane at `point` of the flat ones around it, and their weight; its normal is on the side of that of its
+/// `own`. Limits are those of the square distance and of the misfit.
+fn mean(point: Vec3, own: &Plane, limits: [f32; 2], flat: &FlatPlanes) -> Option<(Plane, f32)> {
+    let [weight, x, y, z, variance, height] = sums(point, own.normal, limits, flat);
+    let plane = Plane {
+        normal: Vec3::new(x, y, z).try_normalize()?,
+        variance: variance / weight,
+        height: height / weight,
+    };
+    Some((plane, weight))
+}
+
+multiversioned! {
+/// Sums of the weights of the planes, which fall from 1 where they fit, and of weighted normals, variances and heights.
+fn sums(p: Vec3, side: Vec3, [reach, most]: [f32; 2], flat: &FlatPlanes) -> [f32; 6] {
+    let per_misfit = 1.0 / most;
+    let mut sums = [[0.0f32; LANES]; 6];
+    let of = |c: &[f32; MAX_CANDIDATES], k: usize| c.as_chunks::<LANES>().0[k];
+    for k in 0..flat.count / LANES {
+        let [x, y, z] = flat.position.each_ref().map(|c| of(c, k));
+        let [nx, ny, nz] = flat.normal.each_ref().map(|c| of(c, k));
+        let (variance, height) = (of(&flat.variance, k), of(&flat.height, k));
+        for l in 0..LANES {
+            let (dx, dy, dz) = (p.x - x[l], p.y - y[l], p.z - z[l]);
+            let above = nx[l] * dx + ny[l] * dy + nz[l] * dz + height[l];
+            let misfit = variance[l] + above * above;
+            let counts = (dx * dx + dy * dy + dz * dz <= reach) & (misfit < most);
+            let keep = |value: f32| if counts { value } else { 0.0 };
+            let weight = keep(1.0 - misfit * per_misfit);
+            let is_beyond = nx[l] * side.x + ny[l] * side.y + nz[l] * side.z < 0.0;
+            let facing = if is_beyond { -weight } else { weight };
+            sums[0][l] += weight;
+            sums[1][l] += facing * nx[l];
+            sums[2][l] += facing * ny[l];
+            sums[3][l] += facing * nz[l];
+            sums[4][l] += weight * keep(variance[l]);
+            sums[5][l] += facing * keep(above);
+        }
+    }
+    sums.map(|of_lane| of_lane.into_iter().sum())
+}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::normals::estimate;
+    use super::*;
+    use std::f32::consts::TAU;
+
+    /// With a mean radius of 1.
+    const POINTS_PER_AREA: f32 = 0.94;
+
+    /// Points that `is_wanted`, with estimated and with sharpened normals.
+    fn normals(
+        points: &[Vec3],
+        is_wanted: impl Fn(Vec3) -> bool,
+        noise: f32,
+    ) -> [Vec<(Vec3, Vec3)>; 2] {
+        let support: Vec<u32> = (0..points.len() as u32).collect();
+        let (mut targets, mut normals) = (vec![], vec![]);
+        let mut scratch = NormalScratch::default();
+        let position = |i: u32| points[i as usize];
+        estimate(
+            &support,
+            position,
+            |k| is_wanted(points[k]),
+            SUPPORT,
+            &mut scratch,
+            &mut targets,
+            &mut normals,
+        );
+        let placed = |normals: &[Vec3]| {
+            let targets = targets.iter().map(|&i| position(i));
+            targets.zip(normals.iter().copied()).collect()
+        };
+        let estimated = placed(&normals);
+        sharpen(SUPPORT, noise, &mut scratch, &mut normals);
+        [estimated, placed(&normals)]
+    }
+
+    /// Random points on quarter planes of 12 radii that meet in the origin: all three of a corner, or two of an edge.
+    fn faces(count: usize, rng: &mut fastrand::Rng) -> Vec<Vec3> {
+        let edge = 12.0;
+        let mut points = Vec::new();
+        for face in 0..count {
+            for _ in 0..(POINTS_PER_AREA * edge * edge) as usize {
+                let mut p = [edge * rng.f32(), edge * rng.f32(), 0.0];
+                p.rotate_right(face);
+                points.push(Vec3::from_array(p));
+            }
+        }
+        points
+    }
+
+    /// Share of normals that are more than 5° off the axis of a face which their point is on.
+    fn off_face(normals: &[(Vec3, Vec3)]) -> f32 {
+        let off = normals.iter().filter(|(point, normal)| {
+            let on = (0..3).filter(|&k| point[k].abs() < 1e-4);
+            on.map(|k| normal[k].abs()).fold(0.0, f32::max) < 5.0_f32.to_radians().cos()
+        });
+        off.count() as f32 / normals.len() as f32
+    }
+
+    #[test]
+    fn edges_and_corners_have_the_normals_of_their_faces() {
+        for (faces_that_meet, before, after) in [(2, 0.2, 0.05), (3, 0.2, 0.1)] {
+            let mut all = [vec![], vec![]];
+            for seed in 0..20 {
+                let mut rng = fastrand::Rng::with_seed(seed);
+                let points = faces(faces_that_meet, &mut rng);
+                // Not what is at the rim of the faces; of an edge, not its ends.
+                let is_wanted = |p: Vec3| match faces_that_meet {
+                    2 => p.max_element() < 8.0 && p.y > 4.0,
+                    _ => p.max_element() < 8.0,
+                };
+                for (all, found) in all.iter_mut().zip(normals(&points, is_wanted, 0.0)) {
+                    all.extend(found);
+                }
+            }
+            let [estimated, sharp] = all.map(|all| off_face(&all));
+            assert!(estimated > before, "{estimated} of {faces_that_meet} faces");
+            assert!(sharp < after, "{sharp} of {faces_that_meet} faces");
+        }
+    }
+
+    /// What is round or noisy has no face to take a normal of.
+    #[test]
+    fn round_and_noisy_normals_stay() {
+        let mut rng = fastrand::Rng::with_seed(1);
+        for radius in [4.0, 6.0, 8.0] {
+            let count = (POINTS_PER_AREA * 2.0 * TAU * radius * radius) as usize;
+            let ball: Vec<Vec3> = (0..count)
+                .map(|_| {
+                    let (z, turn) = (2.0 * rng.f32() - 1.0, TAU * rng.f32());
+                    let across = (1.0 - z * z).sqrt();
+                    radius * Vec3::new(across * turn.cos(), across * turn.sin(), z)
+                })
+                .collect();
+            let [estimated, sharp] = normals(&ball, |_| true, 0.0);
+            assert_eq!(estimated, sharp, "a ball of {radius} radii");
+        }
+        for (noise, told) in [(0.25, 0.0), (0.25, 0.25), (1.0, 0.0), (1.0, 1.0)] {
+            let mut points = faces(1, &mut rng);
+            // The sum of twelve has the standard deviation of a normal distribution.
+            let normal = |rng: &mut fastrand::Rng| (0..12).map(|_| rng.f32()).sum::<f32>() - 6.0;
+            points
+                .iter_mut()
+                .for_each(|p| p.z += noise * normal(&mut rng));
+            let [estimated, sharp] = normals(&points, |_| true, told);
+            let changed = estimated.iter().zip(&sharp).filter(|(m, n)| m != n);
+            // At the rim, where some neighbours are few, or by chance on a plane.
+            let share = changed.count() as f32 / points.len() as f32;
+            assert!(share < 0.02, "{share} with noise of {noise}, told {told}");
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! Planes of neighbourhoods of points: their normals are solved for side by side.
+
+use super::lanes::multiversioned;
+use crate::normals::least_variance_axis;
+use glamx::{DMat3, DVec3, FloatExt, Vec3};
+
+/// Planes that are solved for side by side.
+const BATCH: usize = 64;
+
+/// Share of the squared variance that the two larger axes of a neighbourhood must have for a
+/// normal in single precision: below it the points are on a line or coincide.
+const LEAST_PLANAR: f32 = 1e-4;
+
+/// For [`stage_constants`](crate::plan::stage_constants).
+pub(crate) const CONSTANTS: [(&str, f64); 1] = [("LEAST_PLANAR", LEAST_PLANAR as f64)];
+
+/// Sums over the points around a point, of 1, x, y, z, xx, xy, xz, yy, yz and zz; metres from the point.
+pub(super) type Moments = [f32; 10];
+
+/// The plane that best fits the points around a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane {
+    /// Unit; either way.
+    pub(super) normal: Vec3,
+    /// Of the points about it, square metres; infinite where they are no plane's, but three or on a line.
+    pub(super) variance: f32,
+    /// Height of the point above it, metres.
+    pub(super) height: f32,
+}
+
+impl Plane {
+    /// Any other fits better.
+    pub(super) const UNKNOWN: Self = Self {
+        normal: Vec3::ZERO,
+        variance: f32::INFINITY,
+        height: 0.0,
+    };
+
+    /// A plane between this and another of the same point, with a normal on the same side.
+    pub(super) fn towards(&self, other: &Self, share: f32) -> Self {
+        if share >= 1.0 {
+            return *other;
+        }
+        Self {
+            normal: self
+                .normal
+                .lerp(other.normal, share)
+                .normalize_or(self.normal),
+            variance: self.variance.lerp(other.variance, share),
+            height: self.height.lerp(other.height, share),
+        }
+    }
+}
+
+/// Neighbourhoods whose planes are solved for together, as structure of arrays.
+pub(super) struct Batch {
+    /// Where the plane goes.
+    place: [u32; BATCH],
+    moments: [[f32; BATCH]; 10],
+    normal: [[f32; BATCH]; 3],
+    variance: [f32; BATCH],
+    height: [f32; BATCH],
+    /// Whether the neighbourhood is one that `solve_planar` can tell the plane of.
+    planar: [bool; BATCH],
+    count: usize,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self {
+            place: [0; BATCH],
+            moments: [[0.0; BATCH]; 10],
+            normal: [[0.0; BATCH]; 3],
+            variance: [0.0; BATCH],
+            height: [0.0; BATCH],
+            planar: [false; BATCH],
+            count: 0,
+        }
+    }
+}
+
+impl Batch {
+    /// Adds a neighbourhood whose plane is to be the `place`-th.
+    pub(super) fn push(&mut self, place: u32, moments: Moments) {
+        self.place[self.count] = place;
+        for (to, from) in self.moments.iter_mut().zip(moments) {
+            to[self.count] = from;
+        }
+        self.count += 1;
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.count == BATCH
+    }
+
+    /// Puts the planes of what was pushed into their places.
+    pub(super) fn solve(&mut self, planes: &mut [Plane]) {
+        solve_planar(self);
+        for k in 0..self.count {
+            planes[self.place[k] as usize] = match self.planar[k] {
+                true => Plane {
+                    normal: Vec3::from_array(self.normal.each_ref().map(|c| c[k])),
+                    variance: self.variance[k],
+                    height: self.height[k],
+                },
+                false => solve_any(self.moments.each_ref().map(|c| c[k])),
+            };
+        }
+        self.count = 0;
+    }
+}
+
+/// A plane through points that may be on a line or coincide.
+fn solve_any(moments: Moments) -> Plane {
+    let [count, x, y, z, xx, xy, xz, yy, yz, zz] = moments.map(f64::from);
+    let (mx, my, mz) = (x / count, y / count, z / count);
+    let (xy, xz, yz) = (xy - x * my, xz - x * mz, yz - y * mz);
+    let normal = least_variance_axis(DMat3::from_cols(
+        DVec3::new(xx - x * mx, xy, xz),
+        DVec3::new(xy, yy - y * my, yz),
+        DVec3::new(xz, yz, zz - z * mz),
+    ));
+    Plane {
+        normal: normal.as_vec3(),
+        ..Plane::UNKNOWN
+    }
+}
+
+multiversioned! {
+/// Power iteration by squaring on the adjugate of the covariance: its eigenvectors are the same,
+/// and its eigenvalues are the products of the other two, so that the least variance becomes the
+/// greatest.
+fn solve_planar(batch: &mut Batch) {
+    let [count, sx, sy, sz, xx, xy, xz, yy, yz, zz] = &batch.moments;
+    for k in 0..BATCH {
+        let (mx, my, mz) = (sx[k] / count[k], sy[k] / count[k], sz[k] / count[k]);
+        let (cxx, cxy, cxz) = (xx[k] - sx[k] * mx, xy[k] - sx[k] * my, xz[k] - sx[k] * mz);
+        let (cyy, cyz, czz) = (yy[k] - sy[k] * my, yz[k] - sy[k] * mz, zz[k] - sz[k] * mz);
+        let inv = 1.0 / (cxx + cyy + czz);
+        let (xx, xy, xz) = (cxx * inv, cxy * inv, cxz * inv);
+        let (yy, yz, zz) = (cyy * inv, cyz * inv, czz * inv);
+        let mut a = [
+            yy * zz - yz * yz,
+            xz * yz - xy * zz,
+            xy * yz - xz * yy,
+            xx * zz - xz * xz,
+            xy * xz - xx * yz,
+            xx * yy - xy * xy,
+        ];
+        batch.planar[k] = a[0] + a[3] + a[5] >= LEAST_PLANAR;
+        // The fourth square is the 16th power: eigenvalues that differ by half are 10⁻⁵ apart.
+        for _ in 0..4 {
+            let inv = 1.0 / (a[0] + a[3] + a[5]);
+            let [xx, xy, xz, yy, yz, zz] = a.map(|c| c * inv);
+            a = [
+                xx * xx + xy * xy + xz * xz,
+                xx * xy + xy * yy + xz * yz,
+                xx * xz + xy * yz + xz * zz,
+                xy * xy + yy * yy + yz * yz,
+                xy * xz + yy * yz + yz * zz,
+                xz * xz + yz * yz + zz * zz,
+            ];
+        }
+        // The longest column.
+        let [axx, axy, axz, ayy, ayz, azz] = a;
+        let x_longest = (axx >= ayy) & (axx >= azz);
+        let y_longest = ayy >= azz;
+        let pick = |x: f32, y: f32, z: f32| {
+            let other = if y_longest { y } else { z };
+            if x_longest { x } else { other }
+        };
+        let (x, y, z) = (pick(axx, axy, axz), pick(axy, ayy, ayz), pick(axz, ayz, azz));
+        let inv = 1.0 / (x * x + y * y + z * z).sqrt();
+        let (x, y, z) = (x * inv, y * inv, z * inv);
+        let squares = x * x * cxx + y * y * cyy + z * z * czz
+            + 2.0 * (x * y * cxy + x * z * cxz + y * z * cyz);
+        (batch.normal[0][k], batch.normal[1][k], batch.normal[2][k]) = (x, y, z);
+        let free = count[k] - 3.0;
+        batch.variance[k] = if free > 0.0 { squares / free } else { f32::INFINITY };
+        batch.height[k] = -(x * mx + y * my + z * mz);
+    }
+}
+}
