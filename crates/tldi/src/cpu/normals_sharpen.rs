@@ -185,7 +185,8 @@ fn sums(p: Vec3, side: Vec3, [reach, most]: [f32; 2], flat: &FlatPlanes) -> [f32
 mod tests {
     use super::super::normals::estimate;
     use super::*;
-    use std::f32::consts::TAU;
+    use glamx::Quat;
+    use std::f32::consts::{FRAC_PI_4, TAU};
 
     /// With a mean radius of 1.
     const POINTS_PER_AREA: f32 = 0.94;
@@ -199,10 +200,11 @@ mod tests {
         let support: Vec<u32> = (0..points.len() as u32).collect();
         let (mut targets, mut normals) = (vec![], vec![]);
         let mut scratch = NormalScratch::default();
-        let position = |i: u32| points[i as usize];
+        // Turned, so that neighbours on one face have normals either way.
+        let turn = Quat::from_rotation_z(FRAC_PI_4);
         estimate(
             &support,
-            position,
+            |i| turn * points[i as usize],
             |k| is_wanted(points[k]),
             SUPPORT,
             &mut scratch,
@@ -210,8 +212,9 @@ mod tests {
             &mut normals,
         );
         let placed = |normals: &[Vec3]| {
-            let targets = targets.iter().map(|&i| position(i));
-            targets.zip(normals.iter().copied()).collect()
+            let targets = targets.iter().map(|&i| points[i as usize]);
+            let normals = normals.iter().map(|&n| turn.inverse() * n);
+            targets.zip(normals).collect()
         };
         let estimated = placed(&normals);
         sharpen(SUPPORT, noise, &mut scratch, &mut normals);
