@@ -249,6 +249,7 @@ impl Scratch {
             frame_from_cloud,
             camera,
             params,
+            sharpens: false,
         };
         let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
         let (hits, touching) = (&mut self.hits, &mut self.touching);

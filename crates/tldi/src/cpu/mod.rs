@@ -223,6 +223,7 @@ pub fn build(
         frame_from_cloud,
         camera,
         params,
+        sharpens: true,
     };
     if let Some(seen) = side.project(&view) {
         side.whole_image(&view, &seen);

@@ -220,6 +220,7 @@ impl Scratch {
             frame_from_cloud,
             camera,
             params,
+            sharpens: true,
         };
         // An unbounded surface as far as the cloud is deep in it, twice for what was not sampled.
         let exact_view = |surface, frame_from_surface, deepest: f32| ExactView {

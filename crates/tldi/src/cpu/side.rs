@@ -44,6 +44,9 @@ pub(super) struct CloudView<'a> {
     pub(super) frame_from_cloud: &'a Pose3,
     pub(super) camera: &'a VirtualCamera,
     pub(super) params: &'a Params,
+    /// Whether estimated normals are sharpened: not for casts, which take the pixel that is met first. Planes that are
+    /// sharpened in part, at corners, stand out there.
+    pub(super) sharpens: bool,
 }
 
 /// An exact surface that a camera looks at together with a cloud.
@@ -234,8 +237,10 @@ impl Side {
             &mut self.kept,
             &mut self.kept_normals,
         );
-        let noise = view.cloud.noise();
-        sharpen(radius, noise, &mut self.normals, &mut self.kept_normals);
+        if view.sharpens {
+            let noise = view.cloud.noise();
+            sharpen(radius, noise, &mut self.normals, &mut self.kept_normals);
+        }
     }
 
     /// Image of this cloud, and of an exact surface into `image` over the same pixels; `None`
