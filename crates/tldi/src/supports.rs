@@ -52,6 +52,9 @@ const FLAT: [f32; 2] = [0.35, 0.5];
 /// plane as well.
 const UNBENT: [f32; 2] = [0.3, 0.5];
 
+/// Roughness, in the least, up to which there is no bend to speak of, and from which on there may be one.
+const SMOOTH: [f32; 2] = [0.5, 1.0];
+
 /// How far from the floor of a valley points tell how low it is, in standard deviations across it.
 const NEAR_FLOOR: f32 = 0.4;
 
@@ -152,6 +155,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         })
     });
     let unbent = ramp(bowl.left / roughness.max(least), UNBENT);
+    let unbent = unbent.max(1.0 - ramp(roughness / least, SMOOTH));
     let (main_plane, flatness) = if unbent > 0.0 {
         let heights = points.iter().map(|p| (place(p), p.gap));
         let (main_plane, share) = plane.of_most(heights, roughness, least);
@@ -358,6 +362,14 @@ mod tests {
             // The plane that fits best would be off by 0.2 and more.
             let off = face[k].gap - above - tilt(face[k].middle());
             assert!(off.abs() < 0.05, "{off}");
+        }
+        // Not even half as rough as what counts, whatever a bowl explains of it.
+        let faint = points_of(&|p| 0.02 * (p.x / 5.5).powi(2) - 0.02 * (p.y / 5.5).powi(4));
+        let found = supports(&faint, Vec3::Y, 0.05);
+        assert_eq!(found.flatness, 1.0);
+        for &k in &found.indices {
+            let middle = faint[k].middle().abs();
+            assert!(middle.x.min(middle.z) > 5.0, "{middle} is no corner");
         }
         // So shallow that most of their gaps are within 0.1 of a plane.
         let cylinder = |p: Vec2| (p.x / 12.0).powi(2);

@@ -79,7 +79,7 @@ pub(super) struct Entry {
     pub(super) position: Vec3,
     id: u32,
     pub(super) cell: u32,
-    pub(super) wanted: bool,
+    wanted: bool,
 }
 
 /// Cells of the neighbourhood's size; a rim of empty cells spares bounds checks.
