@@ -158,9 +158,16 @@ fn facing_camera(normal: vec3f, sign: f32) -> vec3f {
     return select(normal, -normal, normal.z * sign < 0.0);
 }
 
-fn opposed(entry: vec3f, leaving: vec3f) -> bool {
-    let n = facing_camera(entry, -1.0);
-    let m = facing_camera(leaving, 1.0);
+// How much the normal of a layer counts for a body. See the CPU's.
+fn share_of(k: u32, side: f32) -> f32 {
+    let agreement = layers[k].agreement;
+    let is_edge = agreement * side * layers[k].normal.z > 0.0;
+    return select(1.0, abs(agreement), is_edge);
+}
+
+fn opposed(entry: u32, leaving: u32) -> bool {
+    let n = facing_camera(layers[entry].normal, -1.0);
+    let m = facing_camera(layers[leaving].normal, 1.0);
     return n.z <= -FACING && m.z >= FACING && dot(n, m) <= -FACING;
 }
 
@@ -201,7 +208,7 @@ fn met_by(look: ptr<function, Look>, a: Column, b: Column, kb: u32) -> u32 {
             continue;
         }
         if layers[kb].depth - layers[ka].depth <= thickness
-            || opposed(layers[ka].normal, layers[kb].normal) {
+            || opposed(ka, kb) {
             return ka;
         }
     }
@@ -218,7 +225,7 @@ fn contact_pixels(look: ptr<function, Look>, a: Column, b: Column, view: u32, pi
         if ka == NONE {
             continue;
         }
-        // Outward normals in the view frame: the camera sees a from outside, b from inside.
+        // Outward unit normals in the view frame: the camera sees a from outside, b from inside.
         let normal_a = facing_camera(layers[ka].normal, -1.0);
         let normal_b = facing_camera(layers[kb].normal, 1.0);
         let normal = unit_or(normal_a - normal_b, vec3f(0.0, 0.0, -1.0));
@@ -242,9 +249,11 @@ fn contact_pixels(look: ptr<function, Look>, a: Column, b: Column, view: u32, pi
         atomicStore(&found[at + 4u], bitcast<u32>(layers[ka].depth));
         atomicStore(&found[at + 5u], bitcast<u32>(layers[kb].depth));
         atomicStore(&found[at + 6u], bitcast<u32>(gap));
+        let shortened_a = share_of(ka, -1.0) * normal_a;
+        let shortened_b = share_of(kb, 1.0) * normal_b;
         for (var k = 0u; k < 3u; k++) {
-            atomicStore(&found[at + 7u + k], bitcast<u32>(normal_a[k]));
-            atomicStore(&found[at + 10u + k], bitcast<u32>(normal_b[k]));
+            atomicStore(&found[at + 7u + k], bitcast<u32>(shortened_a[k]));
+            atomicStore(&found[at + 10u + k], bitcast<u32>(shortened_b[k]));
         }
     }
 }

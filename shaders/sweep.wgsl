@@ -78,8 +78,7 @@ fn weight_of(f: vec2u) -> u32 {
 }
 
 // In steps.
-fn normal_of(f: vec2u) -> vec3i {
-    let splat = f.y >> 8u;
+fn normal_of(splat: u32) -> vec3i {
     let xy = splats[splat].normal_xy;
     return vec3i(i32(xy << 16u) >> 16u, i32(xy) >> 16u, i32(splats[splat].normal_z));
 }
@@ -93,74 +92,104 @@ fn is_lighter(f: vec2u, g: vec2u) -> bool {
     if f.x != g.x {
         return f.x < g.x;
     }
-    let n = normal_of(f);
-    let m = normal_of(g);
+    let n = normal_of(f.y >> 8u);
+    let m = normal_of(g.y >> 8u);
     if n.x != m.x {
         return n.x < m.x;
     }
     return select(n.z < m.z, n.y < m.y, n.y != m.y);
 }
 
-// Weighted depths above a first one: sums of 48 bits, in words of 16 and 32.
-struct DepthSum {
+// Weighted sums over fragments: of depths above a first one 48 bits, in words of 16 and 32; of normals 44, in
+// words of 12 and 32.
+struct Sum {
     weight: u32,
-    low: u32,
-    high: u32,
+    depth_low: u32,
+    depth_high: u32,
+    normal_low: vec3i,
+    normal_high: vec3i,
 }
 
-fn add_depth(sum: ptr<function, DepthSum>, w: u32, above_first: u32) {
+fn add(sum: ptr<function, Sum>, f: vec2u, first_depth: u32) {
+    let w = weight_of(f);
+    let above_first = depth_of(f.x) - first_depth;
     (*sum).weight += w;
-    (*sum).low += w * (above_first & 0xffffu);
-    (*sum).high += w * (above_first >> 16u) + ((*sum).low >> 16u);
-    (*sum).low &= 0xffffu;
+    (*sum).depth_low += w * (above_first & 0xffffu);
+    (*sum).depth_high += w * (above_first >> 16u) + ((*sum).depth_low >> 16u);
+    (*sum).depth_low &= 0xffffu;
+    (*sum).normal_low += i32(w) * normal_of(f.y >> 8u);
+    (*sum).normal_high += (*sum).normal_low >> vec3u(12u);
+    (*sum).normal_low &= vec3i(0xfff);
 }
 
-// Of the fragments that are on the face of the heaviest one.
-fn depths_of_face(start: u32, end: u32) -> DepthSum {
+fn normal_sum(sum: Sum) -> vec3f {
+    return vec3f(sum.normal_high) * 4096.0 + vec3f(sum.normal_low);
+}
+
+// Length of the mean of the unit normals.
+fn agreement_of(sum: Sum) -> f32 {
+    return length(normal_sum(sum)) / (NORMAL_STEPS * f32(sum.weight));
+}
+
+// The splat of the heaviest fragment.
+fn face_of(start: u32, end: u32) -> u32 {
     var heaviest = start;
     for (var k = start + 1u; k < end; k++) {
         if is_lighter(fragments[heaviest], fragments[k]) {
             heaviest = k;
         }
     }
-    let face = normal_of(fragments[heaviest]);
-    var sum: DepthSum;
+    return fragments[heaviest].y >> 8u;
+}
+
+// 1 at an edge, -1 in a groove.
+fn sign_of_bend(start: u32, end: u32, face: u32) -> f32 {
+    var bend = 0;
+    for (var k = start; k < end; k++) {
+        let splat = fragments[k].y >> 8u;
+        let aside = splats[splat].centre - splats[face].centre;
+        let most = vec2f(MOST_ASIDE);
+        let turn = (normal_of(splat) - normal_of(face)).xy >> vec2u(BEND_SHIFT);
+        bend += dot(vec2i(round(BEND_STEPS * clamp(aside, -most, most))), turn);
+    }
+    return select(1.0, -1.0, bend < 0);
+}
+
+fn sum_of_face(start: u32, end: u32, face: u32) -> Sum {
+    let normal = normal_of(face);
+    var sum: Sum;
     for (var k = start; k < end; k++) {
         let f = fragments[k];
-        if f32(dot(face, normal_of(f))) >= SAME_FACE * (NORMAL_STEPS * NORMAL_STEPS) {
-            add_depth(&sum, weight_of(f), depth_of(f.x) - depth_of(fragments[start].x));
+        if f32(dot(normal, normal_of(f.y >> 8u))) >= SAME_FACE * (NORMAL_STEPS * NORMAL_STEPS) {
+            add(&sum, f, depth_of(fragments[start].x));
         }
     }
     return sum;
 }
 
 // The layer of the fragments from `start` to before `end`.
-fn layer_of(start: u32, end: u32, oriented: bool, view: u32) -> Layer {
+fn layer_of(start: u32, end: u32, oriented: bool, knows_faces: bool, view: u32) -> Layer {
     let first_depth = depth_of(fragments[start].x);
-    var depths: DepthSum;
-    // Sums of 48 bits, too.
-    var normal_low = vec3i();
-    var normal_high = vec3i();
+    var sum: Sum;
     for (var k = start; k < end; k++) {
-        let f = fragments[k];
-        add_depth(&depths, weight_of(f), depth_of(f.x) - first_depth);
-        normal_low += i32(weight_of(f)) * normal_of(f);
-        normal_high += normal_low >> vec3u(12u);
-        normal_low &= vec3i(0xfff);
+        add(&sum, fragments[k], first_depth);
     }
-    let sum = vec3f(normal_high) * 4096.0 + vec3f(normal_low);
-    if oriented && length(sum) < CREASED * NORMAL_STEPS * f32(depths.weight) {
-        depths = depths_of_face(start, end);
+    var agreement = 1.0;
+    if knows_faces && agreement_of(sum) < CREASED {
+        let face = face_of(start, end);
+        agreement = agreement_of(sum) * sign_of_bend(start, end, face);
+        sum = sum_of_face(start, end, face);
     }
     let class_of_run = fragments[start].x >> DEPTH_BITS;
     let step = pairs[view / MAX_VIEWS].depth_step;
     let zero = views[view].depth_zero;
-    let mean = (f32(depths.high) * 65536.0 + f32(depths.low)) / f32(depths.weight);
+    let mean = (f32(sum.depth_high) * 65536.0 + f32(sum.depth_low)) / f32(sum.weight);
     var layer: Layer;
     layer.near = zero + f32(first_depth) * step;
     layer.far = zero + f32(depth_of(fragments[end - 1u].x)) * step;
     layer.depth = zero + (f32(first_depth) + mean) * step;
-    layer.normal = unit_or(sum, vec3f(0.0, 0.0, -1.0));
+    layer.agreement = agreement;
+    layer.normal = unit_or(normal_sum(sum), vec3f(0.0, 0.0, -1.0));
     layer.facing = select(UNKNOWN, EXIT, class_of_run == 1u && oriented);
     layer.facing = select(layer.facing, ENTRY, class_of_run == 0u);
     return layer;
@@ -214,15 +243,17 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
     if !fitting {
         return;
     }
-    let oriented = (sides[view / MAX_VIEWS * 2u + s].flags & (HAS_NORMALS | ORIENTED))
-        == (HAS_NORMALS | ORIENTED);
+    let flags = sides[view / MAX_VIEWS * 2u + s].flags;
+    let oriented = (flags & (HAS_NORMALS | ORIENTED)) == (HAS_NORMALS | ORIENTED);
+    // Estimated ones are sharpened.
+    let knows_faces = oriented || (flags & HAS_NORMALS) == 0u;
     var slot = first_layer;
     var start = begin;
     for (var i = begin; i < end; i++) {
         let is_last = i + 1u == end;
         if is_last || !is_same_layer(fragments[i].x, fragments[min(i + 1u, end - 1u)].x, merge_steps) {
             // In order of depth, then of facing.
-            let layer = layer_of(start, i + 1u, oriented, view);
+            let layer = layer_of(start, i + 1u, oriented, knows_faces, view);
             var place = slot;
             while place > first_layer {
                 let before = layers[place - 1u];

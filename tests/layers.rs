@@ -2,7 +2,7 @@
 
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Facing, Layer, Params, PointCloud, Tldi, VirtualCamera, build};
-use tldi_tests::{oracle_layers, random_unit, sampled_plane, sampled_sphere};
+use tldi_tests::{OracleLayer, oracle_layers, random_unit, sampled_plane, sampled_sphere};
 
 /// Every pixel's layers equal those of an O(n²) sort-and-merge in f64.
 #[test]
@@ -37,7 +37,8 @@ fn layers_equal_brute_force() {
                 let mut layers = image.layers_at(i, j).to_vec();
                 layers.sort_by(|a, b| a.near.total_cmp(&b.near));
                 assert_eq!(layers.len(), truth.len(), "seed {seed}, pixel ({u}, {v})");
-                for (layer, (near, far, depth)) in layers.iter().zip(truth) {
+                for (layer, truth) in layers.iter().zip(truth) {
+                    let OracleLayer { near, far, surface } = truth;
                     // Depths are even numbers of steps (thickness / 4096), weights 255ths: of the
                     // layer's spread.
                     let step = f64::from(params.thickness) / 4096.0;
@@ -50,14 +51,17 @@ fn layers_equal_brute_force() {
                         (f64::from(layer.far) - far).abs() < 3.0 * step,
                         "seed {seed}"
                     );
-                    if depth.is_nan() {
+                    if surface.depth.is_nan() {
                         unclear_face += 1;
                         continue;
                     }
                     assert!(
-                        (f64::from(layer.depth) - depth).abs() < 3.0 * step + spread,
+                        (f64::from(layer.depth) - surface.depth).abs() < 3.0 * step + spread,
                         "seed {seed}"
                     );
+                    // Normals are kept in steps of 1 / 16384, weights in 255ths.
+                    let off = layer.normal.as_dvec3() - surface.normal;
+                    assert!(off.length() < 2e-3, "seed {seed}: {layer:?}, {surface:?}");
                     // Random normals: a layer of several points has faces.
                     creased += usize::from(far - near > 10.0 * step);
                 }

@@ -15,6 +15,9 @@ override LEAST_RADIUS_PX: f32;
 override EDGE_ON: f32;
 override NORMAL_STEPS: f32;
 override CREASED: f32;
+override BEND_STEPS: f32;
+override MOST_ASIDE: f32;
+override BEND_SHIFT: u32;
 override SAME_FACE: f32;
 override MAX_WEIGHT: f32;
 override DEPTH_BITS: u32;
@@ -251,7 +254,7 @@ struct Layer {
     near: f32,
     far: f32,
     depth: f32,
-    padding: u32,
+    agreement: f32,
 }
 
 const ENTRY: i32 = -1;

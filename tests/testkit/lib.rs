@@ -21,7 +21,7 @@ pub use backend::{compare_batch, compare_on, gpu_backend};
 pub use data::{data_file, load_cloud};
 pub use half_space::HalfSpace;
 pub use host::Host;
-pub use oracle::{OracleFragment, oracle_layers};
+pub use oracle::{OracleFragment, OracleLayer, OracleSurface, oracle_layers};
 pub use pairs::{aimed, compare, compare_clouds, deepest_contact, deepest_point};
 pub use policy::PolicyChoice;
 pub use random::{random_pose, random_unit};

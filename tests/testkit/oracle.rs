@@ -17,19 +17,39 @@ pub struct OracleFragment {
     pub normal: DVec3,
 }
 
-/// The layers `(near, far, depth)` of pixel `(i, j)` of an orthographic camera that looks along
+/// A layer of a pixel, in metres along the view.
+#[derive(Clone, Copy, Debug)]
+pub struct OracleLayer {
+    /// Of the nearest fragment.
+    pub near: f64,
+    /// Of the farthest.
+    pub far: f64,
+    /// What the layer is taken for.
+    pub surface: OracleSurface,
+}
+
+/// The mean of the fragments of a layer or, where their normals differ, of those on the heaviest one's face.
+#[derive(Clone, Copy, Debug)]
+pub struct OracleSurface {
+    /// Metres.
+    pub depth: f64,
+    /// Unit length.
+    pub normal: DVec3,
+}
+
+/// The layers of pixel `(i, j)` of an orthographic camera that looks along
 /// +z with pixel edges of `params.pixel_size`: every splat of the cloud is tried (O(points)); of a
 /// class those that follow each other within the merge gap, or a thickness where one is steep, are a layer.
 ///
 /// `None` where a decision (covered or not, which class, merged or not) is closer than `f32` can
-/// tell: there the oracle knows no better than what it judges. The depth alone is not a number where
+/// tell: there the oracle knows no better than what it judges. The surface alone is not a number where
 /// that holds for the face at a crease.
 pub fn oracle_layers(
     cloud: &PointCloud,
     i: i32,
     j: i32,
     params: &Params,
-) -> Option<Vec<(f64, f64, f64)>> {
+) -> Option<Vec<OracleLayer>> {
     let pixel = f64::from(params.pixel_size);
     let normals = cloud.normals().expect("the oracle needs normals");
     let mut fragments = Vec::new();
@@ -74,27 +94,37 @@ pub fn oracle_layers(
                 .iter()
                 .map(|f| f.depth)
                 .fold(f64::NEG_INFINITY, f64::max);
-            let depth = depth(run);
-            (near, far, depth)
+            OracleLayer {
+                near,
+                far,
+                surface: surface(run),
+            }
         })
         .collect();
-    layers.sort_by(|a, b| a.0.total_cmp(&b.0));
+    layers.sort_by(|a, b| a.near.total_cmp(&b.near));
     Some(layers)
 }
 
-/// Mean depth; where the normals differ, of those on the heaviest one's face. Not a number where the
-/// rounding of weights and normals decides.
-fn depth(run: &[OracleFragment]) -> f64 {
+/// Not a number where the rounding of weights and normals decides.
+fn surface(run: &[OracleFragment]) -> OracleSurface {
     let weight = |f: &OracleFragment| f.weight;
     let mean = |run: &[&OracleFragment]| {
-        let sum: f64 = run.iter().map(|f| f.weight * f.depth).sum();
-        sum / run.iter().map(|f| f.weight).sum::<f64>()
+        let depth: f64 = run.iter().map(|f| f.weight * f.depth).sum();
+        let normal: DVec3 = run.iter().map(|f| f.weight * f.normal).sum();
+        OracleSurface {
+            depth: depth / run.iter().map(|f| f.weight).sum::<f64>(),
+            normal: normal.normalize(),
+        }
+    };
+    let unclear = OracleSurface {
+        depth: f64::NAN,
+        normal: DVec3::NAN,
     };
     let all: Vec<_> = run.iter().collect();
     let normal: DVec3 = run.iter().map(|f| f.weight * f.normal).sum();
     let length = normal.length() / run.iter().map(weight).sum::<f64>();
     if (length - 0.97).abs() < 0.005 {
-        return f64::NAN;
+        return unclear;
     }
     if length > 0.97 {
         return mean(&all);
@@ -104,7 +134,7 @@ fn depth(run: &[OracleFragment]) -> f64 {
     let face = heaviest[0].normal;
     let is_unclear = |f: &OracleFragment| (f.normal.dot(face) - 0.82).abs() < 0.001;
     if heaviest.len() > 1 || run.iter().any(is_unclear) {
-        return f64::NAN;
+        return unclear;
     }
     let of_face: Vec<_> = run.iter().filter(|f| f.normal.dot(face) > 0.82).collect();
     mean(&of_face)

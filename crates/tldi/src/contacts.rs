@@ -14,9 +14,10 @@ pub struct ContactPixel {
     pub point_a: Vec3,
     /// Point on the second surface, metres; on the same ray as `point_a`.
     pub point_b: Vec3,
-    /// Outward unit normal of the first surface (towards the second).
+    /// Outward normal of the first surface (towards the second), of unit length on a face and shorter at an edge
+    /// ([`Layer::agreement`](crate::Layer::agreement)).
     pub normal_a: Vec3,
-    /// Outward unit normal of the second surface (towards the first).
+    /// Outward normal of the second surface (towards the first), as long likewise.
     pub normal_b: Vec3,
     /// Signed distance between the surfaces along the normal, metres; negative: penetration, cut to
     /// what the neighbouring pixels confirm.
@@ -26,7 +27,8 @@ pub struct ContactPixel {
 impl ContactPixel {
     /// Unit normal from the first surface towards the second: the mean of both sides'.
     pub fn normal(&self) -> Vec3 {
-        (self.normal_a - self.normal_b).normalize_or(self.normal_a)
+        let [a, b] = [self.normal_a, self.normal_b].map(Vec3::normalize_or_zero);
+        (a - b).normalize_or(a)
     }
 
     /// Midway between the surfaces, metres.

@@ -89,7 +89,8 @@ impl Frame {
     }
 }
 
-/// By how much, in metres, the contact of `pixels` is lower than `deepest`, what is fitted to the lowest of them.
+/// By how much, in metres, the contact of `pixels` is lower than `deepest`, the lowest of the points that were fitted
+/// to them.
 pub(crate) fn lower_by<'a>(
     pixels: impl Iterator<Item = &'a ContactPixel> + Clone,
     frame: &Frame,

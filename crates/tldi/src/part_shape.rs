@@ -151,6 +151,15 @@ impl Shape {
         let rises = supports.roughness >= LEAST_RISE * params.pixel_size;
         let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
         let roughness = supports.roughness_about_bowl;
+        let below = |lowest: &ContactPoint| {
+            let frame = Frame {
+                origin: self.centre,
+                axes: [self.longest, self.normal.cross(self.longest)],
+                normal: self.normal,
+            };
+            let pixels = in_band().map(|(contact, _)| contact);
+            lower_by(pixels, &frame, lowest, params.pixel_size)
+        };
         if let Some(lowest) = lowest_of_bowl {
             // Around it the surfaces have other normals: points there would stop what rolls. Where noise
             // leaves open where it is, points as far apart let a ball lie that would otherwise roll about.
@@ -164,6 +173,7 @@ impl Shape {
             let relative_radii = radii.map(|radius| {
                 relative_radius(radius, self.centre, in_band().map(|(contact, _)| contact)).0
             });
+            let point = self.point(point.middle(), point.gap - below(&point));
             let [u, v] = aside.map(|aside| slope_error * aside);
             let points = if slope_error > 0.0 {
                 let moved = |aside: Vec3| self.point(point.middle() + aside, point.gap);
@@ -234,18 +244,9 @@ impl Shape {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
         }
-        if rises {
-            let frame = Frame {
-                origin: self.centre,
-                axes: [self.longest, self.normal.cross(self.longest)],
-                normal: self.normal,
-            };
-            let pixels = in_band().map(|(contact, _)| contact);
-            let lower = lower_by(pixels, &frame, &deepest, params.pixel_size);
-            for point in &mut patch.points {
-                let gap = point.gap - (1.0 - supports.flatness) * lower;
-                *point = self.point(point.middle(), gap);
-            }
+        let below = below(&patch.points[0]);
+        for point in &mut patch.points {
+            *point = self.point(point.middle(), point.gap - below);
         }
         patch
     }

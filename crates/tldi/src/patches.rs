@@ -270,7 +270,8 @@ fn drop_between_faces(result: &mut PairResult) {
             let here = normal.dot(axes[contact.view as usize]).abs();
             axes.iter().any(|axis| normal.dot(*axis).abs() > here)
         };
-        contact.normal_a.dot(contact.normal_b) > -SAME_FACE
+        let lengths = contact.normal_a.length() * contact.normal_b.length();
+        contact.normal_a.dot(contact.normal_b) > -SAME_FACE * lengths
             && (seen_better(contact.normal_a) || seen_better(contact.normal_b))
     };
     if axes.len() > 1 && 2 * contacts.iter().filter(|c| is_between(c)).count() < contacts.len() {

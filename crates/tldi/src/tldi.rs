@@ -27,6 +27,10 @@ pub struct Layer {
     /// Unit normal in the view frame; outward where `facing` is known, else towards the camera.
     /// Zero where the variant does not estimate one.
     pub normal: Vec3,
+    /// 1 on a face. Where the normals of what was merged are those of several, the layer is that of one face, and this the
+    /// length of the mean of all unit normals, at most 0.97: at an edge, seen from where `normal` points, positive; in a
+    /// groove negative.
+    pub agreement: f32,
     /// Which way the layer faces.
     pub facing: Facing,
     /// Blended colour, linear in the 8-bit values; alpha is 0 where the cloud has no colours.

@@ -61,6 +61,7 @@ pub(crate) fn cast(
                     } else {
                         -normal
                     },
+                    agreement: 1.0,
                     facing,
                     color: [0; 4],
                 });

@@ -5,7 +5,7 @@
 //! no closed surface. Contact pixels pair a layer through which rays leave the second body with
 //! one through which they enter the first.
 
-use super::sweep::{SAME_FACE, is_edge_on};
+use super::sweep::{SAME_FACE, is_edge_on, share_of};
 use crate::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera};
 use arrayvec::ArrayVec;
@@ -278,8 +278,8 @@ fn contact_pixels([a, b]: [Column; 2], at: &PixelView, params: &Params, result: 
             view: at.view as u32,
             point_a: *at.frame_from_view * at.camera.view_at(u, v, entry.depth),
             point_b: *at.frame_from_view * at.camera.view_at(u, v, exit.depth),
-            normal_a: in_frame(normal_a),
-            normal_b: in_frame(normal_b),
+            normal_a: share_of(entry, -1.0) * in_frame(normal_a),
+            normal_b: share_of(exit, 1.0) * in_frame(normal_b),
             gap,
         });
     }
@@ -378,6 +378,7 @@ mod tests {
             far: depth,
             depth,
             normal,
+            agreement: 1.0,
             facing,
             color: [0; 4],
         }

@@ -73,6 +73,14 @@ impl CloudView<'_> {
     fn oriented(&self) -> bool {
         self.cloud.normals().is_some() && self.cloud.normals_oriented()
     }
+
+    /// Whether the normals beside an edge are those of its faces, and not means of both.
+    fn knows_faces(&self) -> bool {
+        match self.cloud.normals() {
+            Some(_) => self.oriented(),
+            None => self.sharpens,
+        }
+    }
 }
 
 impl Side {
@@ -196,6 +204,7 @@ impl Side {
             sweep::sweep(
                 &mut self.fragments,
                 points.oriented,
+                view.knows_faces(),
                 imaging.scale.merge_steps(view.params, view.cloud.noise()),
                 color,
                 imaging,

@@ -157,7 +157,7 @@ pub(crate) struct Imaging<'a> {
 #[repr(align(64))]
 pub(crate) struct Splat {
     /// Pixel coordinates of the point.
-    centre: [f32; 2],
+    pub(crate) centre: [f32; 2],
     radius: f32,
     /// Rise of the depth per pixel along columns and rows.
     slope: [f32; 2],

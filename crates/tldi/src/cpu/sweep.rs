@@ -2,9 +2,9 @@
 //!
 //! Within a pixel the fragments are sorted by class (entry, exit, edge-on) and depth; a run whose
 //! depths follow each other within the merge gap (of what is steep, within a thickness) is one
-//! layer. Its depth is the mean of its fragments; at an edge of a surface with given normals, of those
-//! on one face, as tangent planes do not hold beyond it (estimated normals are means of both faces
-//! there). Sums are integers: a layer does not depend on the order of the points.
+//! layer: the mean of its fragments or, at an edge, of those on one face, since tangent planes do not hold
+//! beyond it (normals that are means of both faces have planes that do). Sums are integers: a layer does not
+//! depend on the order of the points.
 
 use super::splat::{
     DEPTH_STEPS, DepthScale, EDGE_ON, Fragment, Fragments, Imaging, NORMAL_STEPS, Splat,
@@ -18,15 +18,27 @@ const CREASED: f32 = 0.97;
 /// Cosine of the largest angle (35°) between normals of one face, or of two that face each other.
 pub(crate) const SAME_FACE: f32 = 0.82;
 
+/// How finely a bend is summed: steps of a pixel, up to so many pixels, and bits of the normals that are left out. Of
+/// 1,024 fragments it is in the range of an `i32`, which WGSL has.
+const BEND_STEPS: f32 = 16.0;
+const MOST_ASIDE: f32 = 4.0;
+const BEND_SHIFT: u32 = 6;
+
 /// For [`stage_constants`](crate::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 2] =
-    [("CREASED", CREASED as f64), ("SAME_FACE", SAME_FACE as f64)];
+pub(crate) const CONSTANTS: [(&str, f64); 5] = [
+    ("CREASED", CREASED as f64),
+    ("SAME_FACE", SAME_FACE as f64),
+    ("BEND_STEPS", BEND_STEPS as f64),
+    ("MOST_ASIDE", MOST_ASIDE as f64),
+    ("BEND_SHIFT", BEND_SHIFT as f64),
+];
 
 /// Appends the layers of the band that was splatted last. `color` tells the colour of a kept
 /// point, where the cloud has colours.
 pub(crate) fn sweep(
     fragments: &mut Fragments,
     oriented: bool,
+    knows_faces: bool,
     merge_steps: u32,
     color: Option<&dyn Fn(u32) -> [u8; 4]>,
     imaging: &Imaging,
@@ -44,20 +56,16 @@ pub(crate) fn sweep(
         in_pixel.sort_unstable_by_key(|f| f.key);
         let first_layer = out.layers.len();
         for run in in_pixel.chunk_by(same_layer) {
-            let mut sum = Sum::default();
-            for f in run {
-                sum.add(f, &splats[f.splat as usize]);
-                if let Some(color) = color {
-                    sum.add_color(f, color(splats[f.splat as usize].kept));
-                }
+            let mut sum = Sum::of(run.iter(), splats, color);
+            let mut agreement = 1.0;
+            if knows_faces && sum.agreement() < CREASED {
+                let face = face_of(run, splats);
+                agreement = sum.agreement() * sign_of_bend(run, splats, face);
+                let of_face = run.iter().filter(|f| is_on_face(f, splats, face));
+                sum = Sum::of(of_face, splats, color);
             }
-            let normal = |f: &Fragment| splats[f.splat as usize].normal;
-            let depth = match oriented && sum.is_creased() {
-                true => depth_of_face(run, normal),
-                false => sum.depth as f64 / sum.weight as f64,
-            };
             out.layers
-                .push(sum.layer(run, depth, oriented, color.is_some(), scale));
+                .push(sum.layer(run, agreement, oriented, color.is_some(), scale));
         }
         out.layers[first_layer..]
             .sort_unstable_by(|a, b| (a.depth.total_cmp(&b.depth)).then(a.facing.cmp(&b.facing)));
@@ -65,21 +73,31 @@ pub(crate) fn sweep(
     }
 }
 
-/// Mean depth, in steps, of the fragments of a run that are on the face of its heaviest one.
-fn depth_of_face(run: &[Fragment], normal: impl Fn(&Fragment) -> [i16; 3]) -> f64 {
+/// The splat of the heaviest fragment of a run.
+fn face_of<'a>(run: &[Fragment], splats: &'a [Splat]) -> &'a Splat {
+    let normal = |f: &&Fragment| splats[f.splat as usize].normal;
     let heaviest = run.iter().max_by_key(|f| (f.weight, f.key, normal(f)));
-    let Some(face) = heaviest.map(&normal) else {
-        return 0.0;
-    };
-    let (mut weight, mut depth) = (0, 0);
-    for f in run {
-        let cosine = (0..3).map(|k| i32::from(face[k]) * i32::from(normal(f)[k]));
-        if cosine.sum::<i32>() as f32 >= SAME_FACE * (NORMAL_STEPS * NORMAL_STEPS) {
-            weight += i64::from(f.weight);
-            depth += i64::from(f.weight) * i64::from(f.depth());
-        }
-    }
-    depth as f64 / weight as f64
+    &splats[heaviest.map_or(0, |f| f.splat) as usize]
+}
+
+fn is_on_face(f: &Fragment, splats: &[Splat], face: &Splat) -> bool {
+    let normal = splats[f.splat as usize].normal;
+    let cosine = (0..3).map(|k| i32::from(face.normal[k]) * i32::from(normal[k]));
+    cosine.sum::<i32>() as f32 >= SAME_FACE * (NORMAL_STEPS * NORMAL_STEPS)
+}
+
+/// 1 where normals lean apart around a face, as at an edge, −1 where they lean together, as in a groove.
+fn sign_of_bend(run: &[Fragment], splats: &[Splat], face: &Splat) -> f32 {
+    let bend = run.iter().map(|f| {
+        let splat = &splats[f.splat as usize];
+        let along = |k: usize| {
+            let aside = (splat.centre[k] - face.centre[k]).clamp(-MOST_ASIDE, MOST_ASIDE);
+            let turn = (i32::from(splat.normal[k]) - i32::from(face.normal[k])) >> BEND_SHIFT;
+            (BEND_STEPS * aside).round() as i32 * turn
+        };
+        i64::from(along(0) + along(1))
+    });
+    if bend.sum::<i64>() < 0 { -1.0 } else { 1.0 }
 }
 
 #[derive(Default)]
@@ -91,37 +109,46 @@ struct Sum {
 }
 
 impl Sum {
-    fn add(&mut self, f: &Fragment, splat: &Splat) {
-        let w = i64::from(f.weight);
-        self.weight += w;
-        self.depth += w * i64::from(f.depth());
-        for (sum, c) in self.normal.iter_mut().zip(splat.normal) {
-            *sum += w * i64::from(c);
+    fn of<'a>(
+        fragments: impl Iterator<Item = &'a Fragment>,
+        splats: &[Splat],
+        color: Option<&dyn Fn(u32) -> [u8; 4]>,
+    ) -> Self {
+        let mut sum = Self::default();
+        for f in fragments {
+            let splat = &splats[f.splat as usize];
+            let w = i64::from(f.weight);
+            sum.weight += w;
+            sum.depth += w * i64::from(f.depth());
+            for (sum, c) in sum.normal.iter_mut().zip(splat.normal) {
+                *sum += w * i64::from(c);
+            }
+            if let Some(color) = color {
+                for (sum, c) in sum.color.iter_mut().zip(color(splat.kept)) {
+                    *sum += w * i64::from(c);
+                }
+            }
         }
+        sum
     }
 
-    fn add_color(&mut self, f: &Fragment, color: [u8; 4]) {
-        for (sum, c) in self.color.iter_mut().zip(color) {
-            *sum += i64::from(f.weight) * i64::from(c);
-        }
-    }
-
-    /// Whether the normals differ as those of two faces do.
-    fn is_creased(&self) -> bool {
+    /// Length of the mean of the unit normals.
+    fn agreement(&self) -> f32 {
         let length = Vec3::from_array(self.normal.map(|n| n as f32)).length();
-        length < CREASED * NORMAL_STEPS * self.weight as f32
+        length / (NORMAL_STEPS * self.weight as f32)
     }
 
-    /// The layer whose depth is `depth` steps.
+    /// The layer of a run.
     fn layer(
         &self,
         run: &[Fragment],
-        depth: f64,
+        agreement: f32,
         oriented: bool,
         colored: bool,
         scale: &DepthScale,
     ) -> Layer {
         let normal = Vec3::from_array(self.normal.map(|n| n as f32)).normalize_or(-Vec3::Z);
+        let depth = self.depth as f64 / self.weight as f64;
         let facing = match run[0].class() {
             0 => Facing::Entry,
             1 if oriented => Facing::Exit,
@@ -138,6 +165,7 @@ impl Sum {
             far: scale.metres(run[run.len() - 1].depth() as f32),
             depth: scale.metres(depth as f32),
             normal,
+            agreement,
             facing,
             color,
         }
@@ -147,4 +175,57 @@ impl Sum {
 /// Whether a layer is seen too steeply for its depth to be that of a surface crossing the ray.
 pub(crate) fn is_edge_on(layer: &Layer) -> bool {
     layer.normal.z.abs() < EDGE_ON
+}
+
+/// How much the normal of a layer counts for a body whose outside is where the camera is (`side` −1) or beyond it (1):
+/// of an edge as far as its faces agree; in a groove both touch, each with its own normal.
+pub(crate) fn share_of(layer: &Layer, side: f32) -> f32 {
+    let is_edge = layer.agreement * side * layer.normal.z > 0.0;
+    if is_edge { layer.agreement.abs() } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Params, PointCloud, VirtualCamera, build};
+
+    /// Two faces that meet in front of the camera, their points 0.1 apart and twice as wide: z = ridge · |x|.
+    fn layers_of(ridge: f32, params: &Params) -> Vec<Layer> {
+        let grid = (-4..=4).flat_map(|j| (-4..=4).map(move |i| [i, j]));
+        let at = grid.map(|[i, j]| [0.1 * i as f32 + 0.05, 0.1 * j as f32]);
+        let points: Vec<Vec3> = at.map(|[x, y]| Vec3::new(x, y, ridge * x.abs())).collect();
+        let slope = |p: &Vec3| Vec3::new(ridge * p.x.signum(), 0.0, -1.0).normalize();
+        let normals = points.iter().map(slope).collect::<Vec<_>>();
+        let cloud = PointCloud::builder(&points)
+            .radius(0.2)
+            .normals(normals)
+            .build()
+            .expect("the points are valid");
+        let camera = VirtualCamera::along(Vec3::Z, params.pixel_size);
+        let image = build(&cloud, &camera.view_from_frame.inverse(), &camera, params);
+        let creased = |l: &&Layer| l.agreement.abs() < CREASED;
+        image.layers.iter().filter(creased).copied().collect()
+    }
+
+    /// An edge counts less than its faces do, seen from outside; a groove has those of both.
+    #[test]
+    fn edges_count_less_than_faces_and_grooves_do_not() {
+        let params = Params::for_radius(0.1);
+        for (ridge, edge_side) in [(1.0, -1.0), (-1.0, 1.0)] {
+            let layers = layers_of(ridge, &params);
+            assert!(layers.len() >= 8, "{}", layers.len());
+            for layer in layers {
+                let face = Vec3::new(layer.normal.x.signum(), 0.0, -1.0).normalize();
+                assert!(
+                    layer.normal.distance(face) < 1e-3,
+                    "{ridge} {layer:?} {face}"
+                );
+                let shares = [edge_side, -edge_side].map(|side| share_of(&layer, side));
+                assert!(
+                    shares[0] < CREASED && shares[1] == 1.0,
+                    "{layer:?}: {shares:?}"
+                );
+            }
+        }
+    }
 }

@@ -50,6 +50,7 @@ pub(super) fn blending(members: &[Fragment], colors: Option<&[[u8; 4]]>) -> Laye
         far: far_depth,
         depth: 0.5 * (near_depth + far_depth),
         normal: Vec3::ZERO,
+        agreement: 1.0,
         facing: Facing::Unknown,
         color: color.map(|sum| (sum / near.weight).round() as u8),
     }

@@ -250,6 +250,7 @@ mod tests {
                     far,
                     depth: 0.5 * (near + far),
                     normal: Vec3::ZERO,
+                    agreement: 1.0,
                     facing: Facing::Unknown,
                     color: [0; 4],
                 });
