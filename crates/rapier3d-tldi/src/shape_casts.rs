@@ -399,22 +399,22 @@ impl Turning<'_> {
     fn met_by_turning(&self, Piece { from, to, .. }: Piece) -> Option<ShapeCastHit> {
         let touching = TOUCHING * self.params.pixel_size;
         let poses = [from, to].map(|time| self.a_from_b(time, time));
-        // What the next piece may measure as touching already is met in this one.
-        let met = if to < self.end { 1.5 } else { 1.0 } * touching;
-        let (share, impact) = met_by_turning(self.shared, self.moving, poses, touching, met)?;
+        let goes_on = to < self.end;
+        let (share, impact) = met_by_turning(self.shared, self.moving, poses, touching, goes_on)?;
         let time = from + (to - from) * share;
         Some(hit_of(&impact, time, &self.a_from_b(time, time)))
     }
 }
 
 /// Of the contacts that a piece of the motion closes, the first one, and the share of the piece until then: what
-/// only a turning brings together, to `met` metres. What is `touching` at its beginning is the solver's.
+/// only a turning brings together. What touches at its beginning is the solver's: of a motion that goes on, what closes
+/// fast is met a little farther off, or the next piece might measure it as touching already.
 fn met_by_turning(
     shared: &Shared,
     moving: &Moving<'_>,
     [before, after]: [Pose; 2],
     touching: f32,
-    met: f32,
+    goes_on: bool,
 ) -> Option<(f32, Impact)> {
     let from_before = before.inverse();
     let way_of = |point: Vector| after * (from_before * point) - point;
@@ -434,6 +434,8 @@ fn met_by_turning(
             patch.points.iter().filter_map(move |point| {
                 let way = way_of(point.point_b);
                 let approach = -patch.normal.dot(way);
+                let is_fast = goes_on && approach >= touching;
+                let met = if is_fast { 1.5 } else { 1.0 } * touching;
                 let meets = point.gap > touching && point.gap - approach <= met;
                 let impact = Impact {
                     distance: point.gap,
