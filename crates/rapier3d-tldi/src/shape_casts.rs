@@ -36,6 +36,10 @@ const SLOW: f32 = 0.25;
 /// (0.1), twice, since contacts are kept until a pair has moved by as much.
 const TOUCHING: f32 = 0.2;
 
+/// How far off in multiples of it surfaces are met that close by more than it in a piece of a motion that goes on: the
+/// next piece may measure them as touching already.
+const CLOSING: f32 = 1.5;
+
 /// Longest straight cast in pixels: what the images resolve in depth.
 const MAX_PIXELS: f32 = 131_072.0;
 
@@ -407,8 +411,7 @@ impl Turning<'_> {
 }
 
 /// Of the contacts that a piece of the motion closes, the first one, and the share of the piece until then: what
-/// only a turning brings together. What touches at its beginning is the solver's: of a motion that goes on, what closes
-/// fast is met a little farther off, or the next piece might measure it as touching already.
+/// only a turning brings together. What touches at its beginning is the solver's.
 fn met_by_turning(
     shared: &Shared,
     moving: &Moving<'_>,
@@ -435,7 +438,7 @@ fn met_by_turning(
                 let way = way_of(point.point_b);
                 let approach = -patch.normal.dot(way);
                 let is_fast = goes_on && approach >= touching;
-                let met = if is_fast { 1.5 } else { 1.0 } * touching;
+                let met = if is_fast { CLOSING } else { 1.0 } * touching;
                 let meets = point.gap > touching && point.gap - approach <= met;
                 let impact = Impact {
                     distance: point.gap,
