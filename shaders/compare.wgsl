@@ -165,9 +165,9 @@ fn share_of(k: u32, side: f32) -> f32 {
     return select(1.0, abs(agreement), is_edge);
 }
 
-fn opposed(entry: u32, leaving: u32) -> bool {
-    let n = facing_camera(layers[entry].normal, -1.0);
-    let m = facing_camera(layers[leaving].normal, 1.0);
+fn opposed(entry: vec3f, leaving: vec3f) -> bool {
+    let n = facing_camera(entry, -1.0);
+    let m = facing_camera(leaving, 1.0);
     return n.z <= -FACING && m.z >= FACING && dot(n, m) <= -FACING;
 }
 
@@ -208,7 +208,7 @@ fn met_by(look: ptr<function, Look>, a: Column, b: Column, kb: u32) -> u32 {
             continue;
         }
         if layers[kb].depth - layers[ka].depth <= thickness
-            || opposed(ka, kb) {
+            || opposed(layers[ka].normal, layers[kb].normal) {
             return ka;
         }
     }

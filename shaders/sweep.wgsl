@@ -77,6 +77,10 @@ fn weight_of(f: vec2u) -> u32 {
     return f.y & 0xffu;
 }
 
+fn splat_of(f: vec2u) -> u32 {
+    return f.y >> 8u;
+}
+
 // In steps.
 fn normal_of(splat: u32) -> vec3i {
     let xy = splats[splat].normal_xy;
@@ -92,8 +96,8 @@ fn is_lighter(f: vec2u, g: vec2u) -> bool {
     if f.x != g.x {
         return f.x < g.x;
     }
-    let n = normal_of(f.y >> 8u);
-    let m = normal_of(g.y >> 8u);
+    let n = normal_of(splat_of(f));
+    let m = normal_of(splat_of(g));
     if n.x != m.x {
         return n.x < m.x;
     }
@@ -117,7 +121,7 @@ fn add(sum: ptr<function, Sum>, f: vec2u, first_depth: u32) {
     (*sum).depth_low += w * (above_first & 0xffffu);
     (*sum).depth_high += w * (above_first >> 16u) + ((*sum).depth_low >> 16u);
     (*sum).depth_low &= 0xffffu;
-    (*sum).normal_low += i32(w) * normal_of(f.y >> 8u);
+    (*sum).normal_low += i32(w) * normal_of(splat_of(f));
     (*sum).normal_high += (*sum).normal_low >> vec3u(12u);
     (*sum).normal_low &= vec3i(0xfff);
 }
@@ -139,14 +143,14 @@ fn face_of(start: u32, end: u32) -> u32 {
             heaviest = k;
         }
     }
-    return fragments[heaviest].y >> 8u;
+    return splat_of(fragments[heaviest]);
 }
 
 // 1 at an edge, -1 in a groove.
 fn sign_of_bend(start: u32, end: u32, face: u32) -> f32 {
     var bend = 0;
     for (var k = start; k < end; k++) {
-        let splat = fragments[k].y >> 8u;
+        let splat = splat_of(fragments[k]);
         let aside = splats[splat].centre - splats[face].centre;
         let most = vec2f(MOST_ASIDE);
         let turn = (normal_of(splat) - normal_of(face)).xy >> vec2u(BEND_SHIFT);
@@ -160,7 +164,7 @@ fn sum_of_face(start: u32, end: u32, face: u32) -> Sum {
     var sum: Sum;
     for (var k = start; k < end; k++) {
         let f = fragments[k];
-        if f32(dot(normal, normal_of(f.y >> 8u))) >= SAME_FACE * (NORMAL_STEPS * NORMAL_STEPS) {
+        if f32(dot(normal, normal_of(splat_of(f)))) >= SAME_FACE * (NORMAL_STEPS * NORMAL_STEPS) {
             add(&sum, f, depth_of(fragments[start].x));
         }
     }

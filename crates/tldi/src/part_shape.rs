@@ -151,7 +151,8 @@ impl Shape {
         let rises = supports.roughness >= LEAST_RISE * params.pixel_size;
         let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
         let roughness = supports.roughness_about_bowl;
-        let below = |lowest: &ContactPoint| {
+        // How much lower than the lowest of the fitted points faces meet.
+        let lower = |lowest: &ContactPoint| {
             let frame = Frame {
                 origin: self.centre,
                 axes: [self.longest, self.normal.cross(self.longest)],
@@ -173,7 +174,7 @@ impl Shape {
             let relative_radii = radii.map(|radius| {
                 relative_radius(radius, self.centre, in_band().map(|(contact, _)| contact)).0
             });
-            let point = self.point(point.middle(), point.gap - below(&point));
+            let point = self.point(point.middle(), point.gap - lower(&point));
             let [u, v] = aside.map(|aside| slope_error * aside);
             let points = if slope_error > 0.0 {
                 let moved = |aside: Vec3| self.point(point.middle() + aside, point.gap);
@@ -244,9 +245,9 @@ impl Shape {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
         }
-        let below = below(&patch.points[0]);
+        let lower = lower(&patch.points[0]);
         for point in &mut patch.points {
-            *point = self.point(point.middle(), point.gap - below);
+            *point = self.point(point.middle(), point.gap - lower);
         }
         patch
     }
