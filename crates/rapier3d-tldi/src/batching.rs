@@ -9,6 +9,7 @@ use crate::prepared::{Batch, PairKey, PreparedPair};
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet};
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// All that a batch is made from.
@@ -71,6 +72,7 @@ impl<'a> Frame<'a> {
                 prediction,
                 parts: first_part..batch.parts.len(),
                 used: AtomicBool::new(false),
+                blocked: Mutex::default(),
                 is_kept: kept.is_some(),
                 measured: kept.or_else(|| Measured::new(&pair, self.config)),
                 shapes: [collider1, collider2].map(|c| c.shared_shape().clone()),
@@ -284,6 +286,7 @@ mod tests {
                 prediction: pair.prediction,
                 parts: 0..1,
                 used: AtomicBool::new(true),
+                blocked: Mutex::default(),
                 is_kept: false,
                 measured: None,
                 shapes: [shape.clone(), shape.clone()],

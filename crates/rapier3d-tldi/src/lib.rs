@@ -57,6 +57,7 @@ mod debug_render;
 mod dispatcher;
 mod error;
 mod exact;
+mod impulses;
 mod manifolds;
 mod mass;
 mod measured;

@@ -201,14 +201,16 @@ impl TldiPipeline {
         );
     }
 
-    /// Closes a step: what it did, and what failed inside it. Give it the narrow phase and the
-    /// colliders of the step.
+    /// Closes a step: what it did, and what failed inside it. Give it the sets of the step. Fast bodies
+    /// (`ccd_enabled`) that are in contact, and that a sweep held at a surface that no contact faces, lose the
+    /// velocity into it.
     ///
     /// # Errors
     /// [`TldiError::NotAttached`], and [`TldiError::OnTheSpot`] where comparisons inside the step
     /// failed.
     pub fn finish(
         &mut self,
+        bodies: &mut RigidBodySet,
         narrow_phase: &NarrowPhase,
         colliders: &ColliderSet,
     ) -> Result<StepReport, TldiError> {
@@ -227,6 +229,7 @@ impl TldiPipeline {
         };
         {
             let mut batch = self.shared.batch_mut();
+            batch.stop_blocked(bodies, colliders);
             (report.pairs_batched, report.pairs_kept) = batch.counts();
             report.contact_pixels += batch.contact_pixels();
             self.memory.update(self.search.candidates(), &batch);
@@ -282,7 +285,7 @@ impl TldiPipeline {
             &world.integration_parameters,
         );
         world.step_with_events(&self.hooks(hooks), events);
-        self.finish(&world.narrow_phase, &world.colliders)
+        self.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)
     }
 
     /// The contact points of all pairs with a cloud, as of the last step in which each pair was

@@ -3,6 +3,7 @@
 
 use crate::measured::{Measured, rolls};
 use crate::parts::{Hint, PartPair, ShapePair, append_part_pairs, append_queries, within_reach};
+use crate::sweeps::Blocked;
 use crate::{TldiConfig, TldiError};
 use rapier3d::geometry::{ColliderHandle, SharedShape};
 use rapier3d::math::Pose;
@@ -51,6 +52,8 @@ pub(crate) struct PreparedPair {
     pub(crate) parts: Range<usize>,
     /// Whether rapier asked for it and took this answer.
     pub(crate) used: AtomicBool,
+    /// Where a sweep held it in this step, though its contacts let it go on.
+    pub(crate) blocked: Mutex<Option<Blocked>>,
     /// It is not compared: the manifolds that rapier has are expected to hold.
     pub(crate) is_kept: bool,
     /// The measurement that this is, or the earlier one that holds.
@@ -290,7 +293,7 @@ impl Shared {
     }
 }
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -10,7 +10,7 @@
 use crate::exact::ExactShape;
 use crate::parts::{ShapePair, has_cloud, part, part_count, surface};
 use crate::prepared::Shared;
-use crate::sweeps::SweptPair;
+use crate::sweeps::{Blocked, SweptPair};
 use crate::{TldiConfig, queries};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::details::ShapeCastOptions;
@@ -39,6 +39,9 @@ const TOUCHING: f32 = 0.2;
 /// How far off in multiples of it surfaces are met that close by more than it in a piece of a motion that goes on: the
 /// next piece may measure them as touching already.
 const CLOSING: f32 = 1.5;
+
+/// Way in pixels within which a sweep of what is in contact holds it: contacts there are as uncertain.
+const BLOCKED: f32 = 1.0;
 
 /// Longest straight cast in pixels: what the images resolve in depth.
 const MAX_PIXELS: f32 = 131_072.0;
@@ -152,7 +155,26 @@ pub(crate) fn cast_shapes_nonlinear(
                 normal: from_1_to_2 * (motions[0].start.rotation.inverse() * found.normal),
                 ..found
             });
-            let hit = turning_impact(shared, &moving, &motions, penetration, (start, end));
+            let Some(params) = moving.params(&shared.config()) else {
+                return Ok(None);
+            };
+            let turning = Turning {
+                shared,
+                moving: &moving,
+                motions: &motions,
+                params,
+                penetration,
+                end,
+            };
+            let hit = turning.impact(start);
+            if let Some(hit) = hit.filter(|hit| turning.is_blocked(start, hit)) {
+                let world_from_a = motions[0].position_at_time(hit.time_of_impact);
+                let blocked = Blocked {
+                    point: world_from_a * hit.witness1,
+                    normal: from_1_to_2 * (world_from_a.rotation * hit.normal1),
+                };
+                shared.batch().block(&swept, blocked);
+            }
             return Ok(hit.map(|hit| moving.restore(hit)));
         }
         DefaultQueryDispatcher.cast_shapes_nonlinear(
@@ -262,39 +284,6 @@ fn straight_impact(
     is_in_time.then(|| hit_of(&impact, time, &moved))
 }
 
-/// The impact of two parts both of which may turn.
-fn turning_impact(
-    shared: &Shared,
-    moving: &Moving<'_>,
-    motions: &[NonlinearRigidMotion; 2],
-    penetration: Option<Penetration>,
-    (start, end): (f32, f32),
-) -> Option<ShapeCastHit> {
-    let params = moving.params(&shared.config())?;
-    let turning = Turning {
-        shared,
-        moving,
-        motions,
-        params,
-        penetration,
-        end,
-    };
-    let fine = MAX_DISPLACEMENT * params.pixel_size;
-    let mut whole = turning.pieces(start, end, fine);
-    if whole.len() == 1 {
-        return whole.find_map(|piece| turning.met_by_moving(piece));
-    }
-    let coarse = fine.max(SLOW * moving.parts[1].ccd_thickness());
-    turning.pieces(start, end, coarse).find_map(|piece| {
-        let hit = turning.hit_in(piece)?;
-        let mut finer = turning.pieces(piece.from, piece.to, fine);
-        if finer.len() == 1 {
-            return Some(hit);
-        }
-        finer.find_map(|piece| turning.hit_in(piece))
-    })
-}
-
 /// The motion of two parts both of which may turn.
 struct Turning<'a> {
     shared: &'a Shared,
@@ -356,6 +345,31 @@ impl Turning<'_> {
             to: time_at(piece + 1),
             displacement: turned / count,
         })
+    }
+
+    /// The impact.
+    fn impact(&self, start: f32) -> Option<ShapeCastHit> {
+        let fine = MAX_DISPLACEMENT * self.params.pixel_size;
+        let mut whole = self.pieces(start, self.end, fine);
+        if whole.len() == 1 {
+            return whole.find_map(|piece| self.met_by_moving(piece));
+        }
+        let coarse = fine.max(SLOW * self.moving.parts[1].ccd_thickness());
+        self.pieces(start, self.end, coarse).find_map(|piece| {
+            let hit = self.hit_in(piece)?;
+            let mut finer = self.pieces(piece.from, piece.to, fine);
+            if finer.len() == 1 {
+                return Some(hit);
+            }
+            finer.find_map(|piece| self.hit_in(piece))
+        })
+    }
+
+    /// Whether what is already in contact is held there.
+    fn is_blocked(&self, start: f32, hit: &ShapeCastHit) -> bool {
+        let middle = self.moving.parts[1].compute_local_aabb().center();
+        let [before, after] = [start, hit.time_of_impact].map(|t| self.a_from_b(t, t) * middle);
+        self.penetration.is_some() && before.distance(after) <= BLOCKED * self.params.pixel_size
     }
 
     /// What is met first in a piece.

@@ -232,3 +232,59 @@ fn what_is_in_a_sheet_leaves_it() -> TestResult {
     }
     Ok(())
 }
+
+/// Boxes that are up to 1.5 radii deep in waves and fly at random. What flies against a slope that none of
+/// its contacts faces is stopped by it, not held by a sweep in step after step with its speed kept.
+#[test]
+fn what_a_slope_holds_loses_its_speed_into_it() -> TestResult {
+    const RADIUS: f32 = 0.1;
+    let height = |x: f32, z: f32| {
+        let phase = |along: f32| along * std::f32::consts::TAU / (14.0 * RADIUS);
+        2.0 * RADIUS * phase(x).sin() * phase(z).cos()
+    };
+    let mut rng = fastrand::Rng::with_seed(1);
+    let mut sample = |k: i32| RADIUS * (k as f32 - 30.25 + 0.5 * rng.f32());
+    let waves = (0..61 * 61).map(|k| {
+        let (x, z) = (sample(k / 61), sample(k % 61));
+        Vector::new(x, height(x, z), z)
+    });
+    let waves = PointCloud::builder(waves.collect::<Vec<_>>())
+        .radius(RADIUS)
+        .build()?;
+    let waves = PointCloudShape::new(waves);
+    let cube = shape(&cube(1.45 * RADIUS));
+    for seed in 0..200 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let mut coordinate = || rng.f32() - 0.5;
+        let mut vector = || Vector::new(coordinate(), coordinate(), coordinate());
+        let (mut world, mut tldi) = attached();
+        world.gravity = Vector::ZERO;
+        world.insert(RigidBodyBuilder::fixed(), cloud_collider(waves.clone()));
+        let at = 14.0 * RADIUS * vector();
+        let flying = RigidBodyBuilder::dynamic()
+            .translation(at.with_y(height(at.x, at.z) + 2.3 * RADIUS))
+            .rotation(6.0 * vector())
+            .ccd_enabled(true);
+        let (body, _) = world.insert(flying, cloud_collider(cube.clone()));
+        tldi.step(&mut world)?; // it is seen where it comes from
+        let flying = &mut world.bodies[body];
+        let down = (1.0 + vector().x) * RADIUS;
+        flying.set_translation(flying.translation() - down * Vector::Y, true);
+        flying.set_linvel(200.0 * vector(), true);
+        let mut held = 0;
+        for step in 1..=8 {
+            let before = world.bodies[body].translation();
+            tldi.step(&mut world)?;
+            let body = &world.bodies[body];
+            let free = body.linvel().length() * world.integration_parameters.dt;
+            let is_held = body.translation().distance(before) < 0.05 * free;
+            held = if is_held && free > 0.5 * RADIUS {
+                held + 1
+            } else {
+                0
+            };
+            assert!(held < 3, "seed {seed}, step {step}: {:?}", body.linvel());
+        }
+    }
+    Ok(())
+}

@@ -61,7 +61,7 @@ fn teleport_after_the_batch_is_a_miss() -> TestResult {
     )?;
     world.bodies[body].set_translation(Vector::new(0.1, HALF - 0.002, 0.0), true);
     world.step();
-    let report = tldi.finish(&world.narrow_phase, &world.colliders)?;
+    let report = tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
     assert_eq!((report.pairs_batched, report.pairs_missed), (1, 1));
     assert_eq!(report.pairs_in_contact, 1);
     assert!(report.contact_pixels > 0);
@@ -80,7 +80,7 @@ fn plain_rapier_step_works_too() -> TestResult {
         world.step();
     }
     assert!((world.bodies[body].translation().y - HALF).abs() < REST_TOLERANCE);
-    let report = tldi.finish(&world.narrow_phase, &world.colliders)?;
+    let report = tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
     assert_eq!(report.pairs_batched, 0);
     assert!(report.pairs_missed > 0);
     Ok(())

@@ -48,7 +48,7 @@ fn error_on_the_spot_is_kept() -> TestResult {
     let (body, _) = world.insert(dynamic_at(0.1), ColliderBuilder::ball(0.1));
     world.step();
     world.step();
-    match tldi.finish(&world.narrow_phase, &world.colliders) {
+    match tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders) {
         Err(TldiError::OnTheSpot { count: 2, .. }) => {}
         other => return Err(format!("{other:?}").into()),
     }
@@ -67,7 +67,7 @@ fn detached_world_is_refused() -> TestResult {
     other.attach(&mut world);
     assert_eq!(tldi.step(&mut world).err(), Some(TldiError::NotAttached));
     assert_eq!(world.bodies[body].translation().y, 1.0, "not stepped");
-    let finished = tldi.finish(&world.narrow_phase, &world.colliders);
+    let finished = tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders);
     assert_eq!(finished.err(), Some(TldiError::NotAttached));
     tldi.attach(&mut world);
     tldi.step(&mut world)?;

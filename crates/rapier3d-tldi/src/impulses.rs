@@ -1,0 +1,99 @@
+//! Impulses outside of rapier's solver: bodies that have to separate at points.
+
+use rapier3d::dynamics::{RigidBodyHandle, RigidBodySet, RigidBodyVelocity};
+use rapier3d::math::Vector;
+
+/// Rounds over all points: a box on four corners has come to 1 % of the velocity asked for.
+const ROUNDS: usize = 10;
+
+/// A point in which bodies have to separate.
+pub(crate) struct PushedPoint {
+    pub(crate) bodies: [Option<RigidBodyHandle>; 2],
+    /// In world space, metres.
+    pub(crate) point: Vector,
+    /// Unit normal from the first body towards the second.
+    pub(crate) normal: Vector,
+    /// Speed at which the bodies have to separate there, m/s.
+    pub(crate) speed: f32,
+    /// So far, Ns.
+    pub(crate) impulse: f32,
+}
+
+/// Velocity that a unit of impulse along `normal` at `point` gives to a body.
+fn velocity_per_impulse(
+    bodies: &RigidBodySet,
+    body: Option<RigidBodyHandle>,
+    point: Vector,
+    normal: Vector,
+) -> RigidBodyVelocity<f32> {
+    let body = body.and_then(|body| bodies.get(body));
+    let Some(body) = body.filter(|body| body.is_dynamic()) else {
+        return RigidBodyVelocity::zero();
+    };
+    let mass = body.mass_properties();
+    let arm = point - body.center_of_mass();
+    RigidBodyVelocity {
+        linvel: mass.effective_inv_mass * normal,
+        angvel: mass.effective_world_inv_inertia * arm.cross(normal),
+    }
+}
+
+/// Velocity of a body at `point`, m/s.
+pub(crate) fn velocity_at(
+    bodies: &RigidBodySet,
+    body: Option<RigidBodyHandle>,
+    point: Vector,
+) -> Vector {
+    let body = body.and_then(|body| bodies.get(body));
+    body.map_or(Vector::ZERO, |body| body.velocity_at_point(point))
+}
+
+/// Gives the bodies of all points the velocities that separate them there, where nothing else does.
+pub(crate) fn separate(points: &mut [PushedPoint], bodies: &mut RigidBodySet) {
+    for _ in 0..ROUNDS {
+        for point in &mut *points {
+            point.solve(bodies);
+        }
+    }
+}
+
+impl PushedPoint {
+    /// Raises the speed at which the bodies separate to what it has to be, or takes back what other
+    /// points made needless.
+    fn solve(&mut self, bodies: &mut RigidBodySet) {
+        let [first, second] = self.bodies;
+        let separating = (velocity_at(bodies, second, self.point)
+            - velocity_at(bodies, first, self.point))
+        .dot(self.normal);
+        let gained = self
+            .bodies
+            .map(|body| velocity_per_impulse(bodies, body, self.point, self.normal));
+        let mobility: f32 = self
+            .bodies
+            .iter()
+            .zip(&gained)
+            .filter_map(|(body, gained)| {
+                let com = bodies.get((*body)?)?.center_of_mass();
+                Some(gained.velocity_at_point(self.point, com).dot(self.normal))
+            })
+            .sum();
+        if mobility <= 0.0 {
+            return;
+        }
+        let impulse = (self.impulse + (self.speed - separating) / mobility).max(0.0);
+        let change = impulse - self.impulse;
+        self.impulse = impulse;
+        if change == 0.0 {
+            return;
+        }
+        for ((body, gained), sign) in self.bodies.iter().zip(gained).zip([-1.0, 1.0]) {
+            let body = body.and_then(|body| bodies.get_mut(body));
+            if let Some(body) = body.filter(|body| body.is_dynamic()) {
+                let linvel = body.linvel() + sign * change * gained.linvel;
+                let angvel = body.angvel() + sign * change * gained.angvel;
+                body.set_linvel(linvel, true);
+                body.set_angvel(angvel, true);
+            }
+        }
+    }
+}
