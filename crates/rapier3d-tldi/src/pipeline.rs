@@ -202,7 +202,7 @@ impl TldiPipeline {
     }
 
     /// Closes a step: what it did, and what failed inside it. Give it the sets of the step. Fast bodies
-    /// (`ccd_enabled`) that are in contact, and that a sweep held at a surface that no contact faces, lose the
+    /// that are deep in contact, and that a sweep (CCD) held at a surface which no contact faces, lose the
     /// velocity into it.
     ///
     /// # Errors

@@ -43,6 +43,9 @@ const CLOSING: f32 = 1.5;
 /// Way in pixels within which a sweep of what is in contact holds it: contacts there are as uncertain.
 const BLOCKED: f32 = 1.0;
 
+/// Depth in pixels from which on a pair is deep in contact: what slides over noise is not.
+const DEEP: f32 = 0.5;
+
 /// Longest straight cast in pixels: what the images resolve in depth.
 const MAX_PIXELS: f32 = 131_072.0;
 
@@ -365,11 +368,13 @@ impl Turning<'_> {
         })
     }
 
-    /// Whether what is already in contact is held there.
+    /// Whether what is deep in contact is held there.
     fn is_blocked(&self, start: f32, hit: &ShapeCastHit) -> bool {
         let middle = self.moving.parts[1].compute_local_aabb().center();
-        let [before, after] = [start, hit.time_of_impact].map(|t| self.a_from_b(t, t) * middle);
-        self.penetration.is_some() && before.distance(after) <= BLOCKED * self.params.pixel_size
+        let [before, held] = [start, hit.time_of_impact].map(|t| self.a_from_b(t, t) * middle);
+        let pixel = self.params.pixel_size;
+        let is_deep = self.penetration.is_some_and(|p| p.depth > DEEP * pixel);
+        is_deep && hit.time_of_impact < self.end && before.distance(held) <= BLOCKED * pixel
     }
 
     /// What is met first in a piece.
