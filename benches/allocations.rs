@@ -75,7 +75,7 @@ fn main() -> anyhow::Result<()> {
 /// Allocations in a round of frames: for new points, and for comparing.
 fn settled(args: &Args, placement: Placement) -> anyhow::Result<[usize; 2]> {
     let source = Source::Generated(args.points);
-    let radius = source.radius()?;
+    let radius = source.radius(placement)?;
     let frames: Vec<[Vec<Vec3>; 2]> = (0..FRAMES)
         .map(|number| source.bodies(placement, radius, args.seed + number))
         .collect();

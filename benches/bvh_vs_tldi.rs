@@ -128,7 +128,7 @@ fn measure(
     placement: Placement,
     methods: &mut Vec<Measured>,
 ) -> anyhow::Result<Vec<FrameRow>> {
-    let radius = source.radius()?;
+    let radius = source.radius(placement)?;
     let mut found: Vec<Vec<Found>> = vec![Vec::new(); methods.len()];
     let mut peaks = vec![0.0f64; methods.len()];
     let mut floors = Vec::new();

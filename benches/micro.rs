@@ -20,8 +20,12 @@ const POINTS: [usize; 2] = [10_000, 100_000];
 
 fn body(points: usize) -> (Vec<Vec3>, f32) {
     let source = Source::Generated(points);
-    let radius = source.radius().expect("a generated body has a radius");
-    (source.points(1), radius)
+    (source.points(1), radius_of(&source, Placement::Coincident))
+}
+
+fn radius_of(source: &Source, placement: Placement) -> f32 {
+    let radius = source.radius(placement);
+    radius.expect("a generated body has a radius")
 }
 
 fn cloud_of(points: &[Vec3], radius: f32) -> PointCloud<'static> {
@@ -92,9 +96,10 @@ fn comparisons(criterion: &mut Criterion) {
     for count in POINTS {
         let (points, radius) = body(count);
         for placement in Placement::ALL {
-            let [a, b] = Source::Generated(count)
-                .bodies(placement, radius, 1)
-                .map(|points| cloud_of(&points, radius));
+            let source = Source::Generated(count);
+            let radius = radius_of(&source, placement);
+            let bodies = source.bodies(placement, radius, 1);
+            let [a, b] = bodies.map(|points| cloud_of(&points, radius));
             let query = query(Surface::Cloud(&a), &b, Pose3::IDENTITY, radius);
             group.bench_function(BenchmarkId::new(placement.name(), count), |bench| {
                 bench.iter(|| compare(query));

@@ -80,8 +80,11 @@ impl Source<'_> {
         }
     }
 
-    /// Mean radius of the points, metres.
-    pub fn radius(&self) -> Result<f32, CloudError> {
+    /// Mean radius of the points of both bodies, metres.
+    pub fn radius(&self, placement: Placement) -> Result<f32, CloudError> {
+        if placement == Placement::BodyOnScan {
+            return Ok(covering_radius(self.count(), SHEET_EDGE * SHEET_EDGE));
+        }
         Ok(match self {
             Self::Generated(count) => covering_radius(*count, 4.0 * PI),
             Self::Sampled(..) | Self::Vertices(_) => {
@@ -217,8 +220,8 @@ mod tests {
             Source::Sampled(&cloud, 5_000),
             Source::Vertices(&model),
         ] {
-            let radius = source.radius().expect("the points are finite");
             for placement in Placement::ALL {
+                let radius = source.radius(placement).expect("the points are finite");
                 let expected = placement != Placement::NearMiss;
                 assert_eq!(
                     touches(&source, placement, radius),
@@ -228,12 +231,34 @@ mod tests {
                     placement.name()
                 );
             }
-            let first = source.bodies(Placement::Deep, radius, 1);
-            let again = source.bodies(Placement::Deep, radius, 1);
-            let next = source.bodies(Placement::Deep, radius, 2);
+            let [first, again, next] = [1, 1, 2].map(|seed| {
+                // Its radius only decides on how far apart bodies nearly miss each other.
+                source.bodies(Placement::Deep, 0.0, seed)
+            });
             assert_eq!(first, again);
             assert!(first[0][0] != next[0][0] && first[0][0] != first[1][0]);
             assert_eq!(first[0].len(), source.count());
+        }
+    }
+
+    /// Balls that peers are given are as large as the points of both bodies are apart.
+    #[test]
+    fn radii_are_those_of_the_points() {
+        let source = Source::Generated(20_000);
+        for placement in Placement::ALL {
+            let radius = source.radius(placement).expect("the points are finite");
+            for points in source.bodies(placement, radius, 1) {
+                let cloud = PointCloud::builder(points).knn_radii(7, 0.65).build();
+                let of_neighbours = cloud.expect("the points are finite").mean_radius();
+                // Of the radius that holds 8 random points on average, that to the 7th neighbour is
+                // Γ(7.5) / Γ(7) / √8 on average; bumps have a little more area.
+                let share = of_neighbours / radius;
+                assert!(
+                    (share - 0.919).abs() < 0.02,
+                    "{}: {share}",
+                    placement.name()
+                );
+            }
         }
     }
 
