@@ -37,8 +37,8 @@ pub enum Resolution {
     /// An edge of so many mean radii of the pair's coarser cloud, greater than 0. 1 resolves the
     /// most that the points tell.
     Radii(f32),
-    /// An error budget in metres, greater than 0. Gaps err by about a pixel at the corners of what
-    /// touches, and elsewhere by less: pixels of this edge, but not smaller than a mean radius, nor
+    /// An error budget in metres, greater than 0. Gaps err by less than a pixel, at the corners of what
+    /// touches the most: pixels of this edge, but not smaller than a mean radius, nor
     /// between 1.5 and the 4.1 radii from which on only a part of the points is looked at, which
     /// cost more than 1.5.
     Error(f32),
