@@ -38,6 +38,9 @@ struct Args {
     /// Frames that each is measured; medians are told
     #[arg(long, value_name = "N", default_value_t = 5)]
     repeats: usize,
+    /// Only these placements, several by commas: near-miss, slight, deep, coincident, body on scan
+    #[arg(long, value_name = "NAME,NAME", value_delimiter = ',', value_parser = Placement::named)]
+    placement: Vec<Placement>,
     #[command(flatten)]
     names: NameArgs,
     /// Measure our method on this backend too
@@ -70,7 +73,9 @@ fn main() -> anyhow::Result<()> {
     let mut provenance = Provenance::now(None);
     let mut rows = Vec::new();
     for source in sources(&args, model.as_ref()) {
-        for placement in Placement::ALL {
+        let is_asked =
+            |placement: &Placement| args.placement.is_empty() || args.placement.contains(placement);
+        for placement in Placement::ALL.into_iter().filter(is_asked) {
             let mut methods = methods(&args)?;
             let measured = measure(&args, &source, placement, &mut methods)?;
             print(&measured);

@@ -42,6 +42,12 @@ impl Placement {
         }
     }
 
+    /// The one of that name.
+    pub fn named(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|p| p.name() == name);
+        found.ok_or_else(|| format!("there is no placement {name:?}"))
+    }
+
     /// Distance of the bodies' middles along x, in their widths; and by how many radii more.
     fn offset(self) -> [f32; 2] {
         match self {

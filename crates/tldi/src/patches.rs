@@ -100,6 +100,15 @@ impl PatchScratch {
         allow_for_noise(result, fitted.reduce(f32::min), query);
     }
 
+    /// [`reduce`](Self::reduce) of the contact pixels of a first look, in which nothing stands alone.
+    pub(crate) fn reduce_coarse(&mut self, result: &mut PairResult, query: &PairQuery) {
+        self.link(result, &query.params);
+        let tells_inside = query.a.is_oriented() || query.b.is_oriented();
+        self.reduce_linked(result, &query.params, tells_inside);
+        let fitted = self.smooth.iter().map(|pixel| pixel.gap);
+        allow_for_noise(result, fitted.reduce(f32::min), query);
+    }
+
     fn link(&mut self, result: &mut PairResult, params: &Params) {
         order(&mut result.contacts);
         drop_between_faces(result);

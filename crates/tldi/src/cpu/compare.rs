@@ -56,6 +56,17 @@ pub(crate) struct Seen<'a> {
     pub(crate) from_behind: [bool; 2],
 }
 
+impl Seen<'_> {
+    /// Axes of the other views, in the frame of this one's `camera`.
+    pub(super) fn others(&self, camera: &VirtualCamera) -> ArrayVec<Vec3, MAX_VIEWS> {
+        let axes = self.axes.iter().enumerate();
+        let others = axes.filter(|(k, _)| *k != self.view);
+        others
+            .map(|(_, axis)| camera.view_from_frame.rotation * *axis)
+            .collect()
+    }
+}
+
 /// Adds what a view sees of crossings to `crossings`, and of contacts, if it is one of the result's
 /// views, to `result`. Both images have the same camera and rectangle.
 pub(crate) fn compare(
@@ -69,12 +80,7 @@ pub(crate) fn compare(
     debug_assert_eq!((a.origin, a.size), (b.origin, b.size));
     let [width, height] = a.size;
     let frame_from_view = a.camera.view_from_frame.inverse();
-    let mut others = ArrayVec::<Vec3, MAX_VIEWS>::new();
-    for (k, axis) in seen.axes.iter().enumerate() {
-        if k != seen.view {
-            others.push(a.camera.view_from_frame.rotation * *axis);
-        }
-    }
+    let others = seen.others(&a.camera);
     for j in 0..height {
         for i in 0..width {
             let k = (j * width + i) as usize;
@@ -83,8 +89,10 @@ pub(crate) fn compare(
                 continue;
             }
             if !crossings.are_enough() {
-                let swap =
-                    |k: usize| swaps(la, lb, a.layers_of(k), b.layers_of(k), &others, params);
+                let swap = |k: usize| {
+                    swap_depth([la, lb], [a.layers_of(k), b.layers_of(k)], &others, params)
+                        .is_some()
+                };
                 crossings.0 += PIERCED * u32::from(pierces(a, b, [i, j], params))
                     + SWAPPED * u32::from(i + 1 < width && swap(k + 1))
                     + SWAPPED * u32::from(j + 1 < height && swap(k + width as usize));
@@ -117,15 +125,14 @@ fn best_seen(normal: Vec3, others: &[Vec3]) -> bool {
         .all(|axis| axis.dot(normal).abs() <= normal.z.abs())
 }
 
-/// Whether a layer of `a` and one of `b` swap their order between two neighbouring pixels, or coincide.
-fn swaps(
-    a: &[Layer],
-    b: &[Layer],
-    a_next: &[Layer],
-    b_next: &[Layer],
+/// Depth, metres, at which a layer of the first surface and one of the second swap their order between two
+/// neighbouring pixels, or coincide.
+pub(super) fn swap_depth(
+    [a, b]: [&[Layer]; 2],
+    [a_next, b_next]: [&[Layer]; 2],
     others: &[Vec3],
     params: &Params,
-) -> bool {
+) -> Option<f32> {
     let continuous = |from: &Layer, to: &[Layer]| {
         let next = to
             .iter()
@@ -137,7 +144,7 @@ fn swaps(
             })?;
         ((next.depth - from.depth).abs() <= params.thickness).then_some(next.depth)
     };
-    a.iter().filter(|l| !is_edge_on(l)).any(|la| {
+    let swaps = |la: &&Layer| {
         continuous(la, a_next).is_some_and(|na| {
             b.iter().filter(|l| !is_edge_on(l)).any(|lb| {
                 (la.depth - lb.depth).abs() <= 2.0 * params.thickness
@@ -146,7 +153,9 @@ fn swaps(
                         .is_some_and(|nb| (la.depth - lb.depth) * (na - nb) <= 0.0)
             })
         })
-    })
+    };
+    let mut seen = a.iter().filter(|l| !is_edge_on(l));
+    seen.find(swaps).map(|layer| layer.depth)
 }
 
 /// Whether a layer of one lies well within a thick layer of the other, a wall seen edge-on to which it is

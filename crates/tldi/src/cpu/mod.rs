@@ -6,6 +6,8 @@
 //! makes their inner loops SIMD. `impact` compares the images of a motion.
 
 mod cast;
+mod cells;
+mod coarse;
 pub(crate) mod columns;
 pub(crate) mod compare;
 pub(crate) mod cull;

@@ -1,5 +1,6 @@
 //! The stages of one pair, in order.
 
+use super::coarse::Window;
 use super::columns::{Tiles, Touching};
 use super::compare::{self, Crossings, Middles, Seen};
 use super::cull;
@@ -10,7 +11,7 @@ use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneGrid, ZoneScratch};
 use crate::camera_policy::{MAX_VIEWS, ZoneNormals, aim, further_axes, seen_from_behind};
 use crate::patches::PatchScratch;
-use crate::plan::{PairPlan, SidePlan, stride};
+use crate::plan::{Approach, PairPlan, SidePlan, stride};
 use crate::{
     CameraPolicy, PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper,
 };
@@ -29,7 +30,9 @@ pub(super) struct Scratch {
     pub(super) touching: Touching,
     crossings: Crossings,
     paper: [paper::Scratch; 2],
-    patches: PatchScratch,
+    pub(super) patches: PatchScratch,
+    /// Of the first look.
+    pub(super) windows: Vec<Window>,
 }
 
 impl Scratch {
@@ -43,7 +46,12 @@ impl Scratch {
         let Some(plan) = PairPlan::new(query) else {
             return;
         };
-        if !self.cull(query, &plan) || !self.zone(query, &plan) {
+        if self.settle(query, &plan, result) {
+            return;
+        }
+        let pixel = query.params.pixel_size;
+        let strides = [query.a, query.b].map(|surface| stride(surface.mean_radius(), pixel));
+        if !self.cull(query, &plan, strides) || !self.zone(query, &plan) {
             return;
         }
         self.crossings = Crossings::default();
@@ -53,11 +61,7 @@ impl Scratch {
                 self.look(query, &plan, &camera, &[camera.axis()], 0, result);
             }
             View::Aim { policy, .. } => {
-                let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| {
-                    let is_cloud = matches!(surface, Surface::Cloud(_));
-                    (is_cloud && !surface.is_oriented()).then(|| side.mean_of_near())
-                });
-                let approach = plan.approach.at_sheet(near);
+                let approach = self.approach(query, &plan);
                 let normals = self.zone_normals(query);
                 aim(policy, normals, &approach, &mut result.axes);
                 if query.params.variant() == Variant::Paper {
@@ -119,11 +123,10 @@ impl Scratch {
         result.gap = found.gap;
     }
 
-    /// Fills both sides' culled points; `false` where a cloud has no point in reach.
-    fn cull(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
-        let cull = |side: &mut Side, surface: Surface, plan: &SidePlan| {
+    /// Fills both sides' culled points, every so many of theirs; `false` where a cloud has no point in reach.
+    pub(super) fn cull(&mut self, query: &PairQuery, plan: &PairPlan, strides: [usize; 2]) -> bool {
+        let cull = |side: &mut Side, surface: Surface, plan: &SidePlan, stride| {
             if let Surface::Cloud(cloud) = surface {
-                let stride = stride(cloud.mean_radius(), query.params.pixel_size);
                 let frame = &plan.frame_from_surface;
                 let Side { cull, points, .. } = side;
                 cull::cull(cloud, frame, &plan.region, stride, cull, points);
@@ -135,13 +138,15 @@ impl Scratch {
         };
         let (a, b) = (&mut self.a, &mut self.b);
         let [plan_a, plan_b] = &plan.sides;
-        let (is_near_a, is_near_b) =
-            rayon::join(|| cull(a, query.a, plan_a), || cull(b, query.b, plan_b));
+        let (is_near_a, is_near_b) = rayon::join(
+            || cull(a, query.a, plan_a, strides[0]),
+            || cull(b, query.b, plan_b, strides[1]),
+        );
         is_near_a && is_near_b
     }
 
     /// Finds the near points of both sides and their normals; `false` where nothing is near.
-    fn zone(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
+    pub(super) fn zone(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
         let reach = plan.zone_reach;
         match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
@@ -185,7 +190,37 @@ impl Scratch {
         }
     }
 
-    fn zone_normals(&self, query: &PairQuery) -> [ZoneNormals<'_>; 2] {
+    /// What is known of where the second surface lies, of bare clouds by their near points as well.
+    pub(super) fn approach(&self, query: &PairQuery, plan: &PairPlan) -> Approach {
+        let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| {
+            let is_cloud = matches!(surface, Surface::Cloud(_));
+            (is_cloud && !surface.is_oriented()).then(|| side.mean_of_near())
+        });
+        plan.approach.at_sheet(near)
+    }
+
+    /// What is known of a view beside its images.
+    pub(super) fn seen<'a>(
+        &self,
+        query: &PairQuery,
+        plan: &PairPlan,
+        camera: &VirtualCamera,
+        axes: &'a [Vec3],
+        view: usize,
+    ) -> Seen<'a> {
+        let depth = |side: &SidePlan| side.middle.map(|middle| camera.view_from_point(middle).z);
+        Seen {
+            axes,
+            view,
+            middles: Middles {
+                a: depth(&plan.sides[0]),
+                b: depth(&plan.sides[1]),
+            },
+            from_behind: seen_from_behind(camera.axis(), &self.zone_normals(query)),
+        }
+    }
+
+    pub(super) fn zone_normals(&self, query: &PairQuery) -> [ZoneNormals<'_>; 2] {
         [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| ZoneNormals {
             normals: &side.near_normals,
             oriented: surface.is_oriented(),
@@ -253,20 +288,10 @@ impl Scratch {
         if looked.is_none() {
             return;
         }
-        let depth = |side: &SidePlan| side.middle.map(|middle| camera.view_from_point(middle).z);
-        let from_behind = seen_from_behind(camera.axis(), &self.zone_normals(query));
         compare::compare(
             &self.a.image,
             &self.b.image,
-            &Seen {
-                axes,
-                view,
-                middles: Middles {
-                    a: depth(&plan.sides[0]),
-                    b: depth(&plan.sides[1]),
-                },
-                from_behind,
-            },
+            &self.seen(query, plan, camera, axes, view),
             &query.params,
             &mut self.crossings,
             result,

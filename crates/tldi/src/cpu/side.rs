@@ -1,6 +1,7 @@
 //! One cloud of a pair: its culled points, their normals and its image.
 
 use super::cast::{self, Rays};
+use super::cells::{CellImaging, Cells};
 use super::columns::{Columns, Tiles, Touching};
 use super::cull::{CullScratch, PointRadii, Survivors};
 use super::impact::BORDER;
@@ -31,6 +32,7 @@ pub(super) struct Side {
     pub(super) support: Vec<u32>,
     pub(super) normals: NormalScratch,
     fragments: Fragments,
+    cells: Cells,
     pub(super) cell_distances: CellDistances,
     /// Greatest depth of a sampled point inside an exact surface, metres.
     pub(super) deepest: f32,
@@ -211,6 +213,20 @@ impl Side {
                 &mut self.image,
             );
         }
+    }
+
+    /// The image of the points that were projected, from their sums.
+    pub(super) fn image_of_cells(&mut self, view: &CloudView, imaging: &CellImaging) {
+        let along = imaging.camera.view_from_frame.rotation * view.frame_from_cloud.rotation;
+        let along = along.inverse() * Vec3::Z;
+        let given = view.cloud.normals().filter(|_| view.oriented());
+        let index = &self.points.index;
+        let is_exit = given.map(|given| move |i: usize| given[index[i] as usize].dot(along) > 0.0);
+        let exits = is_exit
+            .as_ref()
+            .map(|exits| exits as &dyn Fn(usize) -> bool);
+        self.cells
+            .image(&self.columns, exits, imaging, &mut self.image);
     }
 
     /// Fills `kept` and `kept_normals`.

@@ -1,0 +1,380 @@
+//! Stage `cells`: layers of large pixels from the sums of the points in them.
+//!
+//! A *cell* is what lies in one pixel at one depth: points that follow each other in depth within
+//! [`MERGED`] of a pixel. It keeps their number, the sums of their coordinates and of their products.
+//! Sums of neighbouring cells add up, and the plane that fits them best gives the layer: no search for
+//! neighbours, no normals of points, no splats. Sums are integers: they do not depend on the order of
+//! the points.
+
+use super::columns::Columns;
+use super::rect::Rect;
+use crate::{Facing, Layer, Tldi, VirtualCamera};
+use glamx::Vec3;
+use std::ops::Range;
+
+/// Points of a pixel whose depths follow each other by no more than this are in one cell, in pixels. Half
+/// as much tears surfaces apart that are seen at 45°; twice as much merges the two sides of what is
+/// thinner than a pixel.
+const MERGED: f32 = 0.6;
+
+/// Steps of a coordinate in a pixel: the error of a depth is far below that of its plane.
+const STEPS: f32 = 256.0;
+
+/// Least points of a cell and its neighbours: three tell a plane. Fewer stand alone.
+const LEAST_POINTS: f32 = 3.0;
+
+/// Share of the squared spread of the points over the pixels that they must have across their main
+/// direction to tell a plane; of those on a line the mean depth is all that is known.
+const LEAST_SPREAD: f32 = 1e-2;
+
+/// Standard deviation, in pixels, up to which a cell and its neighbours are on a plane. A sphere of a
+/// radius of 25 pixels has 0.02.
+const ON_PLANE: f32 = 0.1;
+
+/// Standard deviation, in pixels, up to which a plane is one that neighbours adopt.
+const FLAT: f32 = 0.05;
+
+/// The points and cells of an image, kept from call to call.
+#[derive(Default)]
+pub(super) struct Cells {
+    pixels: Vec<u32>,
+    /// First point of each pixel; one entry more than pixels.
+    starts: Vec<u32>,
+    points: Vec<Point>,
+    /// First cell of each pixel; one entry more than pixels.
+    firsts: Vec<u32>,
+    cells: Vec<Cell>,
+    planes: Vec<Plane>,
+}
+
+/// Where a point is in its pixel, in [`STEPS`].
+#[derive(Clone, Copy, Default)]
+struct Point {
+    /// Depth; above it whether the ray leaves the body there.
+    key: u32,
+    /// From the middle of the pixel.
+    aside: [i16; 2],
+}
+
+/// Bit of a key that tells exits from what else there is.
+const EXIT: u32 = 1 << 31;
+
+/// Greatest depth in steps: four million pixels, and no sum of two overflows.
+const DEEPEST: u32 = 1 << 30;
+
+/// Points of a pixel that follow each other in depth.
+#[derive(Clone, Copy)]
+struct Cell {
+    /// [`EXIT`] or 0.
+    class: u32,
+    /// Least, greatest and mean depth.
+    near: i32,
+    far: i32,
+    middle: i32,
+    /// From the middle of the pixel and the mean depth.
+    sums: Sums,
+}
+
+/// Sums over points, of 1, x, y, z, xx, xy, xz, yy, yz and zz.
+type Sums = [f32; 10];
+
+/// Sums of points that are moved by [x, y, z].
+#[inline(always)]
+fn moved(sums: &Sums, [x, y, z]: [f32; 3]) -> Sums {
+    let [n, sx, sy, sz, xx, xy, xz, yy, yz, zz] = *sums;
+    [
+        n,
+        sx + n * x,
+        sy + n * y,
+        sz + n * z,
+        xx + x * (2.0 * sx + n * x),
+        xy + x * sy + y * (sx + n * x),
+        xz + x * sz + z * (sx + n * x),
+        yy + y * (2.0 * sy + n * y),
+        yz + y * sz + z * (sy + n * y),
+        zz + z * (2.0 * sz + n * z),
+    ]
+}
+
+/// A plane through a cell, in [`STEPS`].
+#[derive(Clone, Copy)]
+struct Plane {
+    /// Rise of the depth along columns and rows.
+    slope: [f32; 2],
+    /// Depth at the middle of the pixel, from the cell's mean depth.
+    above: f32,
+    /// Mean square of what the points of the cell and its neighbours are beside it; infinite where they
+    /// are too few.
+    variance: f32,
+}
+
+impl Plane {
+    /// Of a cell with sums `own`, as steep as fits `all` best, those of its neighbours included.
+    fn of(own: &Sums, all: &Sums) -> Self {
+        let [n, x, y, z, xx, xy, xz, yy, yz, zz] = *all;
+        let [x, y, z] = [x, y, z].map(|sum| sum / n);
+        let (xx, xy, yy) = (xx / n - x * x, xy / n - x * y, yy / n - y * y);
+        let (xz, yz, zz) = (xz / n - x * z, yz / n - y * z, zz / n - z * z);
+        let determinant = xx * yy - xy * xy;
+        let slope = match determinant > LEAST_SPREAD * (xx + yy).powi(2) {
+            true => [
+                (xz * yy - yz * xy) / determinant,
+                (yz * xx - xz * xy) / determinant,
+            ],
+            false => [0.0; 2],
+        };
+        // Through its own points: those around it lie beside the plane where the surface bends.
+        let [own_n, own_x, own_y, own_z, ..] = *own;
+        Self {
+            slope,
+            above: (own_z - slope[0] * own_x - slope[1] * own_y) / own_n,
+            variance: match n < LEAST_POINTS {
+                true => f32::INFINITY,
+                false => (zz - slope[0] * xz - slope[1] * yz).max(0.0),
+            },
+        }
+    }
+}
+
+/// How an image of cells is taken.
+pub(super) struct CellImaging<'a> {
+    pub(super) camera: &'a VirtualCamera,
+    /// Edge of a pixel, metres.
+    pub(super) pixel_size: f32,
+    pub(super) rect: Rect,
+    /// Least depth, metres.
+    pub(super) near: f32,
+}
+
+impl Cells {
+    /// Fills `out` with the layers of the points in `columns`. `exits` tells of the i-th whether its outward
+    /// normal points along the view, where normals tell. Cost: linear in points and pixels.
+    pub(super) fn image(
+        &mut self,
+        columns: &Columns,
+        exits: Option<&dyn Fn(usize) -> bool>,
+        imaging: &CellImaging,
+        out: &mut Tldi,
+    ) {
+        self.sort(columns, exits, imaging);
+        self.gather(imaging);
+        self.fit(&imaging.rect);
+        let Rect { origin, size } = imaging.rect;
+        out.begin(imaging.camera, origin, size);
+        for (k, pixel) in pixels(&imaging.rect).enumerate() {
+            let first = out.layers.len();
+            for cell in self.of_pixel(k) {
+                let plane = self.sharpened(cell, pixel, &imaging.rect);
+                if plane.variance < f32::INFINITY {
+                    out.layers
+                        .push(self.layer(cell, &plane, exits.is_some(), imaging));
+                }
+            }
+            out.layers[first..].sort_unstable_by(|l, m| {
+                (l.depth.total_cmp(&m.depth)).then(l.facing.cmp(&m.facing))
+            });
+            out.offsets.push(out.layers.len() as u32);
+        }
+    }
+
+    /// Indices of the cells of the `k`-th pixel.
+    fn of_pixel(&self, k: usize) -> Range<usize> {
+        self.firsts[k] as usize..self.firsts[k + 1] as usize
+    }
+
+    /// The cells around one that continue it, at most one a pixel, and how far they are aside, in pixels.
+    fn neighbors(
+        &self,
+        cell: usize,
+        [i, j]: [usize; 2],
+        rect: &Rect,
+    ) -> impl Iterator<Item = (usize, [f32; 2])> {
+        let own = &self.cells[cell];
+        let [width, height] = rect.size.map(|s| s as usize);
+        let merged = (MERGED * STEPS) as i32;
+        let around = (j.saturating_sub(1)..(j + 2).min(height))
+            .flat_map(move |y| (i.saturating_sub(1)..(i + 2).min(width)).map(move |x| [x, y]));
+        around
+            .filter(move |at| *at != [i, j])
+            .filter_map(move |[x, y]| {
+                let continues = |c: &usize| {
+                    let c = &self.cells[*c];
+                    c.class == own.class && c.near <= own.far + merged && own.near <= c.far + merged
+                };
+                let apart = |c: &usize| (self.cells[*c].middle - own.middle).abs();
+                let there = self.of_pixel(y * width + x).filter(continues);
+                let next = there.min_by_key(apart)?;
+                Some((next, [x as f32 - i as f32, y as f32 - j as f32]))
+            })
+    }
+
+    /// Fits a plane to each cell and its neighbours.
+    fn fit(&mut self, rect: &Rect) {
+        self.planes.clear();
+        for (k, pixel) in pixels(rect).enumerate() {
+            for cell in self.of_pixel(k) {
+                let own = &self.cells[cell];
+                let mut all = own.sums;
+                for (next, aside) in self.neighbors(cell, pixel, rect) {
+                    let next = &self.cells[next];
+                    let [x, y] = aside.map(|d| d * STEPS);
+                    let moved = moved(&next.sums, [x, y, (next.middle - own.middle) as f32]);
+                    all.iter_mut().zip(moved).for_each(|(all, sum)| *all += sum);
+                }
+                let plane = Plane::of(&own.sums, &all);
+                self.planes.push(plane);
+            }
+        }
+    }
+
+    /// The plane of a cell or, where it and its neighbours are on none, the flattest of those of its neighbours that
+    /// goes through it: beside an edge the plane of one face, not of both.
+    fn sharpened(&self, cell: usize, pixel: [usize; 2], rect: &Rect) -> Plane {
+        let plane = self.planes[cell];
+        let square = |pixels: f32| (pixels * STEPS).powi(2);
+        if plane.variance <= square(ON_PLANE) || plane.variance == f32::INFINITY {
+            return plane;
+        }
+        let own = &self.cells[cell];
+        let [least, most] = [own.near, own.far].map(|depth| (depth - own.middle) as f32);
+        let reached = least - ON_PLANE * STEPS..=most + ON_PLANE * STEPS;
+        let through = self
+            .neighbors(cell, pixel, rect)
+            .filter_map(|(next, [x, y])| {
+                let Plane {
+                    slope,
+                    above,
+                    variance,
+                } = self.planes[next];
+                let there = (self.cells[next].middle - own.middle) as f32 + above;
+                let above = there - STEPS * (slope[0] * x + slope[1] * y);
+                (variance <= square(FLAT) && reached.contains(&above)).then_some(Plane {
+                    slope,
+                    above,
+                    variance,
+                })
+            });
+        let flattest = through.min_by(|p, q| p.variance.total_cmp(&q.variance));
+        flattest.unwrap_or(plane)
+    }
+
+    /// Counting sort of the points by pixel.
+    fn sort(
+        &mut self,
+        columns: &Columns,
+        exits: Option<&dyn Fn(usize) -> bool>,
+        imaging: &CellImaging,
+    ) {
+        let Rect { origin, size } = imaging.rect;
+        let inv_pixel = 1.0 / imaging.pixel_size;
+        let count = imaging.rect.pixels();
+        self.pixels.clear();
+        self.starts.clear();
+        self.starts.resize(count + 1, 0);
+        let at = |i: usize| [columns.x[i] * inv_pixel, columns.y[i] * inv_pixel];
+        for i in 0..columns.x.len() {
+            let pixel = at(i).map(|c| c.floor() as i64);
+            let [x, y] = [0, 1].map(|k| pixel[k] - i64::from(origin[k]));
+            let [width, height] = size.map(i64::from);
+            let inside = (0..width).contains(&x) && (0..height).contains(&y);
+            let pixel = if inside {
+                (y * width + x) as usize
+            } else {
+                count
+            };
+            self.pixels.push(pixel as u32);
+            self.starts[pixel] += 1;
+        }
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
+        }
+        // Filled from the end, so that each start ends up where it belongs.
+        self.points.clear();
+        self.points.resize(end as usize, Point::default());
+        for (i, pixel) in self.pixels.iter().enumerate().rev() {
+            let slot = &mut self.starts[*pixel as usize];
+            *slot -= 1;
+            let aside = at(i).map(|c| ((c - c.floor() - 0.5) * STEPS) as i16);
+            let depth = (columns.depth[i] - imaging.near) * inv_pixel * STEPS;
+            let exit = exits.is_some_and(|is_exit| is_exit(i));
+            self.points[*slot as usize] = Point {
+                key: (depth.max(0.0) as u32).min(DEEPEST) | if exit { EXIT } else { 0 },
+                aside,
+            };
+        }
+    }
+
+    /// Makes cells of the points of each pixel.
+    fn gather(&mut self, imaging: &CellImaging) {
+        let merged = (MERGED * STEPS) as u32;
+        self.cells.clear();
+        self.firsts.clear();
+        for pixel in 0..imaging.rect.pixels() {
+            self.firsts.push(self.cells.len() as u32);
+            let range = self.starts[pixel] as usize..self.starts[pixel + 1] as usize;
+            let points = &mut self.points[range];
+            points.sort_unstable_by_key(|p| p.key);
+            let follow = |p: &Point, q: &Point| q.key - p.key <= merged;
+            for run in points.chunk_by(follow) {
+                let depth = |p: &Point| (p.key & !EXIT) as i32;
+                let count = run.len() as i64;
+                let sum: i64 = run.iter().map(|p| i64::from(depth(p))).sum();
+                let middle = (sum / count) as i32;
+                let mut sums = [0i64; 10];
+                for p in run {
+                    let [x, y] = p.aside.map(i64::from);
+                    let z = i64::from(depth(p) - middle);
+                    let terms = [1, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+                    sums.iter_mut()
+                        .zip(terms)
+                        .for_each(|(sum, term)| *sum += term);
+                }
+                self.cells.push(Cell {
+                    class: run[0].key & EXIT,
+                    near: depth(&run[0]),
+                    far: depth(&run[run.len() - 1]),
+                    middle,
+                    sums: sums.map(|sum| sum as f32),
+                });
+            }
+        }
+        self.firsts.push(self.cells.len() as u32);
+    }
+
+    /// The layer of a cell on a plane.
+    fn layer(&self, cell: usize, plane: &Plane, oriented: bool, imaging: &CellImaging) -> Layer {
+        let own = &self.cells[cell];
+        let step = imaging.pixel_size / STEPS;
+        let metres = |steps: i32| imaging.near + steps as f32 * step;
+        // A plane that is seen steeply ends where its points do.
+        let [least, most] = [own.near, own.far].map(|depth| (depth - own.middle) as f32);
+        let above = plane.above.clamp(least - 0.5 * STEPS, most + 0.5 * STEPS);
+        let toward_camera = Vec3::new(plane.slope[0], plane.slope[1], -1.0).normalize();
+        let is_exit = own.class == EXIT;
+        Layer {
+            near: metres(own.near),
+            far: metres(own.far),
+            depth: metres(own.middle) + above * step,
+            normal: if is_exit {
+                -toward_camera
+            } else {
+                toward_camera
+            },
+            agreement: 1.0,
+            facing: match (oriented, is_exit) {
+                (false, _) => Facing::Unknown,
+                (true, false) => Facing::Entry,
+                (true, true) => Facing::Exit,
+            },
+            color: [0; 4],
+        }
+    }
+}
+
+/// Columns and rows of the pixels of a rectangle, row by row, from its first.
+fn pixels(rect: &Rect) -> impl Iterator<Item = [usize; 2]> + use<> {
+    let [width, height] = rect.size.map(|s| s as usize);
+    (0..height).flat_map(move |j| (0..width).map(move |i| [i, j]))
+}
