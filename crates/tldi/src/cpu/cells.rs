@@ -147,16 +147,17 @@ pub(super) struct CellImaging<'a> {
 }
 
 impl Cells {
-    /// Fills `out` with the layers of the points in `columns`. `exits` tells of the i-th whether its outward
+    /// Fills `out` with the layers of the `kept` points of `columns`. `exits` tells of the i-th whether its outward
     /// normal points along the view, where normals tell. Cost: linear in points and pixels.
     pub(super) fn image(
         &mut self,
         columns: &Columns,
+        kept: &[u32],
         exits: Option<&dyn Fn(usize) -> bool>,
         imaging: &CellImaging,
         out: &mut Tldi,
     ) {
-        self.sort(columns, exits, imaging);
+        self.sort(columns, kept, exits, imaging);
         self.gather(imaging);
         self.fit(&imaging.rect);
         let Rect { origin, size } = imaging.rect;
@@ -262,6 +263,7 @@ impl Cells {
     fn sort(
         &mut self,
         columns: &Columns,
+        kept: &[u32],
         exits: Option<&dyn Fn(usize) -> bool>,
         imaging: &CellImaging,
     ) {
@@ -272,7 +274,7 @@ impl Cells {
         self.starts.clear();
         self.starts.resize(count + 1, 0);
         let at = |i: usize| [columns.x[i] * inv_pixel, columns.y[i] * inv_pixel];
-        for i in 0..columns.x.len() {
+        for i in kept.iter().map(|&i| i as usize) {
             let pixel = at(i).map(|c| c.floor() as i64);
             let [x, y] = [0, 1].map(|k| pixel[k] - i64::from(origin[k]));
             let [width, height] = size.map(i64::from);
@@ -293,7 +295,8 @@ impl Cells {
         // Filled from the end, so that each start ends up where it belongs.
         self.points.clear();
         self.points.resize(end as usize, Point::default());
-        for (i, pixel) in self.pixels.iter().enumerate().rev() {
+        for (&i, pixel) in kept.iter().zip(&self.pixels).rev() {
+            let i = i as usize;
             let slot = &mut self.starts[*pixel as usize];
             *slot -= 1;
             let aside = at(i).map(|c| ((c - c.floor() - 0.5) * STEPS) as i16);

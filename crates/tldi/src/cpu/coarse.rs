@@ -7,13 +7,14 @@
 
 use super::cells::CellImaging;
 use super::compare::{self, Crossings, Seen};
-use super::pair::Scratch;
+use super::pair::{CommonPixels, Scratch};
 use super::side::CloudView;
 use crate::camera_policy::{MAX_VIEWS, aim};
 use crate::plan::{PairPlan, ring, stride};
 use crate::{
     Aabb, BLOCK, PairQuery, PairResult, Params, Surface, Tldi, Variant, View, VirtualCamera,
 };
+use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
 
 /// Edges of a large pixel, in pixels: smaller ones cost as much as the fine look; larger ones merge limbs.
@@ -23,18 +24,11 @@ const LARGE: [f32; 4] = [16.0, 8.0, 4.0, 2.0];
 /// of a pixel, and this is what a solver is told within 5 %.
 const DEEP: f32 = 2.0;
 
-/// Large pixels that the bounds overlap by at least, where a first look is worth while: bodies that are deep by
-/// [`DEEP`] have as much again behind it.
-const WORTHWHILE: f32 = 4.0;
-
 /// Large pixels through the overlap of the bounds from which on larger ones are taken.
 const THROUGH: f32 = 8.0;
 
 /// Points that are taken per large pixel of a surface seen face on.
 const POINTS_PER_PIXEL: f32 = 4.0;
-
-/// Fewer points of a side are not worth a first look.
-const LEAST_POINTS: usize = 256;
 
 /// Edge of a window, in pixels.
 const WINDOW: f32 = 32.0;
@@ -52,8 +46,18 @@ pub(super) struct Window {
     swaps: u32,
 }
 
-/// The query of the first look: with large pixels; `None` where it would settle nothing.
-fn coarse_query<'a>(query: &PairQuery<'a>) -> Option<PairQuery<'a>> {
+/// What a first look came to.
+pub(super) enum FirstLook {
+    /// Both sides hold nothing of use.
+    Nothing,
+    /// It settled nothing, but both sides hold what was culled, every so many points, and what of it is near.
+    Culled([usize; 2]),
+    /// The result is filled.
+    Settled,
+}
+
+/// Where a first look is worth while: by how much the bounds overlap, metres.
+fn overlap(query: &PairQuery) -> Option<f32> {
     let (Surface::Cloud(a), Surface::Cloud(b)) = (query.a, query.b) else {
         return None;
     };
@@ -61,26 +65,16 @@ fn coarse_query<'a>(query: &PairQuery<'a>) -> Option<PairQuery<'a>> {
     if !is_aimed || query.params.variant() == Variant::Paper {
         return None;
     }
-    let overlap = a
-        .bounds()
-        .intersection(b.bounds().transformed(&query.a_from_b));
-    if overlap.is_empty() {
-        return None;
-    }
-    let through = overlap.extents().min_element();
-    let [.., smallest] = LARGE.map(|large| large * query.params.pixel_size);
-    if through < WORTHWHILE * smallest {
-        return None;
-    }
-    let pixels = LARGE.map(|large| large * query.params.pixel_size);
-    let pixel = pixels.into_iter().find(|pixel| through >= THROUGH * pixel);
-    let pixel = pixel.unwrap_or(smallest);
-    let params = Params {
-        pixel_size: pixel,
-        thickness: 2.0 * pixel,
-        ..query.params
-    };
-    Some(PairQuery { params, ..*query })
+    let bounds_b = b.bounds().transformed(&query.a_from_b);
+    let overlap = a.bounds().intersection(bounds_b);
+    (!overlap.is_empty()).then(|| overlap.extents().min_element())
+}
+
+/// The largest of the large pixels, metres, in which what is so deep is at least `deep` pixels.
+fn large_pixel(query: &PairQuery, depth: f32, deep: f32) -> Option<f32> {
+    let radius = query.a.mean_radius().max(query.b.mean_radius());
+    let pixels = LARGE.map(|large| large * query.params.pixel_size.max(radius));
+    pixels.into_iter().find(|pixel| deep * pixel <= depth)
 }
 
 /// Every how many points of a cloud are enough for the first look.
@@ -90,91 +84,109 @@ fn coarse_stride(mean_radius: f32, pixel_size: f32) -> usize {
 }
 
 impl Scratch {
-    /// Whether a first look settles the pair; `result` is filled then, and else empty.
+    /// Looks at the pair with large pixels. Where that settles it, `result` is filled, and else empty.
     pub(super) fn settle(
         &mut self,
         query: &PairQuery,
         plan: &PairPlan,
         result: &mut PairResult,
-    ) -> bool {
-        let is_settled = coarse_query(query)
-            .is_some_and(|coarse| self.settle_with(&coarse, query, plan, result).is_some());
-        if !is_settled {
+    ) -> FirstLook {
+        let mut came_to = FirstLook::Nothing;
+        self.window_edge = WINDOW * query.params.pixel_size;
+        let Some(through) = overlap(query) else {
+            return came_to;
+        };
+        let large = large_pixel(query, through, THROUGH);
+        let mut next = large.or_else(|| large_pixel(query, through, DEEP));
+        while let Some(pixel) = next {
             result.clear();
+            let params = Params {
+                pixel_size: pixel,
+                thickness: 2.0 * pixel,
+                ..query.params
+            };
+            let coarse = PairQuery { params, ..*query };
+            let depth = self.look_coarsely(&coarse, plan, result, &mut came_to);
+            if depth >= DEEP * pixel {
+                came_to = FirstLook::Nothing;
+                if self.is_proven(query, plan, &result.axes) {
+                    result.collides = true;
+                    self.patches.reduce_coarse(result, &coarse);
+                    if result.gap.is_some_and(|gap| gap <= -DEEP * pixel) {
+                        return FirstLook::Settled;
+                    }
+                }
+                break;
+            }
+            next = large_pixel(query, depth, DEEP);
         }
-        is_settled
+        result.clear();
+        came_to
     }
 
-    fn settle_with(
+    /// Fills `result` with the contact pixels that large pixels show, and `windows` with where these show crossings.
+    /// Returns how deep the surfaces are, metres, or at the most.
+    fn look_coarsely(
         &mut self,
-        coarse: &PairQuery,
         query: &PairQuery,
         plan: &PairPlan,
         result: &mut PairResult,
-    ) -> Option<()> {
+        came_to: &mut FirstLook,
+    ) -> f32 {
+        self.windows.clear();
         let View::Aim { policy, .. } = query.view else {
-            return None;
+            return 0.0;
         };
-        let pixel = coarse.params.pixel_size;
+        let pixel = query.params.pixel_size;
         let strides = [query.a, query.b].map(|s| coarse_stride(s.mean_radius(), pixel));
-        let coarse_plan = PairPlan {
+        let thinned = PairPlan {
             zone_reach: plan.zone_reach * (strides[0].max(strides[1]) as f32).sqrt(),
             ..plan.clone()
         };
-        let is_enough = |scratch: &Self| {
-            [&scratch.a, &scratch.b]
-                .iter()
-                .all(|side| side.points.len() >= LEAST_POINTS)
-        };
-        let is_near =
-            self.cull(coarse, plan, strides) && is_enough(self) && self.zone(coarse, &coarse_plan);
-        if !is_near {
-            return None;
+        *came_to = FirstLook::Nothing;
+        if !self.cull(query, plan, strides) || !self.zone(query, &thinned) {
+            return 0.0;
         }
-        let approach = self.approach(coarse, plan);
-        aim(
-            policy,
-            self.zone_normals(coarse),
-            &approach,
-            &mut result.axes,
-        );
-        let axes: arrayvec::ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
-        let edge = (WINDOW * query.params.pixel_size / pixel) as i32;
-        self.windows.clear();
+        *came_to = FirstLook::Culled(strides);
+        let approach = self.approach(query, plan);
+        let normals = self.zone_normals(query);
+        aim(policy, normals, &approach, &mut result.axes);
+        let axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
+        let mut deepest = 0.0f32;
         for view in 0..axes.len() {
             let camera = VirtualCamera::along(axes[view], pixel);
-            self.look_at_cells(coarse, &camera)?;
-            let seen = self.seen(coarse, plan, &camera, &axes, view);
-            let mut counted = Crossings::default();
-            let [a, b] = [&self.a.image, &self.b.image];
-            compare::compare(a, b, &seen, &coarse.params, &mut counted, result);
-            find_windows([a, b], &seen, &coarse.params, edge, &mut self.windows);
+            deepest = deepest.max(self.look_at_cells(query, plan, &camera, &axes, view, result));
         }
-        let deep = -DEEP * pixel;
-        if !result.contacts.iter().any(|c| c.gap < deep) {
-            return None;
-        }
+        deepest
+    }
+
+    /// Whether small pixels show in a few windows that the surfaces cross.
+    fn is_proven(&mut self, query: &PairQuery, plan: &PairPlan, axes: &[Vec3]) -> bool {
         rank(&mut self.windows);
         let mut crossings = Crossings::default();
         for k in 0..self.windows.len().min(MOST_WINDOWS) {
             let window = self.windows[k];
-            self.look_through(query, plan, &axes, &window, &mut crossings);
+            self.look_through(query, plan, axes, &window, &mut crossings);
             if crossings.are_enough() {
-                break;
+                return true;
             }
         }
-        if !crossings.are_enough() {
-            return None;
-        }
-        result.collides = true;
-        self.patches.reduce_coarse(result, coarse);
-        result.gap.filter(|gap| *gap < deep).map(|_| ())
+        false
     }
 
-    /// Builds both images from the sums of what was culled.
-    fn look_at_cells(&mut self, query: &PairQuery, camera: &VirtualCamera) -> Option<()> {
+    /// Compares the images of the sums of what was culled. Returns how deep the surfaces are in this view, metres, or at
+    /// the most.
+    fn look_at_cells(
+        &mut self,
+        query: &PairQuery,
+        plan: &PairPlan,
+        camera: &VirtualCamera,
+        axes: &[Vec3],
+        view: usize,
+        result: &mut PairResult,
+    ) -> f32 {
         let (Surface::Cloud(a), Surface::Cloud(b)) = (query.a, query.b) else {
-            return None;
+            return 0.0;
         };
         let view_of = |cloud, frame_from_cloud| CloudView {
             cloud,
@@ -184,20 +196,40 @@ impl Scratch {
             sharpens: false,
         };
         let (a, b) = (view_of(a, &Pose3::IDENTITY), view_of(b, &query.a_from_b));
-        let (side_a, side_b) = (&mut self.a, &mut self.b);
-        let (seen_a, seen_b) = rayon::join(|| side_a.project(&a), || side_b.project(&b));
-        let (seen_a, seen_b) = (seen_a?, seen_b?);
+        let Some(CommonPixels { rect, near, .. }) = self.meet(&a, &b, plan.column_reach, 0.0)
+        else {
+            return 0.0;
+        };
+        let pixel = query.params.pixel_size;
+        let at_most = self.a.columns.greatest_overlap(&self.b.columns);
+        if at_most < DEEP * pixel {
+            return at_most;
+        }
         let imaging = CellImaging {
             camera,
-            pixel_size: query.params.pixel_size,
-            rect: seen_a.rect.intersection(&seen_b.rect)?,
-            near: seen_a.near.min(seen_b.near),
+            pixel_size: pixel,
+            rect,
+            near,
         };
+        let (side_a, side_b, touching) = (&mut self.a, &mut self.b, &self.touching);
         rayon::join(
-            || side_a.image_of_cells(&a, &imaging),
-            || side_b.image_of_cells(&b, &imaging),
+            || side_a.image_of_cells(&a, &imaging, touching),
+            || side_b.image_of_cells(&b, &imaging, touching),
         );
-        Some(())
+        let seen = self.seen(query, plan, camera, axes, view);
+        let [a, b] = [&self.a.image, &self.b.image];
+        let mut counted = Crossings::default();
+        let first = result.contacts.len();
+        compare::compare(a, b, &seen, &query.params, &mut counted, result);
+        find_windows(
+            [a, b],
+            &seen,
+            &query.params,
+            self.window_edge,
+            &mut self.windows,
+        );
+        let depths = result.contacts[first..].iter().map(|contact| -contact.gap);
+        depths.fold(0.0, f32::max)
     }
 
     /// Adds what the fine images show of crossings in a window.
@@ -214,7 +246,7 @@ impl Scratch {
         };
         let pixel = query.params.pixel_size;
         let mut camera = VirtualCamera::along(axes[window.view], pixel);
-        let edge = WINDOW * pixel;
+        let edge = self.window_edge;
         // A whole number of pixels: the grid is that of the look at all of the contact zone.
         let first = edge * Vec3::from_array(window.cube.map(|c| c as f32));
         camera.view_from_frame.translation = -first.with_z(0.0);
@@ -261,12 +293,12 @@ impl Scratch {
     }
 }
 
-/// Appends the windows, cubes of `edge` large pixels, in which two images show surfaces that swap their order.
+/// Appends the windows, cubes with edges of `edge` metres, in which two images show surfaces that swap their order.
 fn find_windows(
     [a, b]: [&Tldi; 2],
     seen: &Seen,
     params: &Params,
-    edge: i32,
+    edge: f32,
     windows: &mut Vec<Window>,
 ) {
     let others = seen.others(&a.camera);
@@ -281,11 +313,11 @@ fn find_windows(
             ];
             for next in nexts.into_iter().flatten() {
                 if let Some(depth) = compare::swap_depth(at(k), at(next), &others, params) {
-                    let depth = (depth / params.pixel_size).floor() as i32;
-                    let place = [a.origin[0] + i as i32, a.origin[1] + j as i32, depth];
+                    let [u, v] = [a.origin[0] + i as i32, a.origin[1] + j as i32];
+                    let place = a.camera.view_at(u as f32 + 0.5, v as f32 + 0.5, depth);
                     windows.push(Window {
                         view: seen.view,
-                        cube: place.map(|c| c.div_euclid(edge)),
+                        cube: (place / edge).floor().as_ivec3().to_array(),
                         swaps: 1,
                     });
                 }

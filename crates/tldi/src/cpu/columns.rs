@@ -169,6 +169,13 @@ impl Columns {
         self.depths[tile] + b.depths[tile] <= reach
     }
 
+    /// By how much at most a point of `b` lies behind one of this side in a tile, metres. After
+    /// [`reduce`](Self::reduce) as for [`meet`](Self::meet).
+    pub(crate) fn greatest_overlap(&self, b: &Self) -> f32 {
+        let behind = self.depths.iter().zip(&b.depths).map(|(a, b)| -(a + b));
+        behind.fold(f32::NEG_INFINITY, f32::max)
+    }
+
     /// Finds each tile's least and greatest depth, metres, that a splat of it or of its neighbours may have,
     /// `margin` beyond its point.
     pub(crate) fn reduce_both(&mut self, tiles: &Tiles, margin: f32) {

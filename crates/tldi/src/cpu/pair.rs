@@ -1,11 +1,12 @@
 //! The stages of one pair, in order.
 
-use super::coarse::Window;
+use super::coarse::{FirstLook, Window};
 use super::columns::{Tiles, Touching};
 use super::compare::{self, Crossings, Middles, Seen};
 use super::cull;
 use super::impact::{CoreScratch, Meeting};
 use super::near_exact::Placed;
+use super::rect::Rect;
 use super::side::{CloudView, ExactView, Scope, Side};
 use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneGrid, ZoneScratch};
@@ -17,6 +18,14 @@ use crate::{
 };
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
+
+/// Where two clouds meet in a view.
+pub(super) struct CommonPixels {
+    pub(super) rect: Rect,
+    tiles: Tiles,
+    /// Least depth of both, metres.
+    pub(super) near: f32,
+}
 
 /// Everything one pair needs while it is compared.
 #[derive(Default)]
@@ -33,6 +42,8 @@ pub(super) struct Scratch {
     pub(super) patches: PatchScratch,
     /// Of the first look.
     pub(super) windows: Vec<Window>,
+    /// Metres.
+    pub(super) window_edge: f32,
 }
 
 impl Scratch {
@@ -46,12 +57,14 @@ impl Scratch {
         let Some(plan) = PairPlan::new(query) else {
             return;
         };
-        if self.settle(query, &plan, result) {
-            return;
-        }
         let pixel = query.params.pixel_size;
         let strides = [query.a, query.b].map(|surface| stride(surface.mean_radius(), pixel));
-        if !self.cull(query, &plan, strides) || !self.zone(query, &plan) {
+        let is_found = match self.settle(query, &plan, result) {
+            FirstLook::Settled => return,
+            FirstLook::Culled(taken) => taken == strides,
+            FirstLook::Nothing => false,
+        };
+        if !is_found && !(self.cull(query, &plan, strides) && self.zone(query, &plan)) {
             return;
         }
         self.crossings = Crossings::default();
@@ -306,6 +319,33 @@ impl Scratch {
         b: &CloudView,
         reach: f32,
     ) -> Option<()> {
+        let support = self.a.support(a).max(self.b.support(b));
+        let CommonPixels { rect, tiles, near } = self.meet(a, b, reach, support)?;
+        let (side_a, side_b) = (&mut self.a, &mut self.b);
+        let touching = &self.touching;
+        let imaging = Imaging {
+            camera: a.camera,
+            params: a.params,
+            rect,
+            tiles,
+            scale: DepthScale::new(near, a.params),
+        };
+        rayon::join(
+            || side_a.image(a, &imaging, Some(touching)),
+            || side_b.image(b, &imaging, Some(touching)),
+        );
+        Some(())
+    }
+
+    /// Moves what was culled into the view and finds the tiles in which `a` is less than `reach` metres behind
+    /// `b`, and those within `support` metres around; `None` if there are none.
+    pub(super) fn meet(
+        &mut self,
+        a: &CloudView,
+        b: &CloudView,
+        reach: f32,
+        support: f32,
+    ) -> Option<CommonPixels> {
         let (camera, params) = (a.camera, a.params);
         let (side_a, side_b) = (&mut self.a, &mut self.b);
         let (seen_a, seen_b) = rayon::join(|| side_a.project(a), || side_b.project(b));
@@ -321,23 +361,11 @@ impl Scratch {
             || sort(side_a, 1.0, seen_a.radius),
             || sort(side_b, -1.0, seen_b.radius),
         );
-        let support = side_a.support(a).max(side_b.support(b));
         let support_px = support / seen_a.pixel_size.min(seen_b.pixel_size);
-        let touching = &mut self.touching;
         let (columns_a, columns_b) = (&side_a.columns, &side_b.columns);
         let meet = |tile: usize| columns_a.meet(columns_b, tile, reach);
-        let rect = touching.mark(&tiles, &rect, support_px, meet)?;
-        let imaging = Imaging {
-            camera,
-            params,
-            rect,
-            tiles,
-            scale: DepthScale::new(seen_a.near.min(seen_b.near), params),
-        };
-        rayon::join(
-            || side_a.image(a, &imaging, Some(touching)),
-            || side_b.image(b, &imaging, Some(touching)),
-        );
-        Some(())
+        let rect = self.touching.mark(&tiles, &rect, support_px, meet)?;
+        let near = seen_a.near.min(seen_b.near);
+        Some(CommonPixels { rect, tiles, near })
     }
 }

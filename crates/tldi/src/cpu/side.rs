@@ -215,8 +215,14 @@ impl Side {
         }
     }
 
-    /// The image of the points that were projected, from their sums.
-    pub(super) fn image_of_cells(&mut self, view: &CloudView, imaging: &CellImaging) {
+    /// The image of the points in the tiles of `touching`, from their sums.
+    pub(super) fn image_of_cells(
+        &mut self,
+        view: &CloudView,
+        imaging: &CellImaging,
+        touching: &Touching,
+    ) {
+        self.columns.modelled(touching, &mut self.kept);
         let along = imaging.camera.view_from_frame.rotation * view.frame_from_cloud.rotation;
         let along = along.inverse() * Vec3::Z;
         let given = view.cloud.normals().filter(|_| view.oriented());
@@ -225,8 +231,9 @@ impl Side {
         let exits = is_exit
             .as_ref()
             .map(|exits| exits as &dyn Fn(usize) -> bool);
-        self.cells
-            .image(&self.columns, exits, imaging, &mut self.image);
+        let (columns, kept) = (&self.columns, &self.kept[..]);
+        let Self { cells, image, .. } = self;
+        cells.image(columns, kept, exits, imaging, image);
     }
 
     /// Fills `kept` and `kept_normals`.
