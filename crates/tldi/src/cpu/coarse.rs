@@ -31,7 +31,7 @@ const THROUGH: f32 = 8.0;
 const POINTS_PER_PIXEL: f32 = 4.0;
 
 /// Edge of a window, in pixels.
-const WINDOW: f32 = 32.0;
+const WINDOW: f32 = 16.0;
 
 /// Windows that are looked at; a crossing that is none shows in all of them.
 const MOST_WINDOWS: usize = 3;
@@ -106,15 +106,16 @@ impl Scratch {
                 ..query.params
             };
             let coarse = PairQuery { params, ..*query };
-            let depth = self.look_coarsely(&coarse, plan, result, &mut came_to);
+            let mut depth = self.look_coarsely(&coarse, plan, result, &mut came_to);
+            if depth >= DEEP * pixel {
+                self.patches.reduce_coarse(result, &coarse);
+                depth = result.gap.map_or(0.0, |gap| -gap);
+            }
             if depth >= DEEP * pixel {
                 came_to = FirstLook::Nothing;
                 if self.is_proven(query, plan, &result.axes) {
                     result.collides = true;
-                    self.patches.reduce_coarse(result, &coarse);
-                    if result.gap.is_some_and(|gap| gap <= -DEEP * pixel) {
-                        return FirstLook::Settled;
-                    }
+                    return FirstLook::Settled;
                 }
                 break;
             }
