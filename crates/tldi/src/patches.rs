@@ -7,7 +7,7 @@
 use crate::cpu::sweep::SAME_FACE;
 use crate::gap_fit::GapFit;
 use crate::links::{Groups, Links, join, root};
-use crate::lone_points::LonePoints;
+use crate::lone_points::{Culled, LonePoints};
 use crate::noise::allow_for_noise;
 use crate::part_shape::{Pixels, Shape, ShapeScratch, common_normal};
 use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params};
@@ -88,8 +88,18 @@ impl PatchScratch {
     /// far away as that of one of these four is from it. Cost beside that of `reduce`: where there
     /// are components of few contact pixels, a pass over the points of the blocks around them.
     pub fn reduce_pair(&mut self, result: &mut PairResult, query: &PairQuery) {
+        self.reduce_culled(result, query, [None; 2]);
+    }
+
+    /// [`reduce_pair`](Self::reduce_pair) where all points of each cloud that can touch may be at hand.
+    pub(crate) fn reduce_culled(
+        &mut self,
+        result: &mut PairResult,
+        query: &PairQuery,
+        culled: [Option<Culled>; 2],
+    ) {
         self.link(result, &query.params);
-        if self.lone_points.drop(result, &self.links, query) {
+        if self.lone_points.drop(result, &self.links, query, culled) {
             self.links.find(&result.contacts, &query.params);
         }
         let tells_inside = query.a.is_oriented() || query.b.is_oriented();
