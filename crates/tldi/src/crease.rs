@@ -39,7 +39,7 @@ const LONGER: f32 = 2.0;
 
 /// The gap over a face, in metres, at a place on the plane of a contact: `at_origin + slope · place`.
 #[derive(Clone, Copy, Debug, Default)]
-struct Face {
+pub(crate) struct Face {
     at_origin: f32,
     slope: Vec2,
     pixels: f32,
@@ -90,14 +90,18 @@ impl Frame {
 }
 
 /// By how much, in metres, the contact of `pixels` is lower than `deepest`, the lowest of the points that were fitted
-/// to them.
+/// to them. `tangents` is overwritten.
 pub(crate) fn lower_by<'a>(
     pixels: impl Iterator<Item = &'a ContactPixel> + Clone,
     frame: &Frame,
     deepest: &ContactPoint,
     pixel_size: f32,
+    tangents: &mut Vec<Face>,
 ) -> f32 {
-    let faces = faces(|| pixels.clone().map(|contact| frame.face(contact)));
+    tangents.clear();
+    let all = pixels.clone().map(|contact| frame.face(contact));
+    tangents.extend(all.filter(|face| face.slope.is_finite()));
+    let faces = faces(tangents);
     let Some(vertex) = Vertex::of(&faces, frame.place(deepest.middle())) else {
         return 0.0;
     };
@@ -117,12 +121,9 @@ pub(crate) fn lower_by<'a>(
 }
 
 /// The faces that meet, by slopes that are as far apart as there are.
-fn faces<I: Iterator<Item = Face>>(tangents: impl Fn() -> I) -> ArrayVec<Face, MOST_FACES> {
-    let finite = || tangents().filter(|face| face.slope.is_finite());
-    let (sum, count) = finite().fold((Vec2::ZERO, 0.0), |(sum, n), face| {
-        (sum + face.slope, n + 1.0)
-    });
-    let mean = sum / count;
+fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_FACES> {
+    let count = tangents.len() as f32;
+    let mean = tangents.iter().map(|face| face.slope).sum::<Vec2>() / count;
     let mut seeds = ArrayVec::<Vec2, MOST_FACES>::new();
     while !seeds.is_full() {
         let off = |slope: Vec2| match seeds.is_empty() {
@@ -132,7 +133,7 @@ fn faces<I: Iterator<Item = Face>>(tangents: impl Fn() -> I) -> ArrayVec<Face, M
                 .map(|seed| slope.distance(*seed))
                 .fold(f32::INFINITY, f32::min),
         };
-        let farthest = finite()
+        let farthest = (tangents.iter())
             .map(|face| (off(face.slope), face.slope))
             .max_by(|m, n| m.0.total_cmp(&n.0));
         match farthest {
@@ -146,7 +147,9 @@ fn faces<I: Iterator<Item = Face>>(tangents: impl Fn() -> I) -> ArrayVec<Face, M
     }
     let around = |slope: Vec2, tolerance: f32| {
         let reach = tolerance * (1.0 + slope.length());
-        let near = finite().filter(|face| face.slope.distance(slope) < reach);
+        let near = tangents
+            .iter()
+            .filter(|face| face.slope.distance(slope) < reach);
         let sum = near.fold(Face::default(), |sum, face| Face {
             at_origin: sum.at_origin + face.at_origin,
             slope: sum.slope + face.slope,
@@ -261,7 +264,7 @@ mod tests {
             axes: [Vec3::X, -Vec3::Z],
             normal: Vec3::Y,
         };
-        deepest.gap - lower_by(pixels.iter(), &frame, &deepest, 1.0)
+        deepest.gap - lower_by(pixels.iter(), &frame, &deepest, 1.0, &mut vec![])
     }
 
     /// The highest of planes through one place, and its slope.

@@ -17,52 +17,89 @@ const MOST_NEIGHBORS: usize = 48;
 const LEAST_SLOPE_WEIGHT: f32 = 0.5;
 const LEAST_BEND_WEIGHT: f32 = 2.0;
 
-/// The gap at contact pixel `k`, in metres, by a fit to it and its neighbours up to two links away.
-pub(crate) fn fitted_gap(k: u32, contacts: &[ContactPixel], links: &Links) -> f32 {
-    let at = contacts[k as usize].pixel;
-    let mut ring = ArrayVec::<u32, MOST_NEIGHBORS>::new();
-    // The first of the ring in each of the 5 × 5 pixels: others in the same pixel are rare.
-    let mut first = [NONE; 25];
-    ring.push(k);
-    first[12] = k;
-    let mut push_neighbors = |ring: &mut ArrayVec<u32, MOST_NEIGHBORS>, of: u32| {
-        for &l in links.neighbors(of) {
-            let [u, v] = [0, 1].map(|axis| contacts[l as usize].pixel[axis] - at[axis] + 2);
-            let first = &mut first[(5 * v + u) as usize];
-            if *first == NONE {
-                *first = l;
-            } else if *first == l || ring.contains(&l) {
-                continue;
+/// Places in the 5 × 5 pixels around a pixel, row by row, and the one of the pixel itself.
+const PLACES: usize = 25;
+const MIDDLE: usize = PLACES / 2;
+
+/// 1, u, v and u² + v² at a place (u, v) in pixels from the middle.
+fn basis(place: usize) -> Vec4 {
+    let [u, v] = [place % 5, place / 5].map(|k| k as f32 - 2.0);
+    Vec4::new(1.0, u, v, u * u + v * v)
+}
+
+/// Fits gaps; keeps what depends only on which of the neighbours are there, since that is alike for most
+/// pixels.
+#[derive(Debug, Default)]
+pub(crate) struct GapFit {
+    /// A bit for each place that has a neighbour.
+    pattern: u32,
+    /// The inverse normal matrix for these neighbours.
+    inverse: Mat4,
+}
+
+impl GapFit {
+    /// The gap at contact pixel `k`, in metres, by a fit to it and its neighbours up to two links away.
+    pub(crate) fn gap(&mut self, k: u32, contacts: &[ContactPixel], links: &Links) -> f32 {
+        // Contact pixels and their places.
+        let mut ring = ArrayVec::<(u32, usize), MOST_NEIGHBORS>::new();
+        // The first of the ring in each of the 5 × 5 pixels: others in the same pixel are rare.
+        let mut first = [NONE; PLACES];
+        ring.push((k, MIDDLE));
+        first[MIDDLE] = k;
+        let mut push_neighbors = |ring: &mut ArrayVec<_, MOST_NEIGHBORS>, of: u32, at: usize| {
+            for (l, [u, v]) in links.placed_neighbors(of) {
+                let place = at.wrapping_add_signed(isize::from(5 * v + u));
+                let first = &mut first[place];
+                if *first == NONE {
+                    *first = l;
+                } else if *first == l || ring.iter().any(|(m, _)| *m == l) {
+                    continue;
+                }
+                if !ring.is_full() {
+                    ring.push((l, place));
+                }
             }
-            if !ring.is_full() {
-                ring.push(l);
-            }
+        };
+        push_neighbors(&mut ring, k, MIDDLE);
+        for near in 1..ring.len() {
+            let (of, at) = ring[near];
+            push_neighbors(&mut ring, of, at);
         }
-    };
-    push_neighbors(&mut ring, k);
-    for near in 1..ring.len() {
-        let of = ring[near];
-        push_neighbors(&mut ring, of);
+        let mut moments = Vec4::ZERO;
+        let mut pattern = 0u32;
+        for &(l, place) in &ring {
+            moments += basis(place) * contacts[l as usize].gap;
+            pattern |= 1 << place;
+        }
+        let places = ring.iter().map(|(_, place)| *place);
+        if ring.len() != pattern.count_ones() as usize {
+            return (inverse_normal_matrix(places) * moments).x;
+        }
+        if pattern != self.pattern {
+            self.pattern = pattern;
+            self.inverse = inverse_normal_matrix(places);
+        }
+        (self.inverse * moments).x
     }
+}
+
+/// Its sums are of small whole numbers: their order does not matter.
+fn inverse_normal_matrix(places: impl Iterator<Item = usize>) -> Mat4 {
     let mut normal_matrix = Mat4::from_diagonal(Vec4::new(
         0.0,
         LEAST_SLOPE_WEIGHT,
         LEAST_SLOPE_WEIGHT,
         LEAST_BEND_WEIGHT,
     ));
-    let mut moments = Vec4::ZERO;
-    for contact in ring.iter().map(|&l| &contacts[l as usize]) {
-        let [u, v] = [0, 1].map(|axis| (contact.pixel[axis] - at[axis]) as f32);
-        let basis = Vec4::new(1.0, u, v, u * u + v * v);
+    for basis in places.map(basis) {
         normal_matrix += Mat4::from_cols(
             basis * basis.x,
             basis * basis.y,
             basis * basis.z,
             basis * basis.w,
         );
-        moments += basis * contact.gap;
     }
-    (normal_matrix.inverse() * moments).x
+    normal_matrix.inverse()
 }
 
 #[cfg(test)]
@@ -94,11 +131,8 @@ mod tests {
         links.find(&result.contacts, &params);
         links.confirm(&mut result, &params, true, &mut Vec::new());
         let middle = pixels.iter().position(|p| *p == [0, 0]);
-        fitted_gap(
-            middle.expect("is among them") as u32,
-            &result.contacts,
-            &links,
-        )
+        let middle = middle.expect("is among them") as u32;
+        GapFit::default().gap(middle, &result.contacts, &links)
     }
 
     fn block(rows: std::ops::RangeInclusive<i32>) -> Vec<[i32; 2]> {

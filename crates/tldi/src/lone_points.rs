@@ -5,6 +5,7 @@
 //! part of a scan and of a body that consists of a few points do not.
 
 use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
+use crate::cpu::zone::AroundPlaces;
 use crate::links::{Groups, Links};
 use crate::{Aabb, BLOCK, ContactPixel, PairQuery, PairResult, PointCloud, Surface};
 use glamx::{Pose3, Vec3};
@@ -30,9 +31,8 @@ const REACH: f32 = 32.0;
 /// distance to the seventh neighbour), it reaches beyond the fourth.
 const CELL: f32 = 2.0;
 
-/// Cells by which the grid reaches beyond the places: to their point, to its neighbour, to one of
-/// that, and one to spare.
-const RIM: f32 = 4.0;
+/// Cells from a place to its point and on to a neighbour of that, around which points must be known.
+const RIM: f32 = 2.0;
 
 /// The points nearest to a place: squares of their distances in metres, and where they are.
 type Nearest = [(f32, Vec3); NEIGHBORS];
@@ -46,47 +46,76 @@ fn offer(best: &mut Nearest, squared: f32, point: Vec3) {
     }
 }
 
+/// The points of a cloud in a region, in the frame of the query.
+#[derive(Clone, Copy)]
+pub(crate) struct Culled<'a> {
+    pub(crate) points: &'a Survivors,
+    pub(crate) region: &'a Region,
+}
+
 /// The points of a cloud around some places, in a hashed grid; kept from call to call.
 #[derive(Debug, Default)]
 struct Surroundings {
-    /// What the grid covers, metres.
-    region: Aabb,
-    /// Edge of a cell, metres.
+    frame_from_cloud: Pose3,
+    /// Where points are known, around the places.
+    region: Region,
+    around: AroundPlaces,
+    /// Corner of a cell, and its edge, metres.
+    min: Vec3,
     cell: f32,
     /// Points by bucket, and where each bucket starts, with an end. Cells may share a bucket.
     points: Vec<Vec3>,
     starts: Vec<u32>,
-    /// Points in the order of the cloud, and the bucket of each.
-    around: Survivors,
+    /// The bucket of each point, in the order of the cloud.
     buckets: Vec<u32>,
+    /// Points that were not culled before.
+    culled: Survivors,
     scratch: CullScratch,
 }
 
 impl Surroundings {
-    /// Finds those around `places`. Cost: a pass over the points of the blocks around, and a
-    /// counting sort of those that are.
-    fn find(&mut self, cloud: &PointCloud, places: impl Iterator<Item = Vec3>) {
+    /// Finds those around `places` among the `culled` ones or, without these, in `cloud`. Cost: a pass over these, or
+    /// over the points of the blocks around; and a counting sort of what is found.
+    fn find(
+        &mut self,
+        cloud: &PointCloud,
+        frame_from_cloud: &Pose3,
+        culled: Option<&Culled>,
+        places: &[Vec3],
+    ) {
         self.cell = CELL * cloud.mean_radius();
-        let bounds = places.fold(Aabb::EMPTY, |all, p| all.including(p));
-        self.region = bounds.loosened(RIM * self.cell);
-        let region = Region {
-            overlap: self.region,
-            other_from_frame: Pose3::IDENTITY,
-            other_bounds: self.region,
+        self.frame_from_cloud = *frame_from_cloud;
+        let mut own = std::mem::take(&mut self.culled);
+        let points = if let Some(culled) = culled {
+            self.region = culled.region.clone();
+            culled.points
+        } else {
+            let bounds = (places.iter().copied()).fold(Aabb::EMPTY, Aabb::including);
+            let bounds = bounds.loosened(2.0 * RIM * self.cell);
+            self.region = Region {
+                overlap: bounds,
+                other_from_frame: Pose3::IDENTITY,
+                other_bounds: bounds,
+            };
+            let (region, scratch) = (&self.region, &mut self.scratch);
+            cull(cloud, frame_from_cloud, region, 1, scratch, &mut own);
+            &own
         };
-        let (scratch, around) = (&mut self.scratch, &mut self.around);
-        cull(cloud, &Pose3::IDENTITY, &region, 1, scratch, around);
-        self.sort();
+        self.around.find(points, places, RIM * self.cell);
+        self.sort(points);
+        self.culled = own;
     }
 
-    /// Sorts the points around into buckets, about as many as points.
-    fn sort(&mut self) {
-        let count = self.around.len();
+    /// Sorts what was found into buckets, about as many as points.
+    fn sort(&mut self, culled: &Survivors) {
+        let count = self.around.found.len();
+        let point = |k: u32| culled.point(k as usize);
+        self.min = self.region.overlap.min;
         self.starts.clear();
         self.starts.resize(count.next_power_of_two() + 1, 0);
         self.buckets.clear();
-        for k in 0..count {
-            let bucket = self.bucket(self.cell_of(self.around.point(k)));
+        for &k in &self.around.found {
+            let bucket = self.bucket(self.cell_of(point(k)));
             self.buckets.push(bucket as u32);
             self.starts[bucket] += 1;
         }
@@ -98,15 +127,25 @@ impl Surroundings {
         // Filled from the end, so that each start ends up where it belongs.
         self.points.clear();
         self.points.resize(count, Vec3::ZERO);
-        for k in (0..count).rev() {
-            let slot = &mut self.starts[self.buckets[k] as usize];
+        for (&k, &bucket) in self.around.found.iter().zip(&self.buckets).rev() {
+            let slot = &mut self.starts[bucket as usize];
             *slot -= 1;
-            self.points[*slot as usize] = self.around.point(k);
+            self.points[*slot as usize] = point(k);
         }
     }
 
+    /// Whether all points within a cell's edge of `place` are in the grid.
+    fn knows(&self, place: Vec3) -> bool {
+        let is_inside = |place: Vec3, bounds: &Aabb| bounds.loosened(-self.cell).contains(place);
+        let in_other = self.region.other_from_frame * place;
+        !self.points.is_empty()
+            && self.around.knows(place)
+            && is_inside(place, &self.region.overlap)
+            && is_inside(in_other, &self.region.other_bounds)
+    }
+
     fn cell_of(&self, point: Vec3) -> [i32; 3] {
-        let place = (point - self.region.min) / self.cell;
+        let place = (point - self.min) / self.cell;
         place.to_array().map(|c| c.floor() as i32)
     }
 
@@ -122,8 +161,7 @@ impl Surroundings {
     fn nearest(&self, cloud: &PointCloud, place: Vec3, beyond: f32, reach: f32) -> Nearest {
         let mut best: Nearest = [(f32::INFINITY, place); NEIGHBORS];
         let limits = beyond * beyond..=reach * reach;
-        let known = self.region.loosened(-self.cell);
-        if known.contains(place) && !self.points.is_empty() {
+        if self.knows(place) {
             let middle = self.cell_of(place);
             for k in 0..27 {
                 let offset = [k % 3, k / 3 % 3, k / 9];
@@ -143,14 +181,16 @@ impl Surroundings {
             }
             best = [(f32::INFINITY, place); NEIGHBORS];
         }
+        let frame_from_cloud = &self.frame_from_cloud;
+        let own = frame_from_cloud.inverse_transform_point(place);
         for (block, bounds) in cloud.blocks().iter().enumerate() {
-            let least = place.clamp(bounds.min, bounds.max).distance_squared(place);
+            let least = own.clamp(bounds.min, bounds.max).distance_squared(own);
             if least <= *limits.end() && least < best[NEIGHBORS - 1].0 {
                 for i in block * BLOCK..((block + 1) * BLOCK).min(cloud.len()) {
                     let point = cloud.point(i);
-                    let squared = point.distance_squared(place);
+                    let squared = point.distance_squared(own);
                     if limits.contains(&squared) {
-                        offer(&mut best, squared, point);
+                        offer(&mut best, squared, frame_from_cloud.transform_point(point));
                     }
                 }
             }
@@ -179,7 +219,7 @@ impl Surroundings {
 /// Whether the point of `cloud` nearest to `place` stands alone. Cost: a pass over its blocks.
 pub(crate) fn is_alone(cloud: &PointCloud, place: Vec3) -> bool {
     let mut around = Surroundings::default();
-    around.find(cloud, std::iter::once(place));
+    around.find(cloud, &Pose3::IDENTITY, None, &[place]);
     around.is_alone(cloud, place)
 }
 
@@ -189,43 +229,49 @@ pub(crate) struct LonePoints {
     around: Surroundings,
     roots: Vec<u32>,
     components: Groups,
+    /// Of the small components.
+    middles: Vec<Vec3>,
     is_dropped: Vec<bool>,
 }
 
 impl LonePoints {
     /// Removes them from the contact pixels of `result`, which `links` joins; `false` where there are
-    /// none.
+    /// none. `culled` are all points of each cloud where the surfaces can touch, if they are at hand.
     pub(crate) fn drop(
         &mut self,
         result: &mut PairResult,
         links: &Links,
         query: &PairQuery,
+        culled: [Option<Culled>; 2],
     ) -> bool {
         let contacts = &result.contacts;
         links.components(contacts.len(), &mut self.roots);
         self.components.sort(&self.roots);
         self.is_dropped.clear();
-        let b_from_a = query.a_from_b.inverse();
         for side in [0, 1] {
             let Surface::Cloud(cloud) = [query.a, query.b][side] else {
                 continue;
             };
             let at = |c: &ContactPixel| match side {
                 0 => c.point_a,
-                _ => b_from_a * c.point_b,
+                _ => c.point_b,
             };
+            let frame_from_cloud = [&Pose3::IDENTITY, &query.a_from_b][side];
             let most = most_pixels(cloud, query.params.pixel_size);
             let small = || {
                 let components = self.components.iter(&self.roots);
                 components.filter(|component| component.len() <= most)
             };
-            if small().next().is_none() {
+            self.middles.clear();
+            (self.middles).extend(small().map(|component| middle(component, contacts, at)));
+            if self.middles.is_empty() {
                 continue;
             }
-            let middles = small().map(|component| middle(component, contacts, at));
-            self.around.find(cloud, middles);
-            for component in small() {
-                if made_by_lone_point(&self.around, cloud, component, contacts, at) {
+            let culled = culled[side].as_ref();
+            (self.around).find(cloud, frame_from_cloud, culled, &self.middles);
+            for (component, &middle) in small().zip(&self.middles) {
+                let places = component.iter().map(|&m| at(&contacts[m as usize]));
+                if made_by_lone_point(&self.around, cloud, middle, places) {
                     self.is_dropped.resize(contacts.len(), false);
                     for &m in component {
                         self.is_dropped[m as usize] = true;
@@ -270,15 +316,13 @@ fn middle(
 fn made_by_lone_point(
     around: &Surroundings,
     cloud: &PointCloud,
-    component: &[u32],
-    contacts: &[ContactPixel],
-    at: impl Fn(&ContactPixel) -> Vec3 + Copy,
+    middle: Vec3,
+    places: impl ExactSizeIterator<Item = Vec3> + Clone,
 ) -> bool {
-    if !around.is_alone(cloud, middle(component, contacts, at)) {
+    if !around.is_alone(cloud, middle) {
         return false;
     }
-    let step = component.len().div_ceil(SAMPLES);
-    let places = component.iter().map(|&m| at(&contacts[m as usize]));
+    let step = places.len().div_ceil(SAMPLES);
     let sampled = || places.clone().step_by(step);
     let alone = sampled()
         .filter(|&place| around.is_alone(cloud, place))
@@ -303,19 +347,47 @@ mod tests {
             .collect()
     }
 
-    /// Whether the grid knows the answer or all blocks must be asked; and where it has so few buckets
-    /// that cells share them.
+    /// Whether the grid knows the answer or all blocks must be asked; where it has so few buckets that cells
+    /// share them; and where the points at hand are those of a region.
     #[test]
     fn the_nearest_points_are_those_of_brute_force() {
         let mut rng = fastrand::Rng::with_seed(3);
         let mut random = |size: f32| size * Vec3::from_array(std::array::from_fn(|_| rng.f32()));
-        for (count, size) in [(2000, 0.4), (40, 0.1)] {
+        let pose = Pose3::new(Vec3::new(0.3, -0.2, 0.1), Vec3::new(0.5, 1.0, -0.7));
+        for (count, size, is_culled) in [
+            (2000, 0.4, false),
+            (2000, 0.4, true),
+            (40, 0.1, false),
+            (40, 0.1, true),
+        ] {
             let points: Vec<Vec3> = (0..count).map(|_| random(size)).collect();
-            let cloud = cloud(points.clone());
+            let own: Vec<Vec3> = (points.iter())
+                .map(|p| pose.inverse_transform_point(*p))
+                .collect();
+            let cloud = cloud(own);
+            let region = Region {
+                overlap: Aabb {
+                    min: Vec3::ZERO,
+                    max: Vec3::splat(0.22),
+                },
+                other_from_frame: Pose3::translation(-0.02, 0.0, 0.0),
+                other_bounds: Aabb {
+                    min: Vec3::ZERO,
+                    max: Vec3::ONE,
+                },
+            };
+            let (mut culled, mut scratch) = (Survivors::default(), CullScratch::default());
+            cull(&cloud, &pose, &region, 1, &mut scratch, &mut culled);
+            let culled = is_culled.then_some(Culled {
+                points: &culled,
+                region: &region,
+            });
             let mut around = Surroundings::default();
             // Around a part of the larger cloud only.
-            around.find(&cloud, [0.1, 0.2].map(Vec3::splat).into_iter());
-            assert!((40..1500).contains(&around.points.len()));
+            let places = [0.1, 0.2].map(Vec3::splat);
+            around.find(&cloud, &pose, culled.as_ref(), &places);
+            assert!((20..1900).contains(&around.points.len()));
+            let mut known = 0;
             for k in 0..300 {
                 let place = random(1.2 * size);
                 let beyond = [0.0, 0.01, 0.03][k % 3];
@@ -325,10 +397,15 @@ mod tests {
                 let mut expected: Vec<f32> = squares.filter(|s| limits.contains(s)).collect();
                 expected.sort_by(f32::total_cmp);
                 expected.resize(NEIGHBORS.max(expected.len()), f32::INFINITY);
+                known += usize::from(around.knows(place));
                 let found = around.nearest(&cloud, place, beyond, reach);
-                let found = found.map(|(squared, _)| squared);
-                assert_eq!(found[..], expected[..NEIGHBORS], "{place} {beyond} {reach}");
+                for ((found, _), expected) in found.iter().zip(expected) {
+                    // Points were moved there and back.
+                    let is_alike = (found - expected).abs() <= 1e-6 || *found == expected;
+                    assert!(is_alike, "{found} {expected}: {place} {beyond} {reach}");
+                }
             }
+            assert!(known >= 3 && (known < 290 || !is_culled), "{known}");
         }
     }
 

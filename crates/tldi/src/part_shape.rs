@@ -1,7 +1,7 @@
 //! A part of a contact: its normal, its main direction, and the few points that stand for it.
 
 use crate::bowl::{Floor, GAP_PER_SLOPE, Lowest, relative_radius, slope_error};
-use crate::crease::{Frame, lower_by};
+use crate::crease::{Face, Frame, lower_by};
 use crate::links::Links;
 use crate::patches::Smooth;
 use crate::supports::{longest_axis, supports};
@@ -76,6 +76,15 @@ pub(crate) struct Pixels<'a> {
     pub(crate) links: &'a Links,
 }
 
+/// Memory of [`Shape::patch`], kept from call to call.
+#[derive(Debug, Default)]
+pub(crate) struct ShapeScratch {
+    /// Those that can be support points.
+    points: Vec<ContactPoint>,
+    /// The tangent planes there.
+    tangents: Vec<Face>,
+}
+
 impl Shape {
     pub(crate) fn of(
         members: &[u32],
@@ -132,9 +141,10 @@ impl Shape {
         &self,
         members: &[u32],
         pixels: &Pixels<'_>,
-        points: &mut Vec<ContactPoint>,
+        scratch: &mut ShapeScratch,
         params: &Params,
     ) -> ContactPatch {
+        let ShapeScratch { points, tangents } = scratch;
         let Pixels {
             contacts,
             smooth,
@@ -152,14 +162,14 @@ impl Shape {
         let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
         let roughness = supports.roughness_about_bowl;
         // How much lower than the lowest of the fitted points faces meet.
-        let lower = |lowest: &ContactPoint| {
+        let mut lower = |lowest: &ContactPoint| {
             let frame = Frame {
                 origin: self.centre,
                 axes: [self.longest, self.normal.cross(self.longest)],
                 normal: self.normal,
             };
             let pixels = in_band().map(|(contact, _)| contact);
-            lower_by(pixels, &frame, lowest, params.pixel_size)
+            lower_by(pixels, &frame, lowest, params.pixel_size, tangents)
         };
         if let Some(lowest) = lowest_of_bowl {
             // Around it the surfaces have other normals: points there would stop what rolls. Where noise

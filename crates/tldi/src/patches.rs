@@ -5,14 +5,12 @@
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
 use crate::cpu::sweep::SAME_FACE;
-use crate::gap_fit::fitted_gap;
+use crate::gap_fit::GapFit;
 use crate::links::{Groups, Links, join, root};
-use crate::lone_points::LonePoints;
+use crate::lone_points::{Culled, LonePoints};
 use crate::noise::allow_for_noise;
-use crate::part_shape::{Pixels, Shape, common_normal};
-use crate::{
-    ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, PairQuery, PairResult, Params,
-};
+use crate::part_shape::{Pixels, Shape, ShapeScratch, common_normal};
+use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params};
 use arrayvec::ArrayVec;
 use glamx::Vec3;
 use std::ops::Range;
@@ -59,10 +57,10 @@ pub struct PatchScratch {
     groups: Groups,
     stack: Vec<(usize, usize, u32)>,
     parts: Vec<Part>,
-    /// Members of the parts of one patch, of one of its groups, and those that can be support points.
+    /// Members of the parts of one patch, and of one of its groups.
     patch: Vec<u32>,
     spot: Vec<u32>,
-    points: Vec<ContactPoint>,
+    shape: ShapeScratch,
 }
 
 /// Some of the members, and what decides which patch they belong to.
@@ -90,8 +88,18 @@ impl PatchScratch {
     /// far away as that of one of these four is from it. Cost beside that of `reduce`: where there
     /// are components of few contact pixels, a pass over the points of the blocks around them.
     pub fn reduce_pair(&mut self, result: &mut PairResult, query: &PairQuery) {
+        self.reduce_culled(result, query, [None; 2]);
+    }
+
+    /// [`reduce_pair`](Self::reduce_pair) where all points of each cloud that can touch may be at hand.
+    pub(crate) fn reduce_culled(
+        &mut self,
+        result: &mut PairResult,
+        query: &PairQuery,
+        culled: [Option<Culled>; 2],
+    ) {
         self.link(result, &query.params);
-        if self.lone_points.drop(result, &self.links, query) {
+        if self.lone_points.drop(result, &self.links, query, culled) {
             self.links.find(&result.contacts, &query.params);
         }
         let tells_inside = query.a.is_oriented() || query.b.is_oriented();
@@ -228,12 +236,13 @@ impl PatchScratch {
             smooth: &self.smooth,
             links: &self.links,
         };
-        shape.patch(members, &pixels, &mut self.points, params)
+        shape.patch(members, &pixels, &mut self.shape, params)
     }
 
     /// Averages normals over linked neighbours and fits the gaps to them: what is left of a sensor's
     /// noise is a third.
     fn smooth(&mut self, contacts: &[ContactPixel]) {
+        let mut fit = GapFit::default();
         for (k, contact) in contacts.iter().enumerate() {
             let (mut normal_a, mut normal_b) = (contact.normal_a, contact.normal_b);
             let neighbors = self.links.neighbors(k as u32);
@@ -244,7 +253,7 @@ impl PatchScratch {
             let count = 1.0 + neighbors.len() as f32;
             let (normal_a, normal_b) = (normal_a / count, normal_b / count);
             self.smooth.push(Smooth {
-                gap: fitted_gap(k as u32, contacts, &self.links),
+                gap: fit.gap(k as u32, contacts, &self.links),
                 normal_a,
                 normal_b,
                 normal: common_normal(normal_a, normal_b).unwrap_or_else(|| contact.normal()),

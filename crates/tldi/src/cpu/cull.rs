@@ -39,6 +39,11 @@ impl Survivors {
         self.x.is_empty()
     }
 
+    /// Whether no point of the cloud that is in the region was left out.
+    pub(crate) fn are_all(&self) -> bool {
+        self.stride == 1
+    }
+
     pub(crate) fn point(&self, i: usize) -> Vec3 {
         Vec3::new(self.x[i], self.y[i], self.z[i])
     }
@@ -145,7 +150,7 @@ pub(crate) struct CullScratch {
 
 /// Which points of a cloud are kept: a box in the frame of the query and one in the frame of the
 /// other surface.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Region {
     /// Overlap of both bounds in the frame of the query, metres.
     pub overlap: Aabb,

@@ -95,7 +95,9 @@ impl Scratch {
             }
         }
         result.collides = self.crossings.are_enough();
-        self.patches.reduce_pair(result, query);
+        let sides = [(&self.a, &plan.sides[0]), (&self.b, &plan.sides[1])];
+        let culled = sides.map(|(side, plan)| side.culled(plan));
+        self.patches.reduce_culled(result, query, culled);
     }
 
     fn compare_paper(

@@ -11,7 +11,8 @@ use super::normals_sharpen::sharpen;
 use super::rect::{Footprint, Rect};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
 use super::sweep;
-use crate::plan::{AIM_SAMPLES, is_aim_sample};
+use crate::lone_points::Culled;
+use crate::plan::{AIM_SAMPLES, SidePlan, is_aim_sample};
 use crate::{Params, PointCloud, RayHit, Tldi, VirtualCamera};
 use glamx::{DVec3, Mat3, Pose3, Vec3};
 
@@ -107,6 +108,14 @@ impl Side {
             &mut self.kept,
             &mut self.near_normals,
         );
+    }
+
+    /// The culled points, if they are all that there are where `plan` says.
+    pub(super) fn culled<'a>(&'a self, plan: &'a SidePlan) -> Option<Culled<'a>> {
+        self.points.are_all().then_some(Culled {
+            points: &self.points,
+            region: &plan.region,
+        })
     }
 
     /// Mean of the cloud's near points, of which there are some, in the frame of the query, metres.

@@ -23,7 +23,7 @@ pub(crate) struct ZoneScratch {
 }
 
 /// Cells of at least the zone's reach over the overlap of both bounds.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct ZoneGrid {
     /// Corner of the first cell, metres.
     pub min: Vec3,
@@ -64,6 +64,15 @@ impl ZoneGrid {
 
     fn words(&self) -> usize {
         self.row_words * self.dims[1] * self.dims[2]
+    }
+
+    /// Bit of the cell that holds `point`; `None` outside.
+    fn bit(&self, point: Vec3) -> Option<usize> {
+        let cell = ((point - self.min) * self.inv_cell).floor();
+        let [lx, ly, lz] = self.dims.map(|n| n as f32);
+        let is_inside = cell.cmpge(Vec3::ZERO).all() && cell.cmplt(Vec3::new(lx, ly, lz)).all();
+        let [x, y, z] = cell.to_array().map(|c| c as usize);
+        is_inside.then(|| (z * self.dims[1] + y) * 64 * self.row_words + x)
     }
 
     fn mark(&self, cells: &[u32], bits: &mut Vec<u64>) {
@@ -171,6 +180,44 @@ pub(crate) fn zone(
     grid.mark(cells_b, bits);
     grid.dilate(bits, dilated);
     select(cells_a, bits, near_a);
+}
+
+/// Points around some places, kept from call to call.
+#[derive(Debug, Default)]
+pub(crate) struct AroundPlaces {
+    grid: ZoneGrid,
+    /// Cells of the places and those next to them; those and the next ones again.
+    near: Vec<u64>,
+    around: Vec<u64>,
+    spare: Vec<u64>,
+    cells: Vec<u32>,
+    /// Indices of the points in the latter.
+    pub(crate) found: Vec<u32>,
+}
+
+impl AroundPlaces {
+    /// Finds at least the points within `2 · reach` metres of `places`. Cost: linear in points.
+    pub(crate) fn find(&mut self, points: &Survivors, places: &[Vec3], reach: f32) {
+        let bounds = (places.iter().copied()).fold(Aabb::EMPTY, Aabb::including);
+        // What is outside counts to the outermost cells, which no place is near.
+        self.grid = ZoneGrid::new(&bounds.loosened(3.0 * reach), reach);
+        self.near.clear();
+        self.near.resize(self.grid.words(), 0);
+        for bit in places.iter().filter_map(|place| self.grid.bit(*place)) {
+            self.near[bit / 64] |= 1 << (bit % 64);
+        }
+        self.grid.dilate(&mut self.near, &mut self.spare);
+        self.around.clone_from(&self.near);
+        self.grid.dilate(&mut self.around, &mut self.spare);
+        locate(points, &self.grid, &mut self.cells);
+        select(&self.cells, &self.around, &mut self.found);
+    }
+
+    /// Whether all points within `reach` metres of `place` were found; so it is within `reach` of the places.
+    pub(crate) fn knows(&self, place: Vec3) -> bool {
+        let bit = self.grid.bit(place);
+        bit.is_some_and(|bit| self.near[bit / 64] >> (bit % 64) & 1 > 0)
+    }
 }
 
 #[cfg(test)]
