@@ -318,7 +318,7 @@ fn find_windows(
                     let place = a.camera.view_at(u as f32 + 0.5, v as f32 + 0.5, depth);
                     windows.push(Window {
                         view: seen.view,
-                        cube: (place / edge).floor().as_ivec3().to_array(),
+                        cube: (place / edge).to_array().map(|c| c.floor() as i32),
                         swaps: 1,
                     });
                 }
