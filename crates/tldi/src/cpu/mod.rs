@@ -9,6 +9,7 @@ mod cast;
 pub(crate) mod columns;
 pub(crate) mod compare;
 pub(crate) mod cull;
+mod fold;
 mod impact;
 mod lanes;
 mod near_exact;
@@ -226,7 +227,7 @@ pub fn build(
         sharpens: true,
     };
     if let Some(seen) = side.project(&view) {
-        side.whole_image(&view, &seen);
+        side.whole_image(&view, &seen, seen.rect);
     }
     side.image
 }

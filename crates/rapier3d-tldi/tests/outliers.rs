@@ -1,0 +1,120 @@
+//! A point far from all others costs no more memory than any other point, and lets its body rest where it
+//! would without it. A binary of its own with one test, since the memory of all threads is counted.
+
+mod common;
+mod limiting;
+
+use common::worlds::{HALF, TestResult, attached, dynamic_at};
+use common::{SPACING, cloud, cube, square};
+use limiting::most_held;
+use rapier3d::prelude::*;
+use rapier3d_tldi::prelude::*;
+
+/// Bytes a pair may hold for each of its points: its culled points on both sides, projected, with normals, and
+/// the splats, fragments, pixels and layers of three views.
+const BYTES_PER_POINT: usize = 16 << 10;
+
+/// Bytes a pair may hold whatever its points: images of 4 Mi pixels on both sides and their tiles, and the
+/// grid of 4 Mi bits twice.
+const BYTES: usize = 128 << 20;
+
+/// Steps until the body lies still.
+const STEPS: usize = 120;
+
+/// Distances of the outliers, metres.
+const DISTANCES: [f32; 3] = [70.0, 700.0, 7e3];
+
+/// What the body lies on.
+#[derive(Clone, Copy, Debug)]
+enum Floor {
+    HalfSpace,
+    /// A cuboid of 10 km.
+    Cuboid,
+    /// A sheet, with an outlier of its own in the direction of the body's or without.
+    Cloud(bool),
+}
+
+/// Where the outlier is from the body.
+fn outlier(direction: Vector, distance: f32) -> Vector {
+    Vector::Y * -HALF + direction.normalize() * distance
+}
+
+fn collider_of(floor: Floor, direction: Vector, distance: f32) -> (ColliderBuilder, usize) {
+    match floor {
+        Floor::HalfSpace => (
+            ColliderBuilder::new(SharedShape::new(HalfSpace::new(Vector::Y))),
+            0,
+        ),
+        Floor::Cuboid => {
+            let half = 5e3;
+            let cuboid = ColliderBuilder::cuboid(half, half, half);
+            (cuboid.translation(Vector::Y * -half), 0)
+        }
+        Floor::Cloud(has_outlier) => {
+            let mut points = square(1.0);
+            if has_outlier {
+                points.push(direction.normalize() * distance);
+            }
+            let count = points.len();
+            (cloud_collider(PointCloudShape::new(cloud(&points))), count)
+        }
+    }
+}
+
+/// How far below the floor the body's lower face ends up, and the bytes that it takes.
+fn rest(floor: Floor, direction: Vector, distance: f32) -> Result<(f32, usize, usize), TldiError> {
+    let mut points = cube(HALF);
+    points.push(outlier(direction, distance));
+    let (floor, floor_points) = collider_of(floor, direction, distance);
+    let count = points.len() + floor_points;
+    let (mut world, mut tldi) = attached();
+    world.insert(RigidBodyBuilder::fixed(), floor);
+    // Of the cube alone: where a point is that is no part of the body says nothing about its mass.
+    let mass = MassProperties::from_cuboid(1000.0, Vector::splat(HALF));
+    let shape = PointCloudShape::new(cloud(&points));
+    let collider = cloud_collider(shape).mass_properties(mass);
+    let (body, _) = world.insert(dynamic_at(HALF + 0.25 * SPACING), collider);
+    let mut result = Ok(());
+    let bytes = most_held(|| {
+        for _ in 0..STEPS {
+            result = tldi.step(&mut world).map(|_| ());
+        }
+    });
+    result?;
+    Ok((HALF - world.bodies[body].translation().y, bytes, count))
+}
+
+#[test]
+fn outliers_cost_what_points_cost() -> TestResult {
+    let floors = [
+        Floor::HalfSpace,
+        Floor::Cuboid,
+        Floor::Cloud(false),
+        Floor::Cloud(true),
+    ];
+    // On the plane of the floor, above it, and away in all axes.
+    let directions = [
+        Vector::new(0.8, 0.0, 0.6),
+        Vector::Y,
+        Vector::new(0.5, 0.6, 0.7),
+    ];
+    let mut worst = 0;
+    for floor in floors {
+        for direction in directions {
+            for distance in DISTANCES {
+                let start = std::time::Instant::now();
+                let (depth, bytes, count) = rest(floor, direction, distance)?;
+                let case = format!("{floor:?}, {direction} at {distance} m");
+                eprintln!(
+                    "{case}: depth {depth} bytes {bytes} ms/step {}",
+                    start.elapsed().as_secs_f64() * 1e3 / STEPS as f64
+                );
+                if depth.abs() > SPACING || bytes > BYTES + count * BYTES_PER_POINT {
+                    worst += 1;
+                }
+            }
+        }
+    }
+    assert_eq!(worst, 0);
+    Ok(())
+}
