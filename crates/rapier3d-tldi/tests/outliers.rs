@@ -17,6 +17,9 @@ const BYTES_PER_POINT: usize = 4 << 10;
 /// three times. An image over a square of 70 m takes 50 MB.
 const BYTES: usize = 16 << 20;
 
+/// The same where pixels must be larger: images of 4 Mi pixels on both sides, and their tiles.
+const BYTES_OF_LARGEST: usize = 128 << 20;
+
 /// Steps until the body lies still.
 const STEPS: usize = 120;
 
@@ -83,6 +86,43 @@ fn rest(floor: Floor, direction: Vector, distance: f32) -> Result<(f32, usize, u
     Ok((HALF - world.bodies[body].translation().y, bytes, count))
 }
 
+/// Points none of which is near another, on a floor: there is nothing to fold.
+fn strewn_points_get_larger_pixels() -> TestResult {
+    let radius = 0.005;
+    let mut rng = fastrand::Rng::with_seed(7);
+    let mut coordinate = || 200.0 * (rng.f32() - 0.5);
+    let points: Vec<Vector> = (0..3000)
+        .map(|_| Vector::new(coordinate(), 0.0, coordinate()))
+        .collect();
+    let count = points.len();
+    let (mut world, mut tldi) = attached();
+    let half_space = SharedShape::new(HalfSpace::new(Vector::Y));
+    world.insert(RigidBodyBuilder::fixed(), ColliderBuilder::new(half_space));
+    let shape = PointCloudShape::new(PointCloud::builder(points).radius(radius).build()?);
+    let mass = MassProperties::from_cuboid(1.0, Vector::new(100.0, 1.0, 100.0));
+    let collider = cloud_collider(shape).mass_properties(mass);
+    let (body, _) = world.insert(dynamic_at(0.5 * radius), collider);
+    let (mut result, mut coarser) = (Ok(()), None::<f32>);
+    let bytes = most_held(|| {
+        for _ in 0..10 {
+            match tldi.step(&mut world) {
+                Ok(report) => {
+                    let largest = coarser.into_iter().chain(report.coarser_pixels);
+                    coarser = largest.reduce(f32::max);
+                }
+                Err(error) => result = Err(error),
+            }
+        }
+    });
+    result?;
+    let depth = -world.bodies[body].translation().y;
+    assert!(depth.abs() <= REST_TOLERANCE, "{depth} m deep");
+    assert!(coarser.is_some_and(|by| by > 1.0), "{coarser:?}");
+    let most = BYTES_OF_LARGEST + count * BYTES_PER_POINT;
+    assert!(bytes <= most, "{bytes} bytes for {count} points");
+    Ok(())
+}
+
 #[test]
 fn outliers_cost_what_points_cost() -> TestResult {
     let floors = [
@@ -109,6 +149,7 @@ fn outliers_cost_what_points_cost() -> TestResult {
             }
         }
     }
+    strewn_points_get_larger_pixels()?;
     // Where positions are coarser than points are apart the cloud is refused.
     let beyond = PointCloud::builder(vec![Vector::ZERO, 7e6 * Vector::X]);
     let refused = beyond.radius(SPACING).build();
