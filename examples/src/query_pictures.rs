@@ -300,13 +300,14 @@ impl Views {
     fn new(query: &CloudQuery, answer: &Answer) -> Self {
         let axis = axis_of(query, answer, 0);
         let fine = Self::around(query, axis, answer.params.pixel_size, answer.params);
-        let pixels = fine.size[0].max(fine.size[1]);
-        let pixel_size = answer.params.pixel_size * (pixels as f32 / PANEL_PIXELS as f32).max(1.0);
+        let deep = (fine.depths[1] - fine.depths[0]) / answer.params.pixel_size;
+        let pixels = deep.max(fine.size[0].max(fine.size[1]) as f32);
+        let pixel_size = answer.params.pixel_size * (pixels / PANEL_PIXELS as f32).max(1.0);
         let params = answer.params.with_pixel_size(pixel_size);
         Self::around(query, axis, pixel_size, params)
     }
 
-    /// The contact pixels of a view and their surroundings, in the query's pixels.
+    /// The contact pixels of a view and their surroundings, in the query's pixels, as far as a panel holds them.
     fn of_contacts(
         query: &CloudQuery,
         answer: &Answer,
@@ -318,11 +319,14 @@ impl Views {
         if contacts.is_empty() {
             return Self::new(query, answer);
         }
+        // As many as a panel holds, around the middle one of them.
         let range = |k: usize| {
-            let pixels = contacts.iter().map(|contact| contact.pixel[k]);
-            pixels.fold((i32::MAX, i32::MIN), |(least, most), p| {
-                (least.min(p), most.max(p))
-            })
+            let mut pixels: Vec<i32> = contacts.iter().map(|contact| contact.pixel[k]).collect();
+            pixels.sort_unstable();
+            let middle = pixels[pixels.len() / 2];
+            let half = PANEL_PIXELS as i32 / 2;
+            let shown = |p: i32| p.clamp(middle.saturating_sub(half), middle.saturating_add(half));
+            (shown(pixels[0]), shown(pixels[pixels.len() - 1]))
         };
         for k in 0..2 {
             let (least, most) = range(k);
@@ -351,15 +355,20 @@ impl Views {
         }
     }
 
+    /// Of the pixels of the rectangle, which are counted from its first one.
     fn images(&self, query: &CloudQuery) -> [Tldi; 2] {
+        let mut camera = self.camera;
+        let first = self.origin.map(|c| c as f32 * self.params.pixel_size);
+        camera.view_from_frame.translation -= Vec3::new(first[0], first[1], 0.0);
+        camera.size = Some(self.size);
         let poses = [Pose3::IDENTITY, query.a_from_b];
         [(&query.a, poses[0]), (&query.b, poses[1])]
-            .map(|(cloud, pose)| tldi::build(cloud, &pose, &self.camera, &self.params))
+            .map(|(cloud, pose)| tldi::build(cloud, &pose, &camera, &self.params))
     }
 
     /// The layers of an image at a pixel of the view.
     fn layers_at<'a>(&self, image: &'a Tldi, pixel: [i32; 2]) -> &'a [Layer] {
-        let [i, j] = [0, 1].map(|k| pixel[k] - image.origin[k]);
+        let [i, j] = [0, 1].map(|k| pixel[k] - self.origin[k] - image.origin[k]);
         let inside = i >= 0 && j >= 0 && i < image.size[0] as i32 && j < image.size[1] as i32;
         if inside {
             image.layers_at(i as u32, j as u32)

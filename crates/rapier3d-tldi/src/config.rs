@@ -2,6 +2,7 @@
 
 use crate::parts::cloud_of;
 use crate::{Resolution, TldiError};
+use rapier3d::math::Vector;
 use rapier3d::parry::shape::Shape;
 use tldi::{CameraPolicy, Params, Variant};
 
@@ -13,6 +14,13 @@ const LEAST_PIXELS: f32 = 8.0;
 /// Contacts are looked for up to this many standard deviations of told noise, so that the gaps of what
 /// just touches are fitted to what is around it on all sides.
 const FITTED: f32 = 3.0;
+
+/// Largest pixel, metres, in which a body of these extents, metres, is [`LEAST_PIXELS`] across.
+pub(crate) fn resolving(extents: Vector) -> f32 {
+    let mut extents = extents.to_array();
+    extents.sort_by(f32::total_cmp);
+    extents[1] / LEAST_PIXELS
+}
 
 /// Settings of a [`TldiPipeline`](crate::TldiPipeline), the same for all its pairs.
 ///
@@ -116,9 +124,7 @@ impl TldiConfig {
             true => first,
             false => second,
         };
-        let mut extents = size(&smaller).to_array();
-        extents.sort_by(f32::total_cmp);
-        let to_resolve = (extents[1] / LEAST_PIXELS).max(radius(smaller).unwrap_or(0.0));
+        let to_resolve = resolving(size(&smaller)).max(radius(smaller).unwrap_or(0.0));
         let params = match self.variant {
             Variant::Paper => Params::paper(coarsest),
             Variant::Oriented => Params::for_radius(coarsest),

@@ -7,6 +7,7 @@
 //! (`contact_recycling`), with a distance that does not know how fine the cloud is.
 
 use crate::TldiConfig;
+use crate::config::resolving;
 use crate::parts::{PartPair, ShapePair, clouds_of};
 use rapier3d::math::Pose;
 use rapier3d::parry::bounding_volume::Aabb;
@@ -52,10 +53,12 @@ impl Measured {
             .chain(clouds_of(pair.shape2))
             .map(|cloud| cloud.mean_radius())
             .reduce(f32::max)?;
-        let max_drift = config.scatter * coarsest;
         let bounds = [pair.shape1, pair.shape2].map(|shape| shape.compute_local_aabb());
         let size = bounds.map(|bounds| bounds.extents().length_squared());
         let shape1_is_smaller = size[0] < size[1];
+        let smaller = bounds[usize::from(!shape1_is_smaller)].extents();
+        // What is smaller than the points are apart would be through them before they are looked at again.
+        let max_drift = config.scatter * coarsest.min(resolving(smaller));
         (max_drift > 0.0).then_some(Self {
             pos12: pair.pos12,
             prediction: pair.prediction,

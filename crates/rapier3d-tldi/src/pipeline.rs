@@ -221,6 +221,7 @@ impl TldiPipeline {
             pairs_missed: on_the_spot.pairs,
             pairs_in_contact: 0,
             contact_pixels: on_the_spot.contact_pixels,
+            coarser_pixels: on_the_spot.coarser_pixels,
             max_penetration: 0.0,
             prepare_seconds: self.prepare_seconds,
             backend: Arc::clone(&self.compared_by.backend),
@@ -232,6 +233,11 @@ impl TldiPipeline {
             batch.stop_blocked(bodies, colliders);
             (report.pairs_batched, report.pairs_kept) = batch.counts();
             report.contact_pixels += batch.contact_pixels();
+            let coarser = report
+                .coarser_pixels
+                .into_iter()
+                .chain(batch.coarser_pixels());
+            report.coarser_pixels = coarser.reduce(f32::max);
             self.memory.update(self.search.candidates(), &batch);
             batch.clear();
         }

@@ -137,18 +137,34 @@ impl Batch {
 
     /// Contact pixels of the pairs that rapier asked for.
     pub(crate) fn contact_pixels(&self) -> usize {
-        let used = self
-            .pairs
-            .iter()
-            .filter(|pair| pair.used.load(Ordering::Relaxed));
-        used.map(|pair| count_pixels(&self.parts[pair.parts.clone()], &self.results))
-            .sum()
+        let parts = self.used_parts();
+        parts.map(|parts| count_pixels(parts, &self.results)).sum()
+    }
+
+    /// By how much pixels were made larger, the most of the pairs that rapier asked for.
+    pub(crate) fn coarser_pixels(&self) -> Option<f32> {
+        self.used_parts()
+            .filter_map(|parts| coarser_pixels(parts, &self.results))
+            .reduce(f32::max)
+    }
+
+    /// Parts of the pairs that rapier asked for.
+    fn used_parts(&self) -> impl Iterator<Item = &[PartPair]> {
+        let pairs = self.pairs.iter();
+        let used = pairs.filter(|pair| pair.used.load(Ordering::Relaxed));
+        used.map(|pair| &self.parts[pair.parts.clone()])
     }
 }
 
 pub(crate) fn count_pixels(parts: &[PartPair], results: &[PairResult]) -> usize {
     let comparisons = parts.iter().filter_map(|part| part.comparison.as_ref());
     comparisons.map(|c| results[c.query].contacts.len()).sum()
+}
+
+fn coarser_pixels(parts: &[PartPair], results: &[PairResult]) -> Option<f32> {
+    let comparisons = parts.iter().filter_map(|part| part.comparison.as_ref());
+    let coarser = comparisons.filter_map(|c| results[c.query].coarser);
+    coarser.reduce(f32::max)
 }
 
 /// A CPU backend and its memory, for one pair at a time.
@@ -160,10 +176,12 @@ pub(crate) struct Spot {
 }
 
 /// Comparisons on the spot since the batch.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct SpotCounts {
     pub(crate) pairs: usize,
     pub(crate) contact_pixels: usize,
+    /// By how much pixels were made larger, the most of them.
+    pub(crate) coarser_pixels: Option<f32>,
 }
 
 /// State shared by a pipeline and its dispatchers.
@@ -179,6 +197,8 @@ pub(crate) struct Shared {
     spots: Mutex<Vec<Spot>>,
     spot_pairs: AtomicUsize,
     spot_pixels: AtomicUsize,
+    /// Bits of an `f32`, which are in the order of positive numbers; 0 where no pixels were made larger.
+    spot_coarser: AtomicU32,
     failed: Mutex<Option<(usize, BackendError)>>,
 }
 
@@ -192,6 +212,7 @@ impl Shared {
             spots: Mutex::default(),
             spot_pairs: AtomicUsize::new(0),
             spot_pixels: AtomicUsize::new(0),
+            spot_coarser: AtomicU32::new(0),
             failed: Mutex::default(),
         }
     }
@@ -236,6 +257,10 @@ impl Shared {
             spot.compare(pair, config)?;
             let pixels = count_pixels(&spot.parts, &spot.results);
             self.spot_pixels.fetch_add(pixels, Ordering::Relaxed);
+            if let Some(coarser) = coarser_pixels(&spot.parts, &spot.results) {
+                self.spot_coarser
+                    .fetch_max(coarser.to_bits(), Ordering::Relaxed);
+            }
             Ok(read(&spot.parts, &spot.results))
         })
     }
@@ -284,6 +309,9 @@ impl Shared {
         SpotCounts {
             pairs: self.spot_pairs.swap(0, Ordering::Relaxed),
             contact_pixels: self.spot_pixels.swap(0, Ordering::Relaxed),
+            coarser_pixels: Some(self.spot_coarser.swap(0, Ordering::Relaxed))
+                .filter(|&bits| bits > 0)
+                .map(f32::from_bits),
         }
     }
 

@@ -65,6 +65,10 @@ pub struct PairResult {
     pub axes: Vec<Vec3>,
     /// Pixels where the surfaces are within [`Params::prediction`] or penetrate.
     pub contacts: Vec<ContactPixel>,
+    /// By how much pixels were made larger than [`Params::pixel_size`], since the image would have had more than 4 Mi
+    /// pixels, and more than 16 for each point in reach, though empty rows and columns take none; `None` where they
+    /// were not. Gaps err by more then.
+    pub coarser: Option<f32>,
     /// The contact pixels grouped and reduced to what a solver needs, deepest patch first.
     pub patches: Vec<ContactPatch>,
 }
@@ -74,6 +78,7 @@ impl PairResult {
     pub fn clear(&mut self) {
         self.collides = false;
         self.gap = None;
+        self.coarser = None;
         self.axes.clear();
         self.contacts.clear();
         self.patches.clear();

@@ -63,6 +63,19 @@ impl VirtualCamera {
         }
     }
 
+    /// The same view with pixels larger by a factor of `by`, where it has no fixed size.
+    pub(crate) fn coarser(self, by: f32) -> Self {
+        match (self.projection, self.size) {
+            (Projection::Orthographic { pixel_size }, None) => Self {
+                projection: Projection::Orthographic {
+                    pixel_size: by * pixel_size,
+                },
+                ..self
+            },
+            _ => self,
+        }
+    }
+
     /// A perspective camera at `eye` that looks at `target`, with the image's vertical axis along
     /// `up`, a horizontal field of view `fov` in radians, and `near` and `far` depths in metres.
     pub fn perspective(

@@ -13,6 +13,9 @@ const SAME_SURFACE_PX: f32 = 3.0;
 /// overlap over more.
 const CONFIRMING: u32 = 5;
 
+/// From a pixel to its neighbours that come after it, row by row: columns and rows.
+const AFTER: [[i64; 2]; 4] = [[1, 0], [-1, 1], [0, 1], [1, 1]];
+
 /// In place of an index.
 pub(crate) const NONE: u32 = u32::MAX;
 
@@ -21,8 +24,6 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(crate) struct Links {
     /// Indices of the contact pixels, the lower one first.
     pub(crate) pairs: Vec<(u32, u32)>,
-    /// First contact pixel at each pixel of a view's rectangle.
-    map: Vec<u32>,
     /// Links of each contact pixel; then its new index, or [`NONE`]; then, at each root, whether the
     /// surfaces are apart anywhere in its component.
     counts: Vec<u32>,
@@ -40,32 +41,18 @@ impl Links {
         let limit = SAME_SURFACE_PX * params.pixel_size;
         let mut first = 0;
         for view in contacts.chunk_by(|c, d| c.view == d.view) {
-            let (lo, hi) = view
-                .iter()
-                .fold(([i32::MAX; 2], [i32::MIN; 2]), |(lo, hi), c| {
-                    (
-                        [0, 1].map(|k| lo[k].min(c.pixel[k])),
-                        [0, 1].map(|k| hi[k].max(c.pixel[k])),
-                    )
-                });
-            // A rim of one pixel on the left and right spares the bounds checks.
-            let width = (hi[0] - lo[0] + 3) as usize;
-            let height = (hi[1] - lo[1] + 2) as usize;
-            let at = |p: [i32; 2]| (p[1] - lo[1]) as usize * width + (p[0] - lo[0] + 1) as usize;
-            self.map.clear();
-            self.map.resize(width * height, NONE);
-            for (k, c) in view.iter().enumerate().rev() {
-                self.map[at(c.pixel)] = k as u32;
-            }
+            // The first contact pixel not before each of the pixels that come after one: they move on as it does, so
+            // that nothing is as large as the bounds of the pixels.
+            let mut starts = [0; AFTER.len()];
             for (k, c) in view.iter().enumerate() {
-                let own = at(c.pixel);
-                for next in [own + 1, own + width - 1, own + width, own + width + 1] {
-                    let Some(start) = self.map.get(next).copied().filter(|&m| m != NONE) else {
-                        continue;
-                    };
-                    let same_pixel = view[start as usize].pixel;
-                    for (l, d) in view.iter().enumerate().skip(start as usize) {
-                        if d.pixel != same_pixel {
+                for (start, offset) in starts.iter_mut().zip(AFTER) {
+                    let [i, j] = [0, 1].map(|axis| i64::from(c.pixel[axis]) + offset[axis]);
+                    let place = |d: &ContactPixel| (i64::from(d.pixel[1]), i64::from(d.pixel[0]));
+                    while view.get(*start).is_some_and(|d| place(d) < (j, i)) {
+                        *start += 1;
+                    }
+                    for (l, d) in view.iter().enumerate().skip(*start) {
+                        if place(d) != (j, i) {
                             break;
                         }
                         if c.point_a.distance(d.point_a) <= limit

@@ -1,5 +1,6 @@
 //! Stage `cast`: the image of an exact surface, one ray a pixel.
 
+use super::fold::ViewFold;
 use super::rect::Rect;
 use crate::{Facing, Layer, RayHit, RaySurface, Tldi, VirtualCamera};
 use glamx::Pose3;
@@ -9,6 +10,8 @@ pub(crate) struct Rays<'a> {
     /// Orthographic.
     pub(crate) camera: &'a VirtualCamera,
     pub(crate) rect: Rect,
+    /// Of the image's columns and rows.
+    pub(crate) fold: &'a ViewFold,
     /// They run from this depth, in metres, ...
     pub(crate) near: f32,
     /// ... to this one.
@@ -28,6 +31,7 @@ pub(crate) fn cast(
     let Rays {
         camera,
         rect,
+        fold,
         near,
         far,
         cover,
@@ -40,7 +44,8 @@ pub(crate) fn cast(
         if cover.is_none_or(|cover| !cover.layers_of(pixel).is_empty()) {
             let i = rect.origin[0] + (pixel % rect.size[0] as usize) as i32;
             let j = rect.origin[1] + (pixel / rect.size[0] as usize) as i32;
-            let start = camera.point_at(i as f32 + 0.5, j as f32 + 0.5, near);
+            let [u, v] = fold.unfolded([i, j]).map(|c| c as f32 + 0.5);
+            let start = camera.point_at(u, v, near);
             let origin = frame_from_surface.inverse_transform_point(start);
             hits.clear();
             surface.crossings(origin, direction, far - near, hits);

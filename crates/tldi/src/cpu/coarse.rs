@@ -121,6 +121,8 @@ impl Scratch {
             }
             next = large_pixel(query, depth, DEEP);
         }
+        // There may be room for the pixels of the fine look, which thins nothing out.
+        self.fold.coarser = None;
         result.clear();
         came_to
     }
@@ -217,7 +219,10 @@ impl Scratch {
             || side_a.image_of_cells(&a, &imaging, touching),
             || side_b.image_of_cells(&b, &imaging, touching),
         );
-        let seen = self.seen(query, plan, camera, axes, view);
+        let seen = Seen {
+            fold: Some(&self.fold),
+            ..self.seen(query, plan, camera, axes, view)
+        };
         let [a, b] = [&self.a.image, &self.b.image];
         let mut counted = Crossings::default();
         let first = result.contacts.len();
@@ -314,7 +319,8 @@ fn find_windows(
             ];
             for next in nexts.into_iter().flatten() {
                 if let Some(depth) = compare::swap_depth(at(k), at(next), &others, params) {
-                    let [u, v] = [a.origin[0] + i as i32, a.origin[1] + j as i32];
+                    let pixel = [a.origin[0] + i as i32, a.origin[1] + j as i32];
+                    let [u, v] = seen.fold.map_or(pixel, |fold| fold.unfolded(pixel));
                     let place = a.camera.view_at(u as f32 + 0.5, v as f32 + 0.5, depth);
                     windows.push(Window {
                         view: seen.view,

@@ -6,9 +6,11 @@
 //! In the columns that remain every layer of both is built, as deep contacts need.
 
 use super::cull::Survivors;
+use super::fold::{FARTHEST_PIXEL, ViewFold};
 use super::lanes::{multiversioned, truncated};
 use super::rect::{Footprint, Rect};
 use super::splat::splat_radius;
+use crate::plan::AIM_SAMPLES;
 use crate::{Projection, VirtualCamera};
 use glamx::{Mat3, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
@@ -106,8 +108,7 @@ impl Columns {
         let radius = splat_radius(radius, camera.pixel_size_at(hi.z));
         first = first.map(|c| c - reach);
         last = last.map(|c| c + reach);
-        let corner = |c: [f32; 2]| c.map(|c| c.floor() as i32);
-        let mut rect = Rect::from_corners(corner(first), corner(last))?;
+        let mut rect = rect_of(first, last)?;
         if let Some(size) = camera.size {
             rect = rect.intersection(&Rect {
                 origin: [0, 0],
@@ -122,6 +123,32 @@ impl Columns {
             reach,
             pixel_size: nearest,
         })
+    }
+
+    /// Moves the points of an orthographic view to where `fold` has them, and `seen` with them.
+    pub(crate) fn fold(&mut self, fold: &ViewFold, camera: &VirtualCamera, seen: &mut Footprint) {
+        fold.fold(&mut self.x, &mut self.y);
+        let [x, y] = [bounds(&self.x), bounds(&self.y)];
+        let corner = |x, y, reach| {
+            let pixel = camera.pixel_from_view(Vec3::new(x, y, 0.0));
+            pixel.map(|c| c + reach)
+        };
+        let (first, last) = (corner(x.0, y.0, -seen.reach), corner(x.1, y.1, seen.reach));
+        seen.rect = rect_of(first, last).unwrap_or(seen.rect);
+    }
+
+    /// Coordinates of the points across the view, metres.
+    pub(crate) fn across(&self) -> impl Iterator<Item = [f32; 2]> + Clone {
+        self.x.iter().zip(&self.y).map(|(x, y)| [*x, *y])
+    }
+
+    /// Median depth of an even selection of the points, metres.
+    pub(crate) fn median_depth(&self) -> f32 {
+        let mut depths = arrayvec::ArrayVec::<f32, AIM_SAMPLES>::new();
+        let step = self.depth.len().div_ceil(AIM_SAMPLES).max(1);
+        depths.extend(self.depth.iter().copied().step_by(step));
+        depths.sort_unstable_by(f32::total_cmp);
+        depths.get(depths.len() / 2).copied().unwrap_or(0.0)
     }
 
     pub(crate) fn view(&self, i: usize) -> Vec3 {
@@ -314,6 +341,12 @@ impl Touching {
         let last = [0, 1].map(|k| tiles.origin[k] + (hi[k] as i32 + 1) * tiles.edge - 1);
         Rect::from_corners(first, last)?.intersection(rect)
     }
+}
+
+/// The pixels between two corners in pixel coordinates, as far as there are any.
+pub(super) fn rect_of(first: [f32; 2], last: [f32; 2]) -> Option<Rect> {
+    let corner = |c: [f32; 2]| c.map(|c| c.floor().clamp(-FARTHEST_PIXEL, FARTHEST_PIXEL) as i32);
+    Rect::from_corners(corner(first), corner(last))
 }
 
 /// Replaces each value by what `op` makes of it and its eight neighbours. `spare` is overwritten.

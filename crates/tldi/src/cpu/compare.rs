@@ -5,6 +5,7 @@
 //! no closed surface. Contact pixels pair a layer through which rays leave the second body with
 //! one through which they enter the first.
 
+use super::fold::ViewFold;
 use super::sweep::{SAME_FACE, is_edge_on, share_of};
 use crate::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera};
@@ -54,6 +55,8 @@ pub(crate) struct Seen<'a> {
     pub(crate) middles: Middles,
     /// Whether the outward normals of `a`, and of `b`, say that the view looks at it from behind.
     pub(crate) from_behind: [bool; 2],
+    /// Of the columns and rows of both images, if they are folded.
+    pub(crate) fold: Option<&'a ViewFold>,
 }
 
 impl Seen<'_> {
@@ -101,7 +104,10 @@ pub(crate) fn compare(
                 continue;
             }
             let at = PixelView {
-                pixel: [a.origin[0] + i as i32, a.origin[1] + j as i32],
+                pixel: match ([a.origin[0] + i as i32, a.origin[1] + j as i32], seen.fold) {
+                    (pixel, Some(fold)) => fold.unfolded(pixel),
+                    (pixel, None) => pixel,
+                },
                 camera: &a.camera,
                 frame_from_view: &frame_from_view,
                 view: seen.view,

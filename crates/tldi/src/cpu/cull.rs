@@ -5,6 +5,7 @@
 //! floor of the whole pipeline is this stage's reading of the coordinates. Of a cloud much finer
 //! than the pixels only every n-th point is taken ([`stride`](crate::plan::stride)): more would not be seen.
 
+use super::fold::SpaceFold;
 use super::lanes::multiversioned;
 use crate::plan::first_taken;
 use crate::{Aabb, BLOCK, PointCloud, Radii};
@@ -46,6 +47,21 @@ impl Survivors {
 
     pub(crate) fn point(&self, i: usize) -> Vec3 {
         Vec3::new(self.x[i], self.y[i], self.z[i])
+    }
+
+    pub(crate) fn points(&self) -> impl Iterator<Item = Vec3> + Clone {
+        (0..self.len()).map(|i| self.point(i))
+    }
+
+    /// Takes the coordinates of `other` as they are on folded axes.
+    pub(crate) fn fold(&mut self, other: &Self, fold: &SpaceFold) {
+        self.clear();
+        for point in other.points() {
+            let folded = fold.folded(point);
+            self.x.push(folded.x);
+            self.y.push(folded.y);
+            self.z.push(folded.z);
+        }
     }
 
     fn append(&mut self, other: &Self) {

@@ -88,7 +88,15 @@ impl Scratch {
         }
         let camera = VirtualCamera::along(query.motion, query.params.pixel_size);
         self.cull_swept(query, &camera)?;
-        self.images_of_motion(query, &camera, length)?;
+        let seen = self.images_of_motion(query, &camera, length);
+        if let Some(coarser) = self.fold.coarser.take() {
+            let pixel_size = coarser * query.params.pixel_size;
+            return self.impact(&ImpactQuery {
+                params: query.params.with_pixel_size(pixel_size),
+                ..*query
+            });
+        }
+        seen?;
         let (a, b) = (&self.a.image, &self.b.image);
         if query.core_only {
             match query.b {
@@ -135,10 +143,13 @@ impl Scratch {
             .extend((0..b.pixel_count()).filter_map(|pixel| nearest(pixel, f32::NEG_INFINITY)));
         self.meetings.sort_unstable_by(order);
         let image_width = b.size[0] as usize;
-        let origin = b.origin.map(|o| o as f32 + 0.5);
+        let fold = &self.fold;
         let place = |pixel: usize, depth: f32| {
-            let (i, j) = (pixel % image_width, pixel / image_width);
-            camera.point_at(origin[0] + i as f32, origin[1] + j as f32, depth)
+            let at = [pixel % image_width, pixel / image_width];
+            let [u, v] = fold
+                .unfolded([0, 1].map(|k| b.origin[k] + at[k] as i32))
+                .map(|c| c as f32 + 0.5);
+            camera.point_at(u, v, depth)
         };
         let b_from_a = query.a_from_b.inverse();
         let is_lone = |meeting: &Meeting| {
@@ -252,7 +263,7 @@ impl Scratch {
             sharpens: false,
         };
         let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
-        let (hits, touching) = (&mut self.hits, &mut self.touching);
+        let (hits, touching, fold) = (&mut self.hits, &mut self.touching, &mut self.fold);
         match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
                 let reach = length + query.params.thickness;
@@ -268,8 +279,14 @@ impl Scratch {
                     scope: Scope::Cloud,
                 };
                 let image = &mut self.a.image;
-                self.b
-                    .look_with(&view_of(cloud, a_from_b), &exact, touching, hits, image)
+                self.b.look_with(
+                    &view_of(cloud, a_from_b),
+                    &exact,
+                    touching,
+                    fold,
+                    hits,
+                    image,
+                )
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
                 let exact = ExactView {
@@ -281,8 +298,14 @@ impl Scratch {
                     scope: Scope::Everywhere, // its rim is not that of the cloud
                 };
                 let image = &mut self.b.image;
-                self.a
-                    .look_with(&view_of(cloud, a_from_a), &exact, touching, hits, image)
+                self.a.look_with(
+                    &view_of(cloud, a_from_a),
+                    &exact,
+                    touching,
+                    fold,
+                    hits,
+                    image,
+                )
             }
             _ => None, // refused
         }

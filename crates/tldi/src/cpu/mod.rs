@@ -11,6 +11,7 @@ mod coarse;
 pub(crate) mod columns;
 pub(crate) mod compare;
 pub(crate) mod cull;
+mod fold;
 mod impact;
 mod lanes;
 mod near_exact;
@@ -30,6 +31,7 @@ use crate::{
     Tldi, Variant, VirtualCamera, paper,
 };
 use cull::Region;
+use fold::ViewFold;
 use glamx::{Pose3, Vec3};
 use pair::Scratch;
 use rayon::prelude::*;
@@ -171,7 +173,8 @@ impl Backend for CpuBackend {
 
 /// The image of one cloud, all layers, with either variant.
 ///
-/// With an orthographic camera of no fixed size the image follows the cloud. Allocates; the
+/// With an orthographic camera of no fixed size the image follows the cloud, in larger pixels ([`Tldi::camera`] says
+/// which) where these would be more than 4 Mi and 16 for each point. Allocates; the
 /// backends reuse their memory instead. Cost: linear in points and fragments.
 ///
 /// ```
@@ -220,15 +223,23 @@ pub fn build(
         &mut side.cull,
         &mut side.points,
     );
-    let view = CloudView {
-        cloud,
-        frame_from_cloud,
-        camera,
-        params,
-        sharpens: true,
-    };
-    if let Some(seen) = side.project(&view) {
-        side.whole_image(&view, &seen);
+    let mut camera = *camera;
+    let mut room = ViewFold::default();
+    loop {
+        let view = CloudView {
+            cloud,
+            frame_from_cloud,
+            camera: &camera,
+            params,
+            sharpens: true,
+        };
+        if let Some(seen) = side.project(&view) {
+            if camera.size.is_none() && room.refuses(&seen.rect, side.points.len()) {
+                camera = camera.coarser(room.coarser.unwrap_or(1.0));
+                continue;
+            }
+            side.whole_image(&view, &seen, seen.rect);
+        }
+        return side.image;
     }
-    side.image
 }

@@ -5,7 +5,10 @@
 //! diagonal. Of the points in cells that can be near, an even selection aims the camera; all of them
 //! are asked where it finds few, so that no contact is too small to be found.
 
+use super::columns::rect_of;
+use super::fold::{SpaceFold, is_coarse};
 use super::normals;
+use super::rect::Rect;
 use super::side::Side;
 use super::zone::ZoneGrid;
 use crate::plan::{AIM_SAMPLES, is_aim_sample};
@@ -22,7 +25,10 @@ const LEAST_FREE: f32 = 0.05;
 /// Least distances of what is in the cells, in metres, not a number where nothing was asked yet; kept from
 /// call to call.
 #[derive(Default)]
-pub(super) struct CellDistances(Vec<f32>);
+pub(super) struct CellDistances {
+    least: Vec<f32>,
+    fold: SpaceFold,
+}
 
 /// An exact surface where a pair has it.
 #[derive(Clone, Copy)]
@@ -37,6 +43,18 @@ impl Placed<'_> {
         let own = self.frame_from_surface.inverse_transform_point(point);
         let (distance, normal) = self.surface.project(own);
         (distance, self.frame_from_surface.rotation * normal)
+    }
+
+    /// The pixels that it covers and `border` more on all sides; `None` where its bounds are infinite.
+    pub(super) fn covers(&self, camera: &VirtualCamera, border: i32) -> Option<Rect> {
+        let view_from_surface = camera.view_from_frame * *self.frame_from_surface;
+        let bounds = self.surface.bounds().transformed(&view_from_surface);
+        let corners = [bounds.min, bounds.max];
+        if !corners.iter().all(|corner| corner.is_finite()) {
+            return None;
+        }
+        let [first, last] = corners.map(|corner| camera.pixel_from_view(corner));
+        Some(rect_of(first, last)?.grown(border))
     }
 
     /// Whether it comes within `reach` metres of a column of pixels: of one through `[u, v]`, between two depths.
@@ -107,22 +125,41 @@ impl Side {
     /// with those within `beyond` metres more.
     fn in_near_cells(&mut self, exact: &Placed, reach: f32, beyond: f32) {
         let points = (0..self.points.len()).map(|i| self.points.point(i));
-        let bounds = points.fold(Aabb::EMPTY, Aabb::including);
-        let grid = ZoneGrid::with_cells(&bounds, reach, self.points.len() as f32);
+        let CellDistances {
+            least: distances,
+            fold,
+        } = &mut self.cell_distances;
+        fold.clear();
+        let count = points.len() as f32;
+        let mut bounds = points.clone().fold(Aabb::EMPTY, Aabb::including);
+        let mut grid = ZoneGrid::with_cells(&bounds, reach, count);
+        if is_coarse(grid.inv_cell, reach) {
+            fold.find(reach, points.clone());
+            let folded = points.map(|point| fold.folded(point));
+            bounds = folded.fold(Aabb::EMPTY, Aabb::including);
+            grid = ZoneGrid::with_cells(&bounds, reach, count);
+        }
         let half_diagonal = 0.5 * 3.0f32.sqrt() / grid.inv_cell;
-        let distances = &mut self.cell_distances.0;
         distances.clear();
         distances.resize(grid.dims.iter().product(), f32::NAN);
         self.support.clear();
         self.kept.clear();
         for i in 0..self.points.len() {
-            let at = ((self.points.point(i) - bounds.min) * grid.inv_cell).floor();
+            let point = self.points.point(i);
+            let folded = fold.folded(point);
+            let at = ((folded - bounds.min) * grid.inv_cell).floor();
             let cell = [at.x, at.y, at.z];
             let [x, y, z] = [0, 1, 2].map(|k| (cell[k] as usize).min(grid.dims[k] - 1));
             let least = &mut distances[(z * grid.dims[1] + y) * grid.dims[0] + x];
             if least.is_nan() {
                 let cell = Vec3::new(x as f32, y as f32, z as f32);
                 let middle = bounds.min + (cell + 0.5) / grid.inv_cell;
+                // Of the unfolded cell.
+                let middle = if folded == point {
+                    middle
+                } else {
+                    middle + (point - folded)
+                };
                 *least = exact.project(middle).0 - half_diagonal;
             }
             if *least <= reach + beyond {

@@ -5,6 +5,7 @@
 //! with cells as large as that; all points of a cell share the candidates of its 27 cells, whose
 //! moments are summed in lanes.
 
+use super::fold::{SpaceFold, is_coarse};
 use super::lanes::multiversioned;
 use super::normals_sharpen::SharpenScratch;
 use super::planes::{Batch, Moments, Plane};
@@ -36,6 +37,7 @@ pub(crate) const CONSTANTS: [(&str, f64); 2] = [
 #[derive(Default)]
 pub(crate) struct NormalScratch {
     cells: Vec<u32>,
+    fold: SpaceFold,
     pub(super) sorted: Sorted,
     candidates: Candidates,
     batch: Batch,
@@ -90,6 +92,14 @@ struct Grid {
 }
 
 impl Grid {
+    fn around(points: impl ExactSizeIterator<Item = Vec3>, support: f32) -> Self {
+        let count = points.len();
+        let (min, max) = points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| {
+            (min.min(p), max.max(p))
+        });
+        Self::new(min, max, support, count)
+    }
+
     fn new(min: Vec3, max: Vec3, support: f32, points: usize) -> Self {
         let limit = (CELLS_PER_POINT * points + 4096) as f32;
         let extents = max - min;
@@ -134,19 +144,19 @@ pub(crate) fn estimate(
 ) {
     targets.clear();
     normals.clear();
-    let (min, max) =
-        support
-            .iter()
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), &id| {
-                let p = position(id);
-                (min.min(p), max.max(p))
-            });
     if support.is_empty() {
         scratch.sorted.entries.clear();
         return;
     }
-    let grid = Grid::new(min, max, radius, support.len());
-    scratch.sort(support, position, wanted, &grid);
+    let mut fold = std::mem::take(&mut scratch.fold);
+    fold.clear();
+    let mut grid = Grid::around(support.iter().map(|&id| position(id)), radius);
+    if is_coarse(grid.inv_cell, radius) {
+        fold.find(radius, support.iter().map(|&id| position(id)));
+        grid = Grid::around(support.iter().map(|&id| fold.folded(position(id))), radius);
+    }
+    scratch.sort(support, |id| fold.folded(position(id)), wanted, &grid);
+    scratch.fold = fold;
     let NormalScratch {
         sorted,
         candidates,

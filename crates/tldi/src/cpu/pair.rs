@@ -4,6 +4,7 @@ use super::coarse::{FirstLook, Window};
 use super::columns::{Tiles, Touching};
 use super::compare::{self, Crossings, Middles, Seen};
 use super::cull;
+use super::fold::ViewFold;
 use super::impact::{CoreScratch, Meeting};
 use super::near_exact::Placed;
 use super::rect::Rect;
@@ -37,6 +38,8 @@ pub(super) struct Scratch {
     pub(super) meetings: Vec<Meeting>,
     zone: ZoneScratch,
     pub(super) touching: Touching,
+    /// Of the current view.
+    pub(super) fold: ViewFold,
     crossings: Crossings,
     paper: [paper::Scratch; 2],
     pub(super) patches: PatchScratch,
@@ -94,10 +97,31 @@ impl Scratch {
                 }
             }
         }
+        if let Some(coarser) = self.fold.coarser.take() {
+            self.compare_coarser(query, coarser, result);
+            return;
+        }
         result.collides = self.crossings.are_enough();
         let sides = [(&self.a, &plan.sides[0]), (&self.b, &plan.sides[1])];
         let culled = sides.map(|(side, plan)| side.culled(plan));
         self.patches.reduce_culled(result, query, culled);
+    }
+
+    /// Compares with pixels larger by a factor of `coarser`, since there are too many of those asked for.
+    fn compare_coarser(&mut self, query: &PairQuery, coarser: f32, result: &mut PairResult) {
+        let pixel_size = coarser * query.params.pixel_size;
+        let view = match query.view {
+            View::Fixed(camera) => View::Fixed(camera.coarser(coarser)),
+            aim @ View::Aim { .. } => aim,
+        };
+        result.clear();
+        let larger = PairQuery {
+            params: query.params.with_pixel_size(pixel_size),
+            view,
+            ..*query
+        };
+        self.compare(&larger, result);
+        result.coarser = Some(coarser * result.coarser.unwrap_or(1.0));
     }
 
     fn compare_paper(
@@ -214,7 +238,7 @@ impl Scratch {
         plan.approach.at_sheet(near)
     }
 
-    /// What is known of a view beside its images.
+    /// What is known of a view beside its images and how these are folded.
     pub(super) fn seen<'a>(
         &self,
         query: &PairQuery,
@@ -232,6 +256,7 @@ impl Scratch {
                 b: depth(&plan.sides[1]),
             },
             from_behind: seen_from_behind(camera.axis(), &self.zone_normals(query)),
+            fold: None,
         }
     }
 
@@ -282,7 +307,7 @@ impl Scratch {
             scope: Scope::Near(plan.column_reach),
         };
         let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
-        let (hits, touching) = (&mut self.hits, &mut self.touching);
+        let (hits, touching, fold) = (&mut self.hits, &mut self.touching, &mut self.fold);
         let looked = match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
                 let (a, b) = (view_of(a, a_from_a), view_of(b, a_from_b));
@@ -291,12 +316,14 @@ impl Scratch {
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
                 let exact = exact_view(surface, a_from_b, self.a.deepest);
                 let (cloud, image) = (view_of(cloud, a_from_a), &mut self.b.image);
-                self.a.look_with(&cloud, &exact, touching, hits, image)
+                self.a
+                    .look_with(&cloud, &exact, touching, fold, hits, image)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
                 let exact = exact_view(surface, a_from_a, self.b.deepest);
                 let (cloud, image) = (view_of(cloud, a_from_b), &mut self.a.image);
-                self.b.look_with(&cloud, &exact, touching, hits, image)
+                self.b
+                    .look_with(&cloud, &exact, touching, fold, hits, image)
             }
             _ => None, // refused
         };
@@ -306,7 +333,10 @@ impl Scratch {
         compare::compare(
             &self.a.image,
             &self.b.image,
-            &self.seen(query, plan, camera, axes, view),
+            &Seen {
+                fold: Some(&self.fold),
+                ..self.seen(query, plan, camera, axes, view)
+            },
             &query.params,
             &mut self.crossings,
             result,
@@ -351,8 +381,25 @@ impl Scratch {
         let (camera, params) = (a.camera, a.params);
         let (side_a, side_b) = (&mut self.a, &mut self.b);
         let (seen_a, seen_b) = rayon::join(|| side_a.project(a), || side_b.project(b));
-        let (seen_a, seen_b) = (seen_a?, seen_b?);
-        let rect = seen_a.rect.intersection(&seen_b.rect)?;
+        let (mut seen_a, mut seen_b) = (seen_a?, seen_b?);
+        let mut rect = seen_a.rect.intersection(&seen_b.rect)?;
+        let count = side_a.points.len() + side_b.points.len();
+        self.fold.clear();
+        if camera.size.is_none() && ViewFold::is_wanted(&rect, count) {
+            let support = side_a.support(a).max(side_b.support(b)) / seen_a.pixel_size;
+            let reach = seen_a.reach.max(seen_b.reach).max(support);
+            let points = side_a.columns.across().chain(side_b.columns.across());
+            self.fold.find(reach, seen_a.pixel_size, points);
+            side_a.columns.fold(&self.fold, camera, &mut seen_a);
+            side_b.columns.fold(&self.fold, camera, &mut seen_b);
+            rect = seen_a.rect.intersection(&seen_b.rect)?;
+        }
+        if camera.size.is_none() && self.fold.refuses(&rect, count) {
+            return None;
+        }
+        for (seen, side) in [(&mut seen_a, &*side_a), (&mut seen_b, &*side_b)] {
+            seen.limit_depths(DepthScale::reach(params), || side.columns.median_depth());
+        }
         let tiles = Tiles::new(&rect, seen_a.reach.max(seen_b.reach));
         let sort = |side: &mut Side, sign: f32, radius: f32| {
             side.columns.sort(&tiles, camera);

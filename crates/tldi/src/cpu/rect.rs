@@ -53,3 +53,16 @@ pub(crate) struct Footprint {
     /// Edge of a pixel in metres where the points are nearest.
     pub(crate) pixel_size: f32,
 }
+
+impl Footprint {
+    /// Leaves out depths more than `reach` metres from `middle`, where there may be any: a point that is so far from
+    /// the others does not decide what depths can be told apart. What it covers is then taken to be at the end of what
+    /// remains.
+    pub(crate) fn limit_depths(&mut self, reach: f32, middle: impl Fn() -> f32) {
+        if self.far - self.near > reach {
+            let middle = middle();
+            self.near = self.near.max(middle - reach);
+            self.far = self.far.min(middle + reach);
+        }
+    }
+}

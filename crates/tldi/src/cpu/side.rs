@@ -4,6 +4,7 @@ use super::cast::{self, Rays};
 use super::cells::{CellImaging, Cells};
 use super::columns::{Columns, Tiles, Touching};
 use super::cull::{CullScratch, PointRadii, Survivors};
+use super::fold::ViewFold;
 use super::impact::BORDER;
 use super::near_exact::{CellDistances, Placed};
 use super::normals::{self, NormalScratch};
@@ -143,12 +144,12 @@ impl Side {
         }
     }
 
-    /// The image of all points that were projected.
-    pub(super) fn whole_image(&mut self, view: &CloudView, seen: &Footprint) {
+    /// The image, of the pixels of `rect`, of all points that were projected.
+    pub(super) fn whole_image(&mut self, view: &CloudView, seen: &Footprint, rect: Rect) {
         let imaging = Imaging {
             camera: view.camera,
             params: view.params,
-            rect: seen.rect,
+            rect,
             tiles: Tiles::new(&seen.rect, seen.reach),
             scale: DepthScale::new(seen.near, view.params),
         };
@@ -157,14 +158,17 @@ impl Side {
     }
 
     /// The image of the points that were projected in the columns in which they are within `reach` metres of an
-    /// exact surface. Returns its pixels; `None` where it is nowhere.
+    /// exact surface, as far as that covers them. Returns its pixels; `None` where it is nowhere.
+    #[expect(clippy::too_many_arguments, reason = "a stage's parts of one look")]
     fn image_near(
         &mut self,
         view: &CloudView,
         seen: &Footprint,
+        covered: Option<Rect>,
         exact: &Placed,
         reach: f32,
         touching: &mut Touching,
+        fold: &ViewFold,
     ) -> Option<Rect> {
         let tiles = Tiles::new(&seen.rect, seen.reach);
         self.columns.sort(&tiles, view.camera);
@@ -174,9 +178,10 @@ impl Side {
         let reach = reach + tiles.half_diagonal() * seen.pixel_size;
         let meets = |tile: usize| {
             let depths = self.columns.depths(tile);
-            exact.meets(view.camera, tiles.middle(tile), depths, reach)
+            exact.meets(view.camera, fold.place(tiles.middle(tile)), depths, reach)
         };
         let rect = touching.mark(&tiles, &seen.rect, support_px, meets)?;
+        let rect = rect.intersection(&covered.unwrap_or(rect))?;
         let imaging = Imaging {
             camera: view.camera,
             params: view.params,
@@ -291,20 +296,45 @@ impl Side {
         view: &CloudView,
         look: &ExactView,
         touching: &mut Touching,
+        fold: &mut ViewFold,
         hits: &mut Vec<RayHit>,
         image: &mut Tldi,
     ) -> Option<()> {
         let mut seen = self.project(view)?;
-        match look.scope {
-            Scope::Near(reach) => {
-                seen.rect = self.image_near(view, &seen, &look.exact, reach, touching)?;
-            }
-            Scope::Cloud => self.whole_image(view, &seen),
-            Scope::Everywhere => {
-                seen.rect = seen.rect.grown(BORDER);
-                self.whole_image(view, &seen);
-            }
+        let border = match look.scope {
+            Scope::Everywhere => BORDER,
+            Scope::Near(_) | Scope::Cloud => 0,
+        };
+        seen.rect = seen.rect.grown(border);
+        // Where the surface is not, nothing meets it.
+        let mut covered = look.exact.covers(view.camera, BORDER + 1);
+        let own = covered.unwrap_or(seen.rect);
+        let mut rect = seen.rect.intersection(&own)?;
+        fold.clear();
+        let follows = view.camera.size.is_none();
+        if follows && ViewFold::is_wanted(&rect, self.points.len()) {
+            let reach = seen.reach.max(self.support(view) / seen.pixel_size);
+            fold.find(reach, seen.pixel_size, self.columns.across());
+            self.columns.fold(fold, view.camera, &mut seen);
+            seen.rect = seen.rect.grown(border);
+            // What is a rectangle of the view is none of the folded image.
+            covered = None;
+            rect = seen.rect;
         }
+        if follows && fold.refuses(&rect, self.points.len()) {
+            return None;
+        }
+        let reach = DepthScale::reach(view.params);
+        seen.limit_depths(reach, || self.columns.median_depth());
+        seen.rect = match look.scope {
+            Scope::Near(reach) => {
+                self.image_near(view, &seen, covered, &look.exact, reach, touching, fold)?
+            }
+            Scope::Cloud | Scope::Everywhere => {
+                self.whole_image(view, &seen, rect);
+                rect
+            }
+        };
         let Placed {
             surface,
             frame_from_surface,
@@ -313,11 +343,19 @@ impl Side {
         let extent = surface.bounds().extents().length();
         let through = if extent.is_finite() { extent } else { 0.0 };
         let margin = view.params.prediction + (seen.far - seen.near) + through + look.reach;
+        let mut along = Footprint {
+            near: seen.near - margin,
+            far: seen.far + margin,
+            ..seen
+        };
+        // Where they start decides to what their hits are rounded.
+        along.limit_depths(reach, || self.columns.median_depth());
         let rays = Rays {
             camera: view.camera,
             rect: seen.rect,
-            near: seen.near - margin,
-            far: seen.far + margin,
+            fold,
+            near: along.near,
+            far: along.far,
             cover: (!matches!(look.scope, Scope::Everywhere)).then_some(&self.image),
         };
         cast::cast(surface, frame_from_surface, &rays, hits, image);

@@ -112,6 +112,12 @@ impl DepthScale {
         }
     }
 
+    /// Depths, metres, of which the scale and an `f32` tell those that lie `middle` metres away: by so much they are
+    /// on either side.
+    pub(crate) fn reach(params: &Params) -> f32 {
+        0.5 * MAX_DEPTH * params.thickness / DEPTH_STEPS as f32
+    }
+
     /// Depths in one layer that follow each other are at most this many steps apart, of a cloud whose noise
     /// has a standard deviation of `noise` metres.
     pub fn merge_steps(&self, params: &Params, noise: f32) -> u32 {

@@ -5,6 +5,7 @@
 //! found the pair is rejected before any image is built.
 
 use super::cull::Survivors;
+use super::fold::{SpaceFold, is_coarse};
 use super::lanes::{multiversioned, truncated};
 use crate::Aabb;
 use glamx::Vec3;
@@ -20,6 +21,9 @@ pub(crate) struct ZoneScratch {
     dilated: Vec<u64>,
     cells_a: Vec<u32>,
     cells_b: Vec<u32>,
+    fold: SpaceFold,
+    folded_a: Survivors,
+    folded_b: Survivors,
 }
 
 /// Cells of at least the zone's reach over the overlap of both bounds.
@@ -31,6 +35,8 @@ pub struct ZoneGrid {
     pub inv_cell: f32,
     /// Cells along x, y, z.
     pub dims: [usize; 3],
+    /// Distance in metres for which the cells are made.
+    reach: f32,
     /// Words of 64 bits that a row along x takes here.
     row_words: usize,
 }
@@ -58,6 +64,7 @@ impl ZoneGrid {
             min: bounds.min,
             inv_cell: 1.0 / cell,
             dims,
+            reach,
             row_words: dims[0].div_ceil(64),
         }
     }
@@ -167,7 +174,24 @@ pub(crate) fn zone(
         dilated,
         cells_a,
         cells_b,
+        fold,
+        folded_a,
+        folded_b,
     } = scratch;
+    let (mut a, mut b, mut grid) = (a, b, *grid);
+    if is_coarse(grid.inv_cell, grid.reach) {
+        let both = [a, b].into_iter();
+        fold.find(grid.reach, both.flat_map(Survivors::points));
+        if !fold.is_identity() {
+            folded_a.fold(a, fold);
+            folded_b.fold(b, fold);
+            (a, b) = (folded_a, folded_b);
+            let both = a.points().chain(b.points());
+            let bounds = both.fold(Aabb::EMPTY, Aabb::including);
+            grid = ZoneGrid::new(&bounds, grid.reach);
+        }
+    }
+    let grid = &grid;
     locate(a, grid, cells_a);
     locate(b, grid, cells_b);
     grid.mark(cells_a, bits);
