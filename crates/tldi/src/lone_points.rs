@@ -6,6 +6,7 @@
 
 use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
 use crate::links::{Groups, Links};
+use crate::reach::Ring;
 use crate::{Aabb, BLOCK, ContactPixel, PairQuery, PairResult, PointCloud, Surface};
 use glamx::{Pose3, Vec3};
 
@@ -73,6 +74,8 @@ impl Surroundings {
             overlap: self.region,
             other_from_frame: Pose3::IDENTITY,
             other_bounds: self.region,
+            ring: Ring::default(),
+            included: 0.0,
         };
         let (scratch, around) = (&mut self.scratch, &mut self.around);
         cull(cloud, &Pose3::IDENTITY, &region, 1, scratch, around);

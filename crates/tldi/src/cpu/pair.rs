@@ -7,10 +7,11 @@ use super::impact::{CoreScratch, Meeting};
 use super::near_exact::Placed;
 use super::side::{CloudView, ExactView, Scope, Side};
 use super::splat::{DepthScale, Imaging};
-use super::zone::{self, ZoneGrid, ZoneScratch};
+use super::zone::{self, ZoneScratch, ZoneSide};
 use crate::camera_policy::{MAX_VIEWS, ZoneNormals, aim, further_axes, seen_from_behind};
 use crate::patches::PatchScratch;
-use crate::plan::{PairPlan, SidePlan, stride};
+use crate::plan::{PairPlan, SidePlan, column_reach, stride};
+use crate::reach::Place;
 use crate::{
     CameraPolicy, PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper,
 };
@@ -26,6 +27,8 @@ pub(super) struct Scratch {
     pub(super) core: CoreScratch,
     pub(super) meetings: Vec<Meeting>,
     zone: ZoneScratch,
+    /// Of both sides, metres.
+    merge_gaps: [f32; 2],
     pub(super) touching: Touching,
     crossings: Crossings,
     paper: [paper::Scratch; 2],
@@ -40,12 +43,19 @@ impl Scratch {
             self.compare_paper(query, &camera, result);
             return;
         }
-        let Some(plan) = PairPlan::new(query) else {
+        let Some(mut plan) = PairPlan::new(query) else {
             return;
         };
         if !self.cull(query, &plan) || !self.zone(query, &plan) {
             return;
         }
+        let place = self.place(query);
+        self.merge_gaps = place.merging.map(|factor| factor * query.params.merge_gap);
+        let query = &PairQuery {
+            params: place.params(&query.params),
+            ..*query
+        };
+        plan.column_reach = column_reach(&query.params);
         self.crossings = Crossings::default();
         match query.view {
             View::Fixed(camera) => {
@@ -122,6 +132,7 @@ impl Scratch {
     /// Fills both sides' culled points; `false` where a cloud has no point in reach.
     fn cull(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
         let cull = |side: &mut Side, surface: Surface, plan: &SidePlan| {
+            side.near.clear();
             if let Surface::Cloud(cloud) = surface {
                 let stride = stride(cloud.mean_radius(), query.params.pixel_size);
                 let frame = &plan.frame_from_surface;
@@ -145,10 +156,17 @@ impl Scratch {
         let reach = plan.zone_reach;
         match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
+                let zone_side = |points, mean_radius| ZoneSide {
+                    points,
+                    mean_radius,
+                };
                 zone::zone(
-                    &self.a.points,
-                    &self.b.points,
-                    &ZoneGrid::new(&plan.overlap, reach),
+                    [
+                        zone_side(&self.a.points, a.mean_radius()),
+                        zone_side(&self.b.points, b.mean_radius()),
+                    ],
+                    &plan.overlap,
+                    reach,
                     &mut self.zone,
                     &mut self.a.near,
                     &mut self.b.near,
@@ -185,6 +203,18 @@ impl Scratch {
         }
     }
 
+    /// What the surfaces look like where they are near each other; as the parameters say, where the camera is given.
+    fn place(&self, query: &PairQuery) -> Place {
+        let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| match surface {
+            Surface::Cloud(cloud) => side.near_radius(cloud),
+            Surface::Exact(_) | Surface::Device(_) => 0.0,
+        });
+        match query.view {
+            View::Fixed(_) => Place::AS_TOLD,
+            View::Aim { .. } => Place::new(&query.params, [&query.a, &query.b], near),
+        }
+    }
+
     fn zone_normals(&self, query: &PairQuery) -> [ZoneNormals<'_>; 2] {
         [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| ZoneNormals {
             normals: &side.near_normals,
@@ -215,11 +245,13 @@ impl Scratch {
         result: &mut PairResult,
     ) {
         let params = &query.params;
-        let view_of = |cloud, frame_from_cloud| CloudView {
+        let [merge_a, merge_b] = self.merge_gaps;
+        let view_of = |cloud, frame_from_cloud, merge_gap| CloudView {
             cloud,
             frame_from_cloud,
             camera,
             params,
+            merge_gap,
             sharpens: true,
         };
         // An unbounded surface as far as the cloud is deep in it, twice for what was not sampled.
@@ -235,17 +267,17 @@ impl Scratch {
         let (hits, touching) = (&mut self.hits, &mut self.touching);
         let looked = match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
-                let (a, b) = (view_of(a, a_from_a), view_of(b, a_from_b));
+                let (a, b) = (view_of(a, a_from_a, merge_a), view_of(b, a_from_b, merge_b));
                 self.look_at_clouds(&a, &b, plan.column_reach)
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
                 let exact = exact_view(surface, a_from_b, self.a.deepest);
-                let (cloud, image) = (view_of(cloud, a_from_a), &mut self.b.image);
+                let (cloud, image) = (view_of(cloud, a_from_a, merge_a), &mut self.b.image);
                 self.a.look_with(&cloud, &exact, touching, hits, image)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
                 let exact = exact_view(surface, a_from_a, self.b.deepest);
-                let (cloud, image) = (view_of(cloud, a_from_b), &mut self.a.image);
+                let (cloud, image) = (view_of(cloud, a_from_b, merge_b), &mut self.a.image);
                 self.b.look_with(&cloud, &exact, touching, hits, image)
             }
             _ => None, // refused
@@ -296,7 +328,9 @@ impl Scratch {
             || sort(side_a, 1.0, seen_a.radius),
             || sort(side_b, -1.0, seen_b.radius),
         );
-        let support = side_a.support(a).max(side_b.support(b));
+        let support = side_a
+            .support_radius(a.cloud)
+            .max(side_b.support_radius(b.cloud));
         let support_px = support / seen_a.pixel_size.min(seen_b.pixel_size);
         let touching = &mut self.touching;
         let (columns_a, columns_b) = (&side_a.columns, &side_b.columns);

@@ -4,7 +4,7 @@ use super::cast::{self, Rays};
 use super::columns::{Columns, Tiles, Touching};
 use super::cull::{CullScratch, PointRadii, Survivors};
 use super::impact::BORDER;
-use super::near_exact::{CellDistances, Placed};
+use super::near_exact::{CellDistances, MOST_PIXELS, Placed};
 use super::normals::{self, NormalScratch};
 use super::normals_sharpen::sharpen;
 use super::rect::{Footprint, Rect};
@@ -44,6 +44,8 @@ pub(super) struct CloudView<'a> {
     pub(super) frame_from_cloud: &'a Pose3,
     pub(super) camera: &'a VirtualCamera,
     pub(super) params: &'a Params,
+    /// That of the cloud where it is looked at, metres; see [`Params::merge_gap`].
+    pub(super) merge_gap: f32,
     /// Whether estimated normals are sharpened: not for casts, which take the pixel that is met first. Planes that are
     /// sharpened in part, at corners, stand out there.
     pub(super) sharpens: bool,
@@ -113,9 +115,21 @@ impl Side {
         (near.map(|p| p.as_dvec3()).sum::<DVec3>() / self.near.len() as f64).as_vec3()
     }
 
-    /// Mean radius of the culled points, metres.
+    /// Mean radius in metres of the culled points or, where these do not all reach equally far, of the near ones.
     pub(super) fn mean_radius(&self, cloud: &PointCloud) -> f32 {
-        PointRadii::new(cloud, &self.points).mean()
+        let radii = PointRadii::new(cloud, &self.points);
+        match self.points.further.is_empty() || self.near.is_empty() {
+            true => radii.mean(),
+            false => radii.mean_of(&self.near),
+        }
+    }
+
+    /// Mean radius of the cloud where the other surface is near, metres; in all of it where it is even.
+    pub(super) fn near_radius(&self, cloud: &PointCloud) -> f32 {
+        match self.points.further.is_empty() {
+            true => cloud.mean_radius(),
+            false => PointRadii::unscaled(cloud, &self.points).mean_of(&self.near),
+        }
     }
 
     /// Moves the culled points into the view and returns what they cover.
@@ -125,10 +139,10 @@ impl Side {
     }
 
     /// Radius in metres about a point in which others decide its normal; 0 where it is given.
-    pub(super) fn support(&self, view: &CloudView) -> f32 {
-        match view.cloud.normals() {
+    pub(super) fn support_radius(&self, cloud: &PointCloud) -> f32 {
+        match cloud.normals() {
             Some(_) => 0.0,
-            None => normals::SUPPORT * self.mean_radius(view.cloud),
+            None => normals::SUPPORT * self.mean_radius(cloud),
         }
     }
 
@@ -159,13 +173,16 @@ impl Side {
         self.columns.sort(&tiles, view.camera);
         let margin = view.params.slope_damping * seen.radius;
         self.columns.reduce_both(&tiles, margin);
-        let support_px = self.support(view) / seen.pixel_size;
+        let support_px = self.support_radius(view.cloud) / seen.pixel_size;
         let reach = reach + tiles.half_diagonal() * seen.pixel_size;
         let meets = |tile: usize| {
             let depths = self.columns.depths(tile);
             exact.meets(view.camera, tiles.middle(tile), depths, reach)
         };
-        let rect = touching.mark(&tiles, &seen.rect, support_px, meets)?;
+        let mut rect = touching.mark(&tiles, &seen.rect, support_px, meets)?;
+        if let Some(of_exact) = exact.rect(view.camera) {
+            rect = rect.intersection(&of_exact)?;
+        }
         let imaging = Imaging {
             camera: view.camera,
             params: view.params,
@@ -199,13 +216,17 @@ impl Side {
         let color = color.as_ref().map(|c| c as &dyn Fn(u32) -> [u8; 4]);
         self.image
             .begin(imaging.camera, imaging.rect.origin, imaging.rect.size);
+        let merging = Params {
+            merge_gap: view.merge_gap,
+            ..*view.params
+        };
         for band in 0..self.fragments.begin(&points, imaging) {
             self.fragments.splat_band(band, &points, imaging);
             sweep::sweep(
                 &mut self.fragments,
                 points.oriented,
                 view.knows_faces(),
-                imaging.scale.merge_steps(view.params, view.cloud.noise()),
+                imaging.scale.merge_steps(&merging, view.cloud.noise()),
                 color,
                 imaging,
                 &mut self.image,
@@ -252,6 +273,24 @@ impl Side {
         }
     }
 
+    /// The pixels in which the cloud is seen, and `border` around them, that are where an exact surface is or tell
+    /// about those: its rim, splats that reach there and what decides their normals. `None` where there are none.
+    fn around_exact(
+        &self,
+        view: &CloudView,
+        seen: &Footprint,
+        exact: &Placed,
+        border: i32,
+    ) -> Option<Rect> {
+        let rect = seen.rect.grown(border);
+        let Some(of_exact) = exact.rect(view.camera) else {
+            return Some(rect);
+        };
+        let support_px = self.support_radius(view.cloud) / seen.pixel_size;
+        let beyond = BORDER + (seen.reach + support_px).ceil().min(MOST_PIXELS) as i32;
+        rect.intersection(&of_exact.grown(beyond))
+    }
+
     /// Image of this cloud, and of an exact surface into `image` over the same pixels; `None`
     /// where nothing is in view.
     pub(super) fn look_with(
@@ -267,9 +306,12 @@ impl Side {
             Scope::Near(reach) => {
                 seen.rect = self.image_near(view, &seen, &look.exact, reach, touching)?;
             }
-            Scope::Cloud => self.whole_image(view, &seen),
+            Scope::Cloud => {
+                seen.rect = self.around_exact(view, &seen, &look.exact, 0)?;
+                self.whole_image(view, &seen);
+            }
             Scope::Everywhere => {
-                seen.rect = seen.rect.grown(BORDER);
+                seen.rect = self.around_exact(view, &seen, &look.exact, BORDER)?;
                 self.whole_image(view, &seen);
             }
         }
