@@ -2,25 +2,13 @@
 
 use crate::parts::cloud_of;
 use crate::{Resolution, TldiError};
-use rapier3d::math::Vector;
 use rapier3d::parry::shape::Shape;
+use tldi::plan::largest_pixel;
 use tldi::{CameraPolicy, Params, Variant};
-
-/// Pixels that the smaller one of a pair is at least across, in its second longest extent: of what
-/// is smaller a penetration could not be told from the noise of single rays. Fewer only where its
-/// own points are no finer.
-const LEAST_PIXELS: f32 = 8.0;
 
 /// Contacts are looked for up to this many standard deviations of told noise, so that the gaps of what
 /// just touches are fitted to what is around it on all sides.
 const FITTED: f32 = 3.0;
-
-/// Largest pixel, metres, in which a body of these extents, metres, is [`LEAST_PIXELS`] across.
-pub(crate) fn resolving(extents: Vector) -> f32 {
-    let mut extents = extents.to_array();
-    extents.sort_by(f32::total_cmp);
-    extents[1] / LEAST_PIXELS
-}
 
 /// Settings of a [`TldiPipeline`](crate::TldiPipeline), the same for all its pairs.
 ///
@@ -124,7 +112,7 @@ impl TldiConfig {
             true => first,
             false => second,
         };
-        let to_resolve = resolving(size(&smaller)).max(radius(smaller).unwrap_or(0.0));
+        let to_resolve = largest_pixel(size(&smaller), radius(smaller).unwrap_or(0.0));
         let params = match self.variant {
             Variant::Paper => Params::paper(coarsest),
             Variant::Oriented => Params::for_radius(coarsest),

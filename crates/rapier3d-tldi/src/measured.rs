@@ -7,11 +7,11 @@
 //! (`contact_recycling`), with a distance that does not know how fine the cloud is.
 
 use crate::TldiConfig;
-use crate::config::resolving;
 use crate::parts::{PartPair, ShapePair, clouds_of};
 use rapier3d::math::Pose;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::shape::Shape;
+use tldi::plan::largest_pixel;
 use tldi::{ContactPatch, PairResult};
 
 /// Whether a pair touches in one or two round spots or lines: it rolls there, and a point that rides on the bodies
@@ -58,7 +58,7 @@ impl Measured {
         let shape1_is_smaller = size[0] < size[1];
         let smaller = bounds[usize::from(!shape1_is_smaller)].extents();
         // What is smaller than the points are apart would be through them before they are looked at again.
-        let max_drift = config.scatter * coarsest.min(resolving(smaller));
+        let max_drift = config.scatter * coarsest.min(largest_pixel(smaller, 0.0));
         (max_drift > 0.0).then_some(Self {
             pos12: pair.pos12,
             prediction: pair.prediction,

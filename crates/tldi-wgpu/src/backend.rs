@@ -29,8 +29,9 @@ const MAX_GROUPS: u32 = 65_535;
 /// Compares batches on a GPU.
 ///
 /// What it does not take is compared on the CPU meanwhile, with the same results: pairs with an
-/// exact surface, [`Variant::Paper`](tldi::Variant::Paper), perspective cameras; and pairs of
-/// which a pixel has more than 1024 fragments. A batch costs one submission and one readback,
+/// exact surface, [uneven clouds](tldi::PointCloud::is_uneven), [`Variant::Paper`](tldi::Variant::Paper), perspective
+/// cameras; and pairs of which a pixel has more than 1024 fragments. An uneven cloud and one that only the device holds
+/// are compared by their mean radii: a body smaller than the points are apart may pass where these are coarse. A batch costs one submission and one readback,
 /// whatever the number of pairs, and uploads of clouds with new content.
 ///
 /// ```

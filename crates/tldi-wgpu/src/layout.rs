@@ -287,7 +287,8 @@ fn pose_rows(pose: &Pose3) -> [[f32; 4]; 3] {
 }
 
 /// Whether the device takes a pair: two clouds, oriented splats and an orthographic view. All else
-/// is compared by the CPU backend.
+/// is compared by the CPU backend; so are uneven clouds, since the device goes by their mean radii, unless it alone has
+/// the points of the other one.
 pub(crate) fn is_for_device(query: &PairQuery) -> bool {
     let is_orthographic = match query.view {
         View::Fixed(camera) => matches!(
@@ -297,10 +298,13 @@ pub(crate) fn is_for_device(query: &PairQuery) -> bool {
         View::Aim { .. } => true,
     };
     let is_cloud = |surface| !matches!(surface, Surface::Exact(_));
+    let is_even = |surface| !matches!(surface, Surface::Cloud(cloud) if cloud.is_uneven());
+    let is_resident = |surface| matches!(surface, Surface::Device(_));
     query.params.check().is_ok()
         && is_orthographic
         && is_cloud(query.a)
         && is_cloud(query.b)
+        && (is_even(query.a) && is_even(query.b) || is_resident(query.a) || is_resident(query.b))
         && query.params.variant() == Variant::Oriented
 }
 

@@ -166,8 +166,9 @@ impl<'a> CloudBuilder<'a> {
     /// `scale` = 0.65, which is the default.
     ///
     /// - Neighbours are counted at distinct positions other than the point's own, so that repeated
-    ///   points neither give radius 0 nor shrink the radii around them. Where there are fewer than
-    ///   `k`, the farthest counts.
+    ///   points neither give radius 0 nor shrink the radii around them. Positions within 2⁻²⁰ of the largest
+    ///   coordinate of each other, a few steps of `f32`, are one: a scan that was moved and merged with itself has
+    ///   the radii of the scan. Where there are fewer than `k`, the farthest counts.
     /// - No radius exceeds 10 × the median (over distinct positions): an isolated outlier, such as
     ///   a depth camera's flying pixel, does not become a huge ball. A surface may still be sampled
     ///   at densities of 100 : 1, which is 10 : 1 in spacing; beyond that, give
@@ -206,7 +207,7 @@ impl<'a> CloudBuilder<'a> {
     }
 
     /// Normals of the planes that best fit each point and its `k` nearest neighbours at distinct
-    /// positions (principal component analysis), in parallel. Not oriented, unless a
+    /// positions, as [`knn_radii`](Self::knn_radii) tells them (principal component analysis), in parallel. Not oriented, unless a
     /// [`viewpoint`](Self::viewpoint) is known; [`normals`](Self::normals), if given, win. 8 to 24
     /// neighbours are usual, more against noise.
     ///

@@ -126,6 +126,12 @@ impl<'a> PointCloud<'a> {
         self.max_radius
     }
 
+    /// Whether some radius is twice the mean or more: in such a cloud what is near depends on the place, as its
+    /// resolution does.
+    pub fn is_uneven(&self) -> bool {
+        self.max_radius >= 2.0 * self.mean_radius
+    }
+
     /// Standard deviation of the points along the surface's normal in metres, as
     /// [told](CloudBuilder::noise); 0 where it was not.
     pub fn noise(&self) -> f32 {

@@ -1,9 +1,11 @@
 //! Nearest neighbours: a k-d tree over the distinct positions of a cloud.
 
 use crate::PointCloud;
+use crate::radii::COORDINATE_PER_RADIUS;
 use arrayvec::ArrayVec;
 use glamx::Vec3;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Most positions in a leaf.
 const LEAF: usize = 16;
@@ -230,14 +232,35 @@ impl KdTree {
         });
     }
 
-    /// For each distinct position, in parallel: `f` of it and of its `k` nearest other positions
-    /// (all others, if there are fewer) in order of distance. `k` is at least 1. The neighbours'
+    /// For each distinct position, in parallel: `f` of a tree, its position and its `k` nearest other positions in that
+    /// tree (all others, if there are fewer) in order of distance. `k` is at least 1. The neighbours'
     /// indices are those of positions, for [`KdTree::position`].
-    pub(crate) fn map_positions<T: Send>(
+    ///
+    /// Positions no farther apart than [`twin_distance`] count as one, in the tree that `f` is given: copies of a
+    /// point that were rounded differently are not its neighbours. Where there are such, all is done twice.
+    pub(crate) fn map_positions<T: Send + Copy>(
         &self,
         k: usize,
-        f: impl Fn(Vec3, &[Neighbor]) -> T + Sync,
+        f: impl Fn(&Self, Vec3, &[Neighbor]) -> T + Sync,
     ) -> Vec<T> {
+        let has_twins = AtomicBool::new(false);
+        let values = self.map_entries(k, |position, neighbors| {
+            let is_twin = |n: &Neighbor| n.distance_squared <= twin_distance(position).powi(2);
+            if neighbors.first().is_some_and(is_twin) {
+                has_twins.store(true, Ordering::Relaxed);
+            }
+            f(self, position, neighbors)
+        });
+        if !has_twins.into_inner() {
+            return values;
+        }
+        let (merged, first) = self.merged();
+        let values = merged.map_entries(k, |position, neighbors| f(&merged, position, neighbors));
+        let values = merged.spread(&values);
+        first.into_iter().map(|point| values[point]).collect()
+    }
+
+    fn map_entries<T: Send>(&self, k: usize, f: impl Fn(Vec3, &[Neighbor]) -> T + Sync) -> Vec<T> {
         let k = k.min(self.distinct() - 1) + 1;
         (0..self.distinct())
             .into_par_iter()
@@ -263,6 +286,34 @@ impl KdTree {
                 },
             )
             .collect()
+    }
+
+    /// A tree without positions that are within [`twin_distance`] of one of a lesser index, and for each position of
+    /// this one the point of that tree which stands for it. Cost: a search for each position, one after the other.
+    fn merged(&self) -> (Self, Vec<usize>) {
+        let mut entries: Vec<usize> = (0..self.distinct()).collect();
+        entries.sort_unstable_by_key(|&entry| self.points_at(entry)[0]);
+        let mut stands_for = vec![usize::MAX; entries.len()];
+        let mut kept = [vec![], vec![], vec![]];
+        for entry in entries {
+            if stands_for[entry] < usize::MAX {
+                continue;
+            }
+            let position = self.position(entry);
+            let point = kept[0].len();
+            let limit = twin_distance(position).powi(2);
+            self.search(position, limit.sqrt() as f32, |twin, distance_squared| {
+                if distance_squared <= limit {
+                    stands_for[twin] = stands_for[twin].min(point);
+                }
+                limit
+            });
+            for (kept, coordinate) in kept.iter_mut().zip(position.to_array()) {
+                kept.push(coordinate);
+            }
+        }
+        let [x, y, z] = &kept;
+        (Self::from_coordinates([x, y, z]), stands_for)
     }
 
     /// A distinct position.
@@ -354,6 +405,14 @@ impl KdTree {
             }
         }
     }
+}
+
+/// Distance in metres within which two points are the same one, rounded differently, as when a scan is moved and
+/// merged with itself: half of the least radius that a cloud accepts there, eight steps of `f32` at most. With half as
+/// much, copies that a rotation rounded may count as neighbours; with twice as much, points that a cloud can tell apart
+/// may count as one.
+fn twin_distance(position: Vec3) -> f64 {
+    f64::from(position.abs().max_element()) * (0.5 / f64::from(COORDINATE_PER_RADIUS))
 }
 
 /// Sorts `entries` into `leaves` leaves, the first of which has the number `first_leaf`.

@@ -32,6 +32,7 @@ mod part_shape;
 mod patches;
 pub mod plan;
 mod radii;
+mod reach;
 mod supported;
 mod supports;
 mod surface;

@@ -7,6 +7,7 @@
 use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
 use crate::cpu::zone::AroundPlaces;
 use crate::links::{Groups, Links};
+use crate::reach::Ring;
 use crate::{Aabb, BLOCK, ContactPixel, PairQuery, PairResult, PointCloud, Surface};
 use glamx::{Pose3, Vec3};
 
@@ -96,6 +97,8 @@ impl Surroundings {
                 overlap: bounds,
                 other_from_frame: Pose3::IDENTITY,
                 other_bounds: bounds,
+                ring: Ring::default(),
+                included: 0.0,
             };
             let (region, scratch) = (&self.region, &mut self.scratch);
             cull(cloud, frame_from_cloud, region, 1, scratch, &mut own);
@@ -375,6 +378,8 @@ mod tests {
                     min: Vec3::ZERO,
                     max: Vec3::ONE,
                 },
+                ring: Ring::default(),
+                included: 0.0,
             };
             let (mut culled, mut scratch) = (Survivors::default(), CullScratch::default());
             cull(&cloud, &pose, &region, 1, &mut scratch, &mut culled);

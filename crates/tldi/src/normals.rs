@@ -7,7 +7,7 @@ use glamx::{DMat3, DSymmetricEigen3, DVec3, Vec3};
 /// the direction of least variance (Hoppe et al. 1992, doi:10.1145/133994.134011); for each point.
 /// With a viewpoint they point to its side of the surface, else either way. `k` is at least 2.
 pub(crate) fn pca_normals(tree: &KdTree, k: usize, viewpoint: Option<Vec3>) -> Vec<Vec3> {
-    let normals = tree.map_positions(k, |position, neighbors| {
+    let normals = tree.map_positions(k, |tree, position, neighbors| {
         let origin = position.as_dvec3();
         let offsets = neighbors
             .iter()

@@ -2,6 +2,7 @@
 //! stages. All backends start from here.
 
 use crate::cpu::{columns, compare, normals, normals_sharpen, planes, splat, sweep};
+use crate::reach::{Ring, farthest};
 use crate::{Aabb, BLOCK, PairQuery, Params, Surface, View};
 use crate::{approach, camera_policy};
 use glamx::{Pose3, Vec3};
@@ -51,7 +52,8 @@ pub struct PairPlan {
     pub overlap: Aabb,
     /// What is kept of each side.
     pub sides: [SidePlan; 2],
-    /// Distance in metres up to which points of both sides are near each other.
+    /// Distance in metres up to which points of both sides are near each other; those of [uneven
+    /// clouds](crate::PointCloud::is_uneven) farther, by as much as their radii exceed the mean.
     pub zone_reach: f32,
     /// Distance in metres along a view up to which the surfaces of a column can matter to each
     /// other.
@@ -93,38 +95,62 @@ impl PairPlan {
     /// # Ok::<(), tldi::CloudError>(())
     /// ```
     pub fn new(query: &PairQuery) -> Option<Self> {
-        let zone_reach = query.params.prediction + query.a.mean_radius() + query.b.mean_radius();
-        if !within_reach(query, zone_reach) {
+        let (a, b) = (&query.a, &query.b);
+        let prediction = query.params.prediction;
+        if !within_reach(query, prediction + farthest(a) + farthest(b)) {
             return None;
         }
-        let ring = |surface| ring(surface, &query.params);
-        let margin = query.params.prediction + ring(&query.a).max(ring(&query.b));
+        let rings = [ring(a, &query.params), ring(b, &query.params)];
         let [bounds_a, bounds_b] = bounds_with_inside(query);
-        let overlap = bounds_a
-            .loosened(margin)
-            .intersection(bounds_b.transformed(&query.a_from_b).loosened(margin));
-        if overlap.is_empty() {
+        let b_in_frame = bounds_b.transformed(&query.a_from_b);
+        let overlap =
+            |margin| (bounds_a.loosened(margin)).intersection(b_in_frame.loosened(margin));
+        let widest = overlap(prediction + rings[0].widest().max(rings[1].widest()));
+        if widest.is_empty() {
             return None;
         }
         let [middle_a, middle_b] = middles(query);
-        let side = |frame_from_surface, other_from_frame, other_bounds: Aabb, middle| SidePlan {
-            frame_from_surface,
-            region: Region {
-                overlap,
-                other_from_frame,
-                other_bounds: other_bounds.loosened(margin),
-            },
-            middle,
+        let side = |frame_from_surface,
+                    other_from_frame,
+                    other_bounds: Aabb,
+                    [own, other]: [Ring; 2],
+                    middle| {
+            let included = own.beside(&other);
+            let margin = prediction + included;
+            SidePlan {
+                frame_from_surface,
+                region: Region {
+                    overlap: overlap(margin),
+                    other_from_frame,
+                    other_bounds: other_bounds.loosened(margin),
+                    ring: own,
+                    included,
+                },
+                middle,
+            }
         };
+        let [ring_a, ring_b] = rings;
         let b_from_a = query.a_from_b.inverse();
         Some(Self {
-            overlap,
+            overlap: widest,
             sides: [
-                side(Pose3::IDENTITY, b_from_a, bounds_b, middle_a),
-                side(query.a_from_b, Pose3::IDENTITY, bounds_a, middle_b),
+                side(
+                    Pose3::IDENTITY,
+                    b_from_a,
+                    bounds_b,
+                    [ring_a, ring_b],
+                    middle_a,
+                ),
+                side(
+                    query.a_from_b,
+                    Pose3::IDENTITY,
+                    bounds_a,
+                    [ring_b, ring_a],
+                    middle_b,
+                ),
             ],
-            zone_reach,
-            column_reach: REACH * query.params.thickness.max(query.params.prediction),
+            zone_reach: prediction + a.mean_radius() + b.mean_radius(),
+            column_reach: column_reach(&query.params),
             approach: {
                 let (motion, last_axis) = match query.view {
                     View::Fixed(_) => (Vec3::ZERO, None),
@@ -137,6 +163,24 @@ impl PairPlan {
             },
         })
     }
+}
+
+/// See [`PairPlan::column_reach`].
+pub(crate) fn column_reach(params: &Params) -> f32 {
+    REACH * params.thickness.max(params.prediction)
+}
+
+/// Pixels that the smaller one of a pair is at least across, in its second longest extent: of what
+/// is smaller a penetration could not be told from the noise of single rays. Fewer only where its
+/// own points are no finer.
+const LEAST_PIXELS: f32 = 8.0;
+
+/// Edge in metres of the largest pixels that resolve a body of these extents, metres, whose points have this mean
+/// radius, metres: eight across its second longest extent, or as large as its points.
+pub fn largest_pixel(extents: Vec3, radius: f32) -> f32 {
+    let mut extents = extents.to_array();
+    extents.sort_by(f32::total_cmp);
+    (extents[1] / LEAST_PIXELS).max(radius)
 }
 
 /// Every how many points of a cloud of this mean radius are enough for pixels of this size, metres.
@@ -164,7 +208,7 @@ fn within_reach(query: &PairQuery, reach: f32) -> bool {
 /// By how much more than what can touch is culled, metres: splats reach a radius beyond their
 /// points, on both sides; normals that are estimated here need their neighbours, or they would err
 /// at the rim.
-pub(crate) fn ring(surface: &Surface, params: &Params) -> f32 {
+pub(crate) fn ring(surface: &Surface, params: &Params) -> Ring {
     let is_bare = match surface {
         Surface::Cloud(cloud) => cloud.normals().is_none(),
         Surface::Exact(_) => false,
@@ -175,7 +219,7 @@ pub(crate) fn ring(surface: &Surface, params: &Params) -> f32 {
     } else {
         0.0
     };
-    (2.0 + support) * surface.mean_radius()
+    Ring::new(surface, 2.0 + support)
 }
 
 /// Bounds of both surfaces, each in its own frame; those of the larger one with what of a body may

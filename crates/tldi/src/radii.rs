@@ -9,7 +9,7 @@ const RADIUS_RANGE: RangeInclusive<f32> = 1e-12..=1e12;
 
 /// Largest coordinate in units of the point's radius: 2¹⁹, where a step of `f32` (2⁻²³ of the
 /// coordinate, at most) is a sixteenth of the radius.
-const COORDINATE_PER_RADIUS: f32 = 524_288.0;
+pub(crate) const COORDINATE_PER_RADIUS: f32 = 524_288.0;
 
 /// Largest radius from nearest neighbours, in units of the median one.
 const CAP_PER_MEDIAN: f32 = 10.0;
@@ -84,7 +84,7 @@ pub(crate) fn mean_and_max(radii: &Radii<'_>) -> (f32, f32) {
 }
 
 /// `scale` × the distance to the `k`-th nearest other position (the farthest, where there are
-/// fewer), for each point; `k` is at least 1. With m the median of that over all distinct positions,
+/// fewer; what is rounded differently is the same one), for each point; `k` is at least 1. With m the median of that over all distinct positions,
 /// radii above [`CAP_PER_MEDIAN`] × m are lowered to it, and radii that [`check_coordinates`] would
 /// refuse are raised to what it accepts, but not above m: a few points that nearly coincide do not
 /// make a cloud unusable, while coordinates too large for its typical spacing do.
@@ -92,10 +92,13 @@ pub(crate) fn knn_radii(tree: &KdTree, k: usize, scale: f32) -> Result<Vec<f32>,
     if tree.distinct() < 2 {
         return Err(CloudError::NoSpacing { count: tree.len() });
     }
-    let mut radii = tree.map_positions(k, |_, neighbors| {
+    let mut radii = tree.map_positions(k, |_, _, neighbors| {
         let farthest = neighbors.last().map_or(0.0, |n| n.distance_squared);
         (f64::from(scale) * farthest.sqrt()) as f32
     });
+    if radii.iter().all(|radius| *radius == 0.0) {
+        return Err(CloudError::NoSpacing { count: tree.len() });
+    }
     let mut sorted = radii.clone();
     let middle = (sorted.len() - 1) / 2;
     let (_, median, _) = sorted.select_nth_unstable_by(middle, f32::total_cmp);

@@ -270,15 +270,21 @@ fn outliers_are_capped_and_genuine_density_is_not() {
 
 #[test]
 fn near_duplicates_far_from_the_origin_are_accepted() {
-    // Ten points one step of f32 apart (2⁻²⁰ at 10 m): their spacing is finer than 10 m / 2¹⁹.
+    // Ten points one step of f32 apart (2⁻²⁰ at 10 m) beside one of a grid: rounding makes as much of a single point.
     let mut points = grid(20, 0.1, Vec3::new(10.0, 0.0, 0.0));
+    let built = |points: &[Vec3]| PointCloud::builder(points.to_vec()).build();
+    let without = built(&points).expect("a grid").radius(0);
     points.extend((1..11).map(|i| Vec3::new(10.0 + i as f32 * 2f32.powi(-20), 0.0, 0.0)));
-    let cloud = PointCloud::builder(&points)
-        .build()
-        .expect("near duplicates are not an error");
-    let radius = cloud.radius(400);
+    let cloud = built(&points).expect("near duplicates are not an error");
+    assert_eq!([cloud.radius(0), cloud.radius(400)], [without; 2]);
+
+    // Twenty points two steps farther apart than that are several, but too close for their coordinates.
+    points.truncate(400);
+    points.extend((1..21).map(|i| Vec3::new(10.0 + i as f32 * 12.0 * 2f32.powi(-20), 0.0, 0.0)));
+    let cloud = built(&points).expect("near duplicates are not an error");
+    let radius = cloud.radius(410);
     assert!(
-        radius >= points[400].x / 524_288.0 && radius < 1e-4,
+        radius >= points[410].x / 524_288.0 && radius < 1e-4,
         "{radius}"
     );
 
@@ -347,4 +353,72 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let one = run(1);
     assert!(one == run(2), "2 threads");
     assert!(one == run(7), "7 threads");
+}
+
+/// Copies of points, each coordinate off by up to two steps of `f32` at the largest one, as after a rotation.
+fn rounded_differently(points: &[Vec3], rng: &mut Rng) -> Vec<Vec3> {
+    let copy = |p: &Vec3| {
+        let step = p.abs().max_element() * f32::EPSILON;
+        let mut off = || step * rng.i32(-2..=2) as f32;
+        *p + Vec3::new(off(), off(), off())
+    };
+    points.iter().map(copy).collect()
+}
+
+/// A cloud in which all points or some occur twice or three times, to the bit or rounded differently, has the radii and
+/// normals of the single one: by brute force over its points, and to the bit where these come first.
+#[test]
+fn copies_of_points_change_nothing() {
+    for (seed, offset) in [(1, 0.0), (2, 3.0), (3, 40.0)] {
+        let mut rng = Rng::with_seed(seed);
+        let single: Vec<Vec3> = (0..600)
+            .map(|_| (random_vec(&mut rng) * Vec3::new(1.0, 0.02, 1.0)) + Vec3::splat(offset))
+            .collect();
+        let built = |points: &[Vec3]| {
+            let builder = PointCloud::builder(points.to_vec()).knn_radii(7, 0.65);
+            builder.pca_normals(12).build().expect("a valid cloud")
+        };
+        let expected = built(&single);
+        for k in 0..single.len() {
+            let radius = 0.65 * brute_force_spacing(&single, single[k], 7);
+            assert!((f64::from(expected.radius(k)) - radius).abs() < 1e-6 * radius);
+        }
+        let twice = rounded_differently(&single, &mut rng);
+        let thrice = rounded_differently(&single, &mut rng);
+        for copies in [
+            single.clone(),
+            [&single[..], &single].concat(),
+            single[..200].to_vec(),
+            twice[..200].to_vec(),
+            [&twice[..], &thrice].concat(),
+        ] {
+            let cloud = built(&[&single[..], &copies].concat());
+            let normals = cloud.normals().expect("they were asked for");
+            for (k, normal) in normals.iter().enumerate() {
+                let original = k % single.len();
+                assert_eq!(cloud.radius(k), expected.radius(original), "{seed}: {k}");
+                let expected = expected.normals().map(|normals| normals[original]);
+                assert_eq!(Some(*normal), expected, "{seed}: {k}");
+            }
+        }
+    }
+}
+
+/// Points that differ by more than rounding are several, those that do not are one.
+#[test]
+fn what_f32_tells_apart_is_several_points() {
+    let radii = |apart: f32| {
+        let points = [Vec3::X, Vec3::X + apart * Vec3::Y, 3.0 * Vec3::X];
+        let cloud = PointCloud::builder(&points[..]).knn_radii(1, 1.0).build();
+        cloud.map(|cloud| [cloud.radius(0), cloud.radius(2)])
+    };
+    let [close, _] = radii(1e-5).expect("three points");
+    assert_eq!(close, 1e-5);
+    assert_eq!(radii(5e-7).expect("two points"), [2.0, 2.0]);
+    let one = [Vec3::X, Vec3::X + 5e-7 * Vec3::Y];
+    let error = PointCloud::builder(&one[..]).knn_radii(7, 0.65).build();
+    assert!(
+        matches!(error, Err(CloudError::NoSpacing { count: 2 })),
+        "{error:?}"
+    );
 }

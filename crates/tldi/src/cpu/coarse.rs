@@ -62,7 +62,8 @@ fn overlap(query: &PairQuery) -> Option<f32> {
         return None;
     };
     let is_aimed = matches!(query.view, View::Aim { .. });
-    if !is_aimed || query.params.variant() == Variant::Paper {
+    let is_even = !a.is_uneven() && !b.is_uneven();
+    if !is_aimed || !is_even || query.params.variant() == Variant::Paper {
         return None;
     }
     let bounds_b = b.bounds().transformed(&query.a_from_b);
@@ -196,6 +197,7 @@ impl Scratch {
             frame_from_cloud,
             camera,
             params: &query.params,
+            merge_gap: query.params.merge_gap,
             sharpens: false,
         };
         let (a, b) = (view_of(a, &Pose3::IDENTITY), view_of(b, &query.a_from_b));
@@ -257,7 +259,8 @@ impl Scratch {
         let first = edge * Vec3::from_array(window.cube.map(|c| c as f32));
         camera.view_from_frame.translation = -first.with_z(0.0);
         camera.size = Some([WINDOW as u32; 2]);
-        let margin = ring(&query.a, &query.params).max(ring(&query.b, &query.params));
+        let rings = [&query.a, &query.b].map(|surface| ring(surface, &query.params).widest());
+        let margin = rings[0].max(rings[1]);
         let cube = Aabb {
             min: Vec3::ZERO.with_z(first.z),
             max: Vec3::splat(edge).with_z(first.z + edge),
@@ -276,6 +279,7 @@ impl Scratch {
             frame_from_cloud,
             camera: &camera,
             params: &query.params,
+            merge_gap: query.params.merge_gap,
             sharpens: true,
         };
         let (a, b) = (view_of(a, &Pose3::IDENTITY), view_of(b, &query.a_from_b));

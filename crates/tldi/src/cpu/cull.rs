@@ -4,10 +4,14 @@
 //! One pass over the cloud, skipping blocks of [`BLOCK`] points whose bounds miss the overlap: the
 //! floor of the whole pipeline is this stage's reading of the coordinates. Of a cloud much finer
 //! than the pixels only every n-th point is taken ([`stride`](crate::plan::stride)): more would not be seen.
+//!
+//! Coarser points reach farther ([`reach`](crate::reach)). Where a cloud has such, the boxes of a block are as wide as
+//! its coarsest point needs, and what is inside is asked again, each point by its own radius.
 
 use super::fold::SpaceFold;
 use super::lanes::multiversioned;
 use crate::plan::first_taken;
+use crate::reach::{Ring, Uneven};
 use crate::{Aabb, BLOCK, PointCloud, Radii};
 use glamx::{Mat3, Pose3, Vec3};
 use rayon::prelude::*;
@@ -20,16 +24,24 @@ pub(crate) struct Survivors {
     pub(crate) z: Vec<f32>,
     /// Indices into the cloud.
     pub(crate) index: Vec<u32>,
+    /// By how much each reaches farther than the cloud's mean radius, metres; empty where none does.
+    pub(crate) further: Vec<f32>,
     /// Every how many points of the cloud were taken.
     stride: usize,
 }
 
 impl Survivors {
+    /// By how much the i-th reaches farther than the cloud's mean radius, metres.
+    pub(crate) fn further(&self, i: usize) -> f32 {
+        self.further.get(i).copied().unwrap_or(0.0)
+    }
+
     pub(crate) fn clear(&mut self) {
         self.x.clear();
         self.y.clear();
         self.z.clear();
         self.index.clear();
+        self.further.clear();
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -62,6 +74,7 @@ impl Survivors {
             self.y.push(folded.y);
             self.z.push(folded.z);
         }
+        self.further.extend_from_slice(&other.further);
     }
 
     fn append(&mut self, other: &Self) {
@@ -69,6 +82,7 @@ impl Survivors {
         self.y.extend_from_slice(&other.y);
         self.z.extend_from_slice(&other.z);
         self.index.extend_from_slice(&other.index);
+        self.further.extend_from_slice(&other.further);
     }
 
     /// Appends the points of a block that are inside the region, after moving them to its front.
@@ -93,11 +107,14 @@ impl Survivors {
         self.index.extend_from_slice(&index[..kept]);
     }
 
-    fn reserve(&mut self, additional: usize) {
+    fn reserve(&mut self, additional: usize, with_further: bool) {
         self.x.reserve(additional);
         self.y.reserve(additional);
         self.z.reserve(additional);
         self.index.reserve(additional);
+        if with_further {
+            self.further.reserve(additional);
+        }
     }
 }
 
@@ -129,6 +146,14 @@ impl<'a> PointRadii<'a> {
         }
     }
 
+    /// As the cloud has them.
+    pub(crate) fn unscaled(cloud: &'a PointCloud, points: &'a Survivors) -> Self {
+        Self {
+            scale: 1.0,
+            ..Self::new(cloud, points)
+        }
+    }
+
     /// Mean over the culled points.
     pub(crate) fn mean(&self) -> f32 {
         match self.radii {
@@ -140,9 +165,22 @@ impl<'a> PointRadii<'a> {
         }
     }
 
-    /// At least the largest.
+    /// Mean over some of the culled points.
+    pub(crate) fn mean_of(&self, some: &[u32]) -> f32 {
+        let sum: f32 = some.iter().map(|&i| self.of(i as usize)).sum();
+        sum / some.len().max(1) as f32
+    }
+
+    /// At least the largest: of the cloud or, where it is coarser in other places, of the culled points.
     pub(crate) fn limit(&self, cloud: &PointCloud) -> f32 {
-        self.scale * cloud.max_radius()
+        let largest = match self.radii {
+            Radii::PerPoint(r) if cloud.is_uneven() => {
+                let culled = self.index.iter().map(|&i| r[i as usize]);
+                culled.fold(0.0, f32::max)
+            }
+            _ => cloud.max_radius(),
+        };
+        self.scale * largest
     }
 
     /// Of the i-th culled point.
@@ -174,6 +212,27 @@ pub struct Region {
     pub other_from_frame: Pose3,
     /// The other surface's bounds in its own frame, loosened: as good as an oriented box.
     pub other_bounds: Aabb,
+    /// How far beyond what can touch points are culled.
+    pub(crate) ring: Ring,
+    /// By how much of it both boxes are loosened, metres.
+    pub(crate) included: f32,
+}
+
+impl Region {
+    /// The region of the points of a radius, metres.
+    fn of_radius(&self, radius: f32) -> Self {
+        let beyond = self.ring.beyond(self.included, radius);
+        Self {
+            overlap: self.overlap.loosened(beyond),
+            other_bounds: self.other_bounds.loosened(beyond),
+            ..*self
+        }
+    }
+
+    /// Whether a point, in the frame of the query, is in it.
+    fn contains(&self, point: Vec3) -> bool {
+        self.overlap.contains(point) && self.other_bounds.contains(self.other_from_frame * point)
+    }
 }
 
 /// Fills `out` with every `stride`-th point of `cloud` inside `region`, in the order of the cloud.
@@ -190,7 +249,7 @@ pub(crate) fn cull(
 ) {
     out.clear();
     out.stride = stride;
-    if region.overlap.is_empty() {
+    if region.of_radius(cloud.max_radius()).overlap.is_empty() {
         return;
     }
     let blocks = cloud.blocks().len();
@@ -208,7 +267,7 @@ pub(crate) fn cull(
         .for_each(|(task, part)| {
             part.clear();
             // At once for all that may come: which task has how many changes from pose to pose.
-            part.reserve(TASK_BLOCKS * BLOCK.div_ceil(stride));
+            part.reserve(TASK_BLOCKS * BLOCK.div_ceil(stride), cloud.is_uneven());
             let first = task * TASK_BLOCKS;
             let range = first..(first + TASK_BLOCKS).min(blocks);
             cull_blocks(cloud, frame_from_cloud, region, stride, range, part);
@@ -226,18 +285,25 @@ fn cull_blocks(
     blocks: std::ops::Range<usize>,
     out: &mut Survivors,
 ) {
-    let kernel = Kernel::new(frame_from_cloud, region);
+    let uneven = Uneven::of(cloud);
+    let widest = region.of_radius(cloud.max_radius());
+    let mut kernel = Kernel::new(frame_from_cloud, &widest);
     let [x, y, z] = cloud.coordinates();
     let mut moved = Moved::default();
     let mut thinned = [[0.0; BLOCK]; 3];
     for block in blocks {
-        if !cloud.blocks()[block]
-            .transformed(frame_from_cloud)
-            .intersects(&region.overlap)
-        {
+        let bounds = cloud.blocks()[block].transformed(frame_from_cloud);
+        if !bounds.intersects(&widest.overlap) {
             continue;
         }
         let end = ((block + 1) * BLOCK).min(x.len());
+        if let Some(uneven) = &uneven {
+            let region = region.of_radius(uneven.largest(block * BLOCK..end));
+            if !bounds.intersects(&region.overlap) {
+                continue;
+            }
+            kernel = Kernel::new(frame_from_cloud, &region);
+        }
         let range = (block * BLOCK + first_taken(block, stride)).min(end)..end;
         if stride == 1 {
             let [x, y, z] = [x, y, z].map(|c| &c[range.clone()]);
@@ -254,7 +320,26 @@ fn cull_blocks(
             let [x, y, z] = &thinned;
             classify(&kernel, &x[..n], &y[..n], &z[..n], &mut moved);
         }
+        if let Some(uneven) = &uneven {
+            keep_own(uneven, &mut moved, range.start, stride, region);
+        }
+        let first = out.len();
         out.extend(&mut moved, range.start, stride);
+        if let Some(uneven) = &uneven {
+            let kept = out.index[first..].iter();
+            (out.further).extend(kept.map(|&i| uneven.further(i as usize)));
+        }
+    }
+}
+
+/// Leaves of the points that are in the region of the coarsest one those that are in their own.
+fn keep_own(uneven: &Uneven, moved: &mut Moved, first: usize, stride: usize, region: &Region) {
+    for i in 0..BLOCK {
+        if moved.inside[i] > 0 {
+            let own = region.of_radius(uneven.radius(first + i * stride));
+            let point = Vec3::new(moved.x[i], moved.y[i], moved.z[i]);
+            moved.inside[i] = u8::from(own.contains(point));
+        }
     }
 }
 
@@ -366,6 +451,8 @@ mod tests {
             overlap: everything,
             other_from_frame: Pose3::IDENTITY,
             other_bounds: everything,
+            ring: Ring::default(),
+            included: 0.0,
         };
         let (mut left, mut scratch) = (Survivors::default(), CullScratch::default());
         let frame = Pose3::IDENTITY;
@@ -399,6 +486,8 @@ mod tests {
                     overlap: aabb(0.6),
                     other_from_frame,
                     other_bounds: aabb(0.5),
+                    ring: Ring::default(),
+                    included: 0.0,
                 };
                 let is_kept = |&p: &Vec3| {
                     let [p, q] = [p, other_from_frame * p].map(Vec3::abs);
@@ -418,6 +507,57 @@ mod tests {
             }
         }
         assert!(counts.iter().all(|&n| n > 20 && n < BLOCK), "{counts:?}");
+    }
+
+    /// Each point by its own radius, by brute force: in shares of what is kept of the coarsest, which blocks have in
+    /// some places only.
+    #[test]
+    fn coarse_points_are_kept_farther_away() {
+        let mut rng = fastrand::Rng::with_seed(6);
+        let points: Vec<Vec3> = (0..4 * BLOCK)
+            .map(|k| {
+                let side = 2.0 * (k / BLOCK % 2) as f32 - 1.0;
+                let coordinate = |_| 2.0 * rng.f32() - 1.0;
+                Vec3::from_array([0, 1, 2].map(coordinate)).with_x(side * rng.f32())
+            })
+            .collect();
+        // On the right up to 13 times as large as on the left.
+        let radius = |p: Vec3| if p.x > 0.0 { 0.02 + 0.11 * p.x } else { 0.01 };
+        let radii: Vec<f32> = points.iter().map(|&p| radius(p)).collect();
+        let cloud = PointCloud::builder(&points).radii(radii).build().unwrap();
+        assert!(cloud.is_uneven());
+        let ring = Ring::new(&crate::Surface::Cloud(&cloud), 2.0);
+        let aabb = |half: f32| Aabb {
+            min: Vec3::splat(-half),
+            max: Vec3::splat(half),
+        };
+        let included = 2.0 * cloud.mean_radius();
+        let region = Region {
+            overlap: aabb(0.5),
+            other_from_frame: Pose3::IDENTITY,
+            other_bounds: aabb(0.5),
+            ring,
+            included,
+        };
+        for (stride, most) in [(1, 10), (3, 3)] {
+            let (mut kept, mut scratch) = (Survivors::default(), CullScratch::default());
+            let frame = Pose3::IDENTITY;
+            cull(&cloud, &frame, &region, stride, &mut scratch, &mut kept);
+            let is_kept = |&i: &usize| {
+                let beyond = (2.0 * radius(points[i]) - included).max(0.0);
+                let is_taken = (i % BLOCK).checked_sub(first_taken(i / BLOCK, stride));
+                points[i].abs().max_element() <= 0.5 + beyond
+                    && is_taken.is_some_and(|k| k % stride == 0)
+            };
+            let expected: Vec<usize> = (0..points.len()).filter(is_kept).collect();
+            assert!(kept.index.iter().map(|&i| i as usize).eq(expected));
+            let far = |k: &usize| kept.point(*k).abs().max_element() > 0.5;
+            assert!((0..kept.len()).filter(far).count() > most);
+            for k in 0..kept.len() {
+                let further = (radius(kept.point(k)) - cloud.mean_radius()).max(0.0);
+                assert!((kept.further(k) - further).abs() < 1e-6);
+            }
+        }
     }
 
     #[test]

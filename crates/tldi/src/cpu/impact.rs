@@ -188,13 +188,14 @@ impl Scratch {
 
     /// Fills both sides' points that the motion can bring together; `None` where there are none.
     fn cull_swept(&mut self, query: &ImpactQuery, camera: &VirtualCamera) -> Option<()> {
-        let margin = query.params.prediction
-            + ring(&query.a, &query.params).max(ring(&query.b, &query.params));
+        let [ring_a, ring_b] = [query.a, query.b].map(|surface| ring(&surface, &query.params));
+        let widest_ring = ring_a.widest().max(ring_b.widest());
+        let widest = query.params.prediction + widest_ring;
         let way = query.motion.length() * Vec3::Z;
         let view_from_a = camera.view_from_frame;
-        let seen_a = query.a.bounds().transformed(&view_from_a).loosened(margin);
+        let seen_a = query.a.bounds().transformed(&view_from_a).loosened(widest);
         let view_from_b = view_from_a * query.a_from_b;
-        let seen_b = query.b.bounds().transformed(&view_from_b).loosened(margin);
+        let seen_b = query.b.bounds().transformed(&view_from_b).loosened(widest);
         let mut met_by_b = Aabb {
             min: seen_b.min,
             max: seen_b.max + way,
@@ -219,17 +220,24 @@ impl Scratch {
             (&mut self.a, query.a, Pose3::IDENTITY, met_by_b),
             (&mut self.b, query.b, query.a_from_b, meeting_a),
         ];
-        for (side, surface, frame, region) in sides {
+        let rings = [[ring_a, ring_b], [ring_b, ring_a]];
+        for ((side, surface, frame, region), [own, other]) in sides.into_iter().zip(rings) {
+            side.near.clear();
             let Surface::Cloud(cloud) = surface else {
                 side.points.clear();
                 continue;
             };
+            let included = own.beside(&other);
+            let margin = query.params.prediction + included;
+            let region = region.loosened(included - widest_ring);
             let region = Region {
                 overlap: region
                     .transformed(&frame_from_view)
                     .intersection(cloud.bounds().transformed(&frame).loosened(margin)),
                 other_from_frame: view_from_a,
                 other_bounds: region,
+                ring: own,
+                included,
             };
             let stride = stride(cloud.mean_radius(), query.params.pixel_size);
             cull::cull(
@@ -260,6 +268,7 @@ impl Scratch {
             frame_from_cloud,
             camera,
             params,
+            merge_gap: params.merge_gap,
             sharpens: false,
         };
         let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);

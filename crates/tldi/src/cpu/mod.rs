@@ -25,6 +25,7 @@ pub(crate) mod splat;
 pub(crate) mod sweep;
 pub(crate) mod zone;
 
+use crate::reach::Ring;
 use crate::supported::supported_surfaces;
 use crate::{
     Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,
@@ -214,6 +215,8 @@ pub fn build(
             min: Vec3::NEG_INFINITY,
             max: Vec3::INFINITY,
         },
+        ring: Ring::default(),
+        included: 0.0,
     };
     cull::cull(
         cloud,
@@ -231,6 +234,7 @@ pub fn build(
             frame_from_cloud,
             camera: &camera,
             params,
+            merge_gap: params.merge_gap,
             sharpens: true,
         };
         if let Some(seen) = side.project(&view) {

@@ -80,8 +80,9 @@ impl Placed<'_> {
 }
 
 impl Side {
-    /// Finds the culled points within `reach` metres of an exact surface or inside it, or an even selection of
-    /// them; its normals at the nearest points go to `surface_normals`. `false` where none is near.
+    /// Finds the culled points within `reach` metres of an exact surface or inside it, coarser ones farther away, or
+    /// an even selection of them; its normals at the nearest points go to `surface_normals`. `false` where none is
+    /// near.
     pub(super) fn near_exact(
         &mut self,
         cloud: &PointCloud,
@@ -90,10 +91,8 @@ impl Side {
         reach: f32,
         surface_normals: &mut Vec<Vec3>,
     ) -> bool {
-        let support = match cloud.normals() {
-            Some(_) => 0.0,
-            None => normals::SUPPORT * self.mean_radius(cloud),
-        };
+        self.near.clear();
+        let support = self.support_radius(cloud);
         self.in_near_cells(exact, reach, support);
         let step = self.kept.len().div_ceil(AIM_SAMPLES) as u32;
         self.select_near(exact, reach, step, surface_normals);
@@ -107,6 +106,7 @@ impl Side {
             self.sample_normals(cloud, frame_from_cloud);
         } else {
             // Neighbours are not among the samples.
+            let support = self.support_radius(cloud);
             let of_support = &self.support;
             normals::estimate(
                 of_support,
@@ -122,7 +122,7 @@ impl Side {
     }
 
     /// Fills `kept` with the points in cells that reach within `reach` metres of the surface, and `support`
-    /// with those within `beyond` metres more.
+    /// with those within `beyond` metres more; with coarser ones of cells farther away.
     fn in_near_cells(&mut self, exact: &Placed, reach: f32, beyond: f32) {
         let points = (0..self.points.len()).map(|i| self.points.point(i));
         let CellDistances {
@@ -162,9 +162,10 @@ impl Side {
                 };
                 *least = exact.project(middle).0 - half_diagonal;
             }
-            if *least <= reach + beyond {
+            let further = self.points.further(i);
+            if *least <= reach + beyond + (1.0 + normals::SUPPORT) * further {
                 self.support.push(i as u32);
-                if *least <= reach {
+                if *least <= reach + further {
                     self.kept.push(i as u32);
                 }
             }
@@ -188,7 +189,7 @@ impl Side {
             }
             let (distance, normal) = exact.project(self.points.point(i as usize));
             self.deepest = self.deepest.max(-distance);
-            if distance <= reach {
+            if distance <= reach + self.points.further(i as usize) {
                 self.near.push(i);
                 surface_normals.push(normal);
             }
@@ -201,6 +202,7 @@ mod tests {
     use super::*;
     use crate::RayHit;
     use crate::cpu::cull::{self, Region};
+    use crate::reach::Ring;
     use fastrand::Rng;
 
     /// A ball of one metre.
@@ -243,6 +245,8 @@ mod tests {
             overlap: cloud.bounds(),
             other_from_frame: Pose3::IDENTITY,
             other_bounds: cloud.bounds(),
+            ring: Ring::default(),
+            included: 0.0,
         };
         let mut side = Side::default();
         let Side { cull, points, .. } = &mut side;
@@ -274,6 +278,38 @@ mod tests {
                 }
             }
             assert!(found.len() < points.len(), "all are near");
+        }
+    }
+
+    /// Of points at up to three reaches from the ball those that a radius of their own brings near are found.
+    #[test]
+    fn coarse_points_are_near_farther_away() {
+        let mut rng = Rng::with_seed(25);
+        let at = |height: f32| (1.0 + height) * random(&mut rng).normalize();
+        let heights: Vec<f32> = (0..400).map(|k| 3.0 * REACH * k as f32 / 400.0).collect();
+        let points: Vec<Vec3> = heights.iter().copied().map(at).collect();
+        // Every tenth five times as coarse.
+        let radius = |k: usize| {
+            if k.is_multiple_of(10) {
+                REACH
+            } else {
+                0.2 * REACH
+            }
+        };
+        let radii: Vec<f32> = (0..points.len()).map(radius).collect();
+        let cloud = PointCloud::builder(&points).radii(radii);
+        let cloud = cloud.build().expect("a valid cloud");
+        let mut side = side_of(&cloud);
+        let mut normals = Vec::new();
+        let (exact, frame) = (here(&Ball), Pose3::IDENTITY);
+        let mean = cloud.mean_radius();
+        assert!(side.near_exact(&cloud, &frame, &exact, mean, &mut normals));
+        for (k, &height) in heights.iter().enumerate() {
+            let reach = radius(k).max(mean);
+            if (height - reach).abs() > 1e-3 * reach {
+                let is_near = side.near.binary_search(&(k as u32)).is_ok();
+                assert_eq!(is_near, height < reach, "{height} of {reach}");
+            }
         }
     }
 

@@ -10,10 +10,11 @@ use super::near_exact::Placed;
 use super::rect::Rect;
 use super::side::{CloudView, ExactView, Scope, Side};
 use super::splat::{DepthScale, Imaging};
-use super::zone::{self, ZoneGrid, ZoneScratch};
+use super::zone::{self, ZoneScratch, ZoneSide};
 use crate::camera_policy::{MAX_VIEWS, ZoneNormals, aim, further_axes, seen_from_behind};
 use crate::patches::PatchScratch;
-use crate::plan::{Approach, PairPlan, SidePlan, stride};
+use crate::plan::{Approach, PairPlan, SidePlan, column_reach, stride};
+use crate::reach::Place;
 use crate::{
     CameraPolicy, PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper,
 };
@@ -37,6 +38,8 @@ pub(super) struct Scratch {
     pub(super) core: CoreScratch,
     pub(super) meetings: Vec<Meeting>,
     zone: ZoneScratch,
+    /// Of both sides, metres.
+    merge_gaps: [f32; 2],
     pub(super) touching: Touching,
     /// Of the current view.
     pub(super) fold: ViewFold,
@@ -57,7 +60,7 @@ impl Scratch {
             self.compare_paper(query, &camera, result);
             return;
         }
-        let Some(plan) = PairPlan::new(query) else {
+        let Some(mut plan) = PairPlan::new(query) else {
             return;
         };
         let pixel = query.params.pixel_size;
@@ -70,6 +73,13 @@ impl Scratch {
         if !is_found && !(self.cull(query, &plan, strides) && self.zone(query, &plan)) {
             return;
         }
+        let place = self.place(query);
+        self.merge_gaps = place.merging.map(|factor| factor * query.params.merge_gap);
+        let query = &PairQuery {
+            params: place.params(&query.params),
+            ..*query
+        };
+        plan.column_reach = column_reach(&query.params);
         self.crossings = Crossings::default();
         match query.view {
             View::Fixed(camera) => {
@@ -165,6 +175,7 @@ impl Scratch {
     /// Fills both sides' culled points, every so many of theirs; `false` where a cloud has no point in reach.
     pub(super) fn cull(&mut self, query: &PairQuery, plan: &PairPlan, strides: [usize; 2]) -> bool {
         let cull = |side: &mut Side, surface: Surface, plan: &SidePlan, stride| {
+            side.near.clear();
             if let Surface::Cloud(cloud) = surface {
                 let frame = &plan.frame_from_surface;
                 let Side { cull, points, .. } = side;
@@ -189,10 +200,17 @@ impl Scratch {
         let reach = plan.zone_reach;
         match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
+                let zone_side = |points, mean_radius| ZoneSide {
+                    points,
+                    mean_radius,
+                };
                 zone::zone(
-                    &self.a.points,
-                    &self.b.points,
-                    &ZoneGrid::new(&plan.overlap, reach),
+                    [
+                        zone_side(&self.a.points, a.mean_radius()),
+                        zone_side(&self.b.points, b.mean_radius()),
+                    ],
+                    &plan.overlap,
+                    reach,
                     &mut self.zone,
                     &mut self.a.near,
                     &mut self.b.near,
@@ -226,6 +244,18 @@ impl Scratch {
                     .near_exact(cloud, &query.a_from_b, &exact, reach, near)
             }
             _ => false, // refused
+        }
+    }
+
+    /// What the surfaces look like where they are near each other; as the parameters say, where the camera is given.
+    fn place(&self, query: &PairQuery) -> Place {
+        let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| match surface {
+            Surface::Cloud(cloud) => side.near_radius(cloud),
+            Surface::Exact(_) | Surface::Device(_) => 0.0,
+        });
+        match query.view {
+            View::Fixed(_) => Place::AS_TOLD,
+            View::Aim { .. } => Place::new(&query.params, [&query.a, &query.b], near),
         }
     }
 
@@ -290,11 +320,13 @@ impl Scratch {
         result: &mut PairResult,
     ) {
         let params = &query.params;
-        let view_of = |cloud, frame_from_cloud| CloudView {
+        let [merge_a, merge_b] = self.merge_gaps;
+        let view_of = |cloud, frame_from_cloud, merge_gap| CloudView {
             cloud,
             frame_from_cloud,
             camera,
             params,
+            merge_gap,
             sharpens: true,
         };
         // An unbounded surface as far as the cloud is deep in it, twice for what was not sampled.
@@ -310,18 +342,18 @@ impl Scratch {
         let (hits, touching, fold) = (&mut self.hits, &mut self.touching, &mut self.fold);
         let looked = match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
-                let (a, b) = (view_of(a, a_from_a), view_of(b, a_from_b));
+                let (a, b) = (view_of(a, a_from_a, merge_a), view_of(b, a_from_b, merge_b));
                 self.look_at_clouds(&a, &b, plan.column_reach)
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
                 let exact = exact_view(surface, a_from_b, self.a.deepest);
-                let (cloud, image) = (view_of(cloud, a_from_a), &mut self.b.image);
+                let (cloud, image) = (view_of(cloud, a_from_a, merge_a), &mut self.b.image);
                 self.a
                     .look_with(&cloud, &exact, touching, fold, hits, image)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
                 let exact = exact_view(surface, a_from_a, self.b.deepest);
-                let (cloud, image) = (view_of(cloud, a_from_b), &mut self.a.image);
+                let (cloud, image) = (view_of(cloud, a_from_b, merge_b), &mut self.a.image);
                 self.b
                     .look_with(&cloud, &exact, touching, fold, hits, image)
             }
@@ -351,7 +383,7 @@ impl Scratch {
         b: &CloudView,
         reach: f32,
     ) -> Option<()> {
-        let support = self.a.support(a).max(self.b.support(b));
+        let support = (self.a.support_radius(a.cloud)).max(self.b.support_radius(b.cloud));
         let CommonPixels { rect, tiles, near } = self.meet(a, b, reach, support)?;
         let (side_a, side_b) = (&mut self.a, &mut self.b);
         let touching = &self.touching;
@@ -386,7 +418,8 @@ impl Scratch {
         let count = side_a.points.len() + side_b.points.len();
         self.fold.clear();
         if camera.size.is_none() && ViewFold::is_wanted(&rect, count) {
-            let support = side_a.support(a).max(side_b.support(b)) / seen_a.pixel_size;
+            let support = (side_a.support_radius(a.cloud)).max(side_b.support_radius(b.cloud))
+                / seen_a.pixel_size;
             let reach = seen_a.reach.max(seen_b.reach).max(support);
             let points = side_a.columns.across().chain(side_b.columns.across());
             self.fold.find(reach, seen_a.pixel_size, points);

@@ -48,6 +48,8 @@ pub(super) struct CloudView<'a> {
     pub(super) frame_from_cloud: &'a Pose3,
     pub(super) camera: &'a VirtualCamera,
     pub(super) params: &'a Params,
+    /// That of the cloud where it is looked at, metres; see [`Params::merge_gap`].
+    pub(super) merge_gap: f32,
     /// Whether estimated normals are sharpened: not for casts, which take the pixel that is met first. Planes that are
     /// sharpened in part, at corners, stand out there.
     pub(super) sharpens: bool,
@@ -125,9 +127,21 @@ impl Side {
         (near.map(|p| p.as_dvec3()).sum::<DVec3>() / self.near.len() as f64).as_vec3()
     }
 
-    /// Mean radius of the culled points, metres.
+    /// Mean radius in metres of the culled points or, where these do not all reach equally far, of the near ones.
     pub(super) fn mean_radius(&self, cloud: &PointCloud) -> f32 {
-        PointRadii::new(cloud, &self.points).mean()
+        let radii = PointRadii::new(cloud, &self.points);
+        match self.points.further.is_empty() || self.near.is_empty() {
+            true => radii.mean(),
+            false => radii.mean_of(&self.near),
+        }
+    }
+
+    /// Mean radius of the cloud where the other surface is near, metres; in all of it where it is even.
+    pub(super) fn near_radius(&self, cloud: &PointCloud) -> f32 {
+        match self.points.further.is_empty() {
+            true => cloud.mean_radius(),
+            false => PointRadii::unscaled(cloud, &self.points).mean_of(&self.near),
+        }
     }
 
     /// Moves the culled points into the view and returns what they cover.
@@ -137,10 +151,10 @@ impl Side {
     }
 
     /// Radius in metres about a point in which others decide its normal; 0 where it is given.
-    pub(super) fn support(&self, view: &CloudView) -> f32 {
-        match view.cloud.normals() {
+    pub(super) fn support_radius(&self, cloud: &PointCloud) -> f32 {
+        match cloud.normals() {
             Some(_) => 0.0,
-            None => normals::SUPPORT * self.mean_radius(view.cloud),
+            None => normals::SUPPORT * self.mean_radius(cloud),
         }
     }
 
@@ -174,7 +188,7 @@ impl Side {
         self.columns.sort(&tiles, view.camera);
         let margin = view.params.slope_damping * seen.radius;
         self.columns.reduce_both(&tiles, margin);
-        let support_px = self.support(view) / seen.pixel_size;
+        let support_px = self.support_radius(view.cloud) / seen.pixel_size;
         let reach = reach + tiles.half_diagonal() * seen.pixel_size;
         let meets = |tile: usize| {
             let depths = self.columns.depths(tile);
@@ -215,13 +229,17 @@ impl Side {
         let color = color.as_ref().map(|c| c as &dyn Fn(u32) -> [u8; 4]);
         self.image
             .begin(imaging.camera, imaging.rect.origin, imaging.rect.size);
+        let merging = Params {
+            merge_gap: view.merge_gap,
+            ..*view.params
+        };
         for band in 0..self.fragments.begin(&points, imaging) {
             self.fragments.splat_band(band, &points, imaging);
             sweep::sweep(
                 &mut self.fragments,
                 points.oriented,
                 view.knows_faces(),
-                imaging.scale.merge_steps(view.params, view.cloud.noise()),
+                imaging.scale.merge_steps(&merging, view.cloud.noise()),
                 color,
                 imaging,
                 &mut self.image,
@@ -313,7 +331,9 @@ impl Side {
         fold.clear();
         let follows = view.camera.size.is_none();
         if follows && ViewFold::is_wanted(&rect, self.points.len()) {
-            let reach = seen.reach.max(self.support(view) / seen.pixel_size);
+            let reach = seen
+                .reach
+                .max(self.support_radius(view.cloud) / seen.pixel_size);
             fold.find(reach, seen.pixel_size, self.columns.across());
             self.columns.fold(fold, view.camera, &mut seen);
             seen.rect = seen.rect.grown(border);

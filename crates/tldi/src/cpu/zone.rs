@@ -3,11 +3,15 @@
 //! One bit per cell of a coarse grid over the overlap, dilated by one cell: whatever is within one
 //! cell edge of the other cloud is found, at a cost linear in points and cells. If nothing is
 //! found the pair is rejected before any image is built.
+//!
+//! Of a cloud with coarser points the octaves of its radii ([`reach`](crate::reach)) are taken one by one, with
+//! cells as large as the points of both sides reach: two points are near by their own radii.
 
 use super::cull::Survivors;
 use super::fold::{SpaceFold, is_coarse};
 use super::lanes::{multiversioned, truncated};
 use crate::Aabb;
+use crate::reach::{Class, classes};
 use glamx::Vec3;
 
 /// Most cells of the grid: 4 Mi bits are 512 KiB, which stays in a core's cache. Larger overlaps
@@ -22,8 +26,11 @@ pub(crate) struct ZoneScratch {
     cells_a: Vec<u32>,
     cells_b: Vec<u32>,
     fold: SpaceFold,
-    folded_a: Survivors,
-    folded_b: Survivors,
+    /// Of both sides, on folded axes.
+    folded: [Survivors; 2],
+    /// Which points are near in some octave, 1 or 0.
+    is_near_a: Vec<u8>,
+    is_near_b: Vec<u8>,
 }
 
 /// Cells of at least the zone's reach over the overlap of both bounds.
@@ -35,8 +42,6 @@ pub struct ZoneGrid {
     pub inv_cell: f32,
     /// Cells along x, y, z.
     pub dims: [usize; 3],
-    /// Distance in metres for which the cells are made.
-    reach: f32,
     /// Words of 64 bits that a row along x takes here.
     row_words: usize,
 }
@@ -64,7 +69,6 @@ impl ZoneGrid {
             min: bounds.min,
             inv_cell: 1.0 / cell,
             dims,
-            reach,
             row_words: dims[0].div_ceil(64),
         }
     }
@@ -82,7 +86,7 @@ impl ZoneGrid {
         is_inside.then(|| (z * self.dims[1] + y) * 64 * self.row_words + x)
     }
 
-    fn mark(&self, cells: &[u32], bits: &mut Vec<u64>) {
+    fn mark<'c>(&self, cells: impl Iterator<Item = &'c u32>, bits: &mut Vec<u64>) {
         bits.clear();
         bits.resize(self.words(), 0);
         for cell in cells {
@@ -158,10 +162,51 @@ fn locate_cells(grid: &ZoneGrid, x: &[f32], y: &[f32], z: &[f32], cells: &mut [u
 }
 }
 
+/// The culled points of a side, which is a cloud of this mean radius, metres.
+#[derive(Clone, Copy)]
+pub(crate) struct ZoneSide<'a> {
+    pub(crate) points: &'a Survivors,
+    pub(crate) mean_radius: f32,
+}
+
 /// Fills `near_a` and `near_b` with the indices of the culled points that have a point of the
-/// other cloud within the grid's reach. A few farther ones (up to two cell diagonals) are included;
-/// none nearer is missed.
+/// other cloud within `reach` metres, or as much farther as both reach farther than their clouds' mean radii. A few
+/// farther ones (up to two cell diagonals) are included; none nearer is missed. `bounds` hold the points.
 pub(crate) fn zone(
+    [a, b]: [ZoneSide; 2],
+    bounds: &Aabb,
+    reach: f32,
+    scratch: &mut ZoneScratch,
+    near_a: &mut Vec<u32>,
+    near_b: &mut Vec<u32>,
+) {
+    let mut folded = std::mem::take(&mut scratch.folded);
+    let (mut sides, mut bounds) = ([a, b], *bounds);
+    let farthest = sides.iter().map(|side| side.farthest());
+    let widest = farthest.fold(reach, |sum, further| sum + further);
+    if is_coarse(ZoneGrid::new(&bounds, widest).inv_cell, widest) {
+        let points = sides.into_iter().flat_map(|side| side.points.points());
+        scratch.fold.find(widest, points);
+        if !scratch.fold.is_identity() {
+            for (side, folded) in sides.iter_mut().zip(&mut folded) {
+                folded.fold(side.points, &scratch.fold);
+                side.points = folded;
+            }
+            let points = sides.into_iter().flat_map(|side| side.points.points());
+            bounds = points.fold(Aabb::EMPTY, Aabb::including);
+        }
+    }
+    if sides.iter().all(|side| side.points.further.is_empty()) {
+        let grid = ZoneGrid::new(&bounds, reach);
+        let [a, b] = sides.map(|side| side.points);
+        of_one_octave(a, b, &grid, scratch, near_a, near_b);
+    } else {
+        of_all_octaves(sides, &bounds, reach, scratch, near_a, near_b);
+    }
+    scratch.folded = folded;
+}
+
+fn of_one_octave(
     a: &Survivors,
     b: &Survivors,
     grid: &ZoneGrid,
@@ -174,34 +219,18 @@ pub(crate) fn zone(
         dilated,
         cells_a,
         cells_b,
-        fold,
-        folded_a,
-        folded_b,
+        ..
     } = scratch;
-    let (mut a, mut b, mut grid) = (a, b, *grid);
-    if is_coarse(grid.inv_cell, grid.reach) {
-        let both = [a, b].into_iter();
-        fold.find(grid.reach, both.flat_map(Survivors::points));
-        if !fold.is_identity() {
-            folded_a.fold(a, fold);
-            folded_b.fold(b, fold);
-            (a, b) = (folded_a, folded_b);
-            let both = a.points().chain(b.points());
-            let bounds = both.fold(Aabb::EMPTY, Aabb::including);
-            grid = ZoneGrid::new(&bounds, grid.reach);
-        }
-    }
-    let grid = &grid;
     locate(a, grid, cells_a);
     locate(b, grid, cells_b);
-    grid.mark(cells_a, bits);
+    grid.mark(cells_a.iter(), bits);
     grid.dilate(bits, dilated);
     select(cells_b, bits, near_b);
     if near_b.is_empty() {
         near_a.clear();
         return;
     }
-    grid.mark(cells_b, bits);
+    grid.mark(cells_b.iter(), bits);
     grid.dilate(bits, dilated);
     select(cells_a, bits, near_a);
 }
@@ -244,21 +273,90 @@ impl AroundPlaces {
     }
 }
 
+/// Cost: that of [`of_one_octave`] for each pair of octaves that the culled points are of.
+fn of_all_octaves(
+    [a, b]: [ZoneSide; 2],
+    bounds: &Aabb,
+    reach: f32,
+    scratch: &mut ZoneScratch,
+    near_a: &mut Vec<u32>,
+    near_b: &mut Vec<u32>,
+) {
+    let ZoneScratch {
+        bits,
+        dilated,
+        cells_a,
+        cells_b,
+        is_near_a,
+        is_near_b,
+        ..
+    } = scratch;
+    for (side, is_near) in [(a, &mut *is_near_a), (b, &mut *is_near_b)] {
+        is_near.clear();
+        is_near.resize(side.points.len(), 0);
+    }
+    for class_a in classes(&a.points.further, a.mean_radius) {
+        for class_b in classes(&b.points.further, b.mean_radius) {
+            let grid = ZoneGrid::new(bounds, reach + class_a.further + class_b.further);
+            locate(a.points, &grid, cells_a);
+            locate(b.points, &grid, cells_b);
+            grid.mark(a.of_class(class_a).map(|k| &cells_a[k]), bits);
+            grid.dilate(bits, dilated);
+            b.add(class_b, cells_b, bits, is_near_b);
+            grid.mark(b.of_class(class_b).map(|k| &cells_b[k]), bits);
+            grid.dilate(bits, dilated);
+            a.add(class_a, cells_a, bits, is_near_a);
+        }
+    }
+    for (is_near, near) in [(is_near_a, near_a), (is_near_b, near_b)] {
+        near.clear();
+        near.extend((0..is_near.len() as u32).filter(|&k| is_near[k as usize] > 0));
+    }
+}
+
+impl ZoneSide<'_> {
+    /// By how much a point reaches farther than the mean radius at most, metres.
+    fn farthest(&self) -> f32 {
+        self.points.further.iter().fold(0.0, |a: f32, &b| a.max(b))
+    }
+
+    /// Indices of the points of a class.
+    fn of_class(&self, class: Class) -> impl Iterator<Item = usize> {
+        let holds = move |k: &usize| class.holds(self.points.further(*k), self.mean_radius);
+        (0..self.points.len()).filter(holds)
+    }
+
+    /// Marks as near the points of a class whose cells are marked.
+    fn add(&self, class: Class, cells: &[u32], bits: &[u64], is_near: &mut [u8]) {
+        for k in self.of_class(class) {
+            let cell = cells[k];
+            is_near[k] |= (bits[cell as usize / 64] >> (cell % 64) & 1) as u8;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Every pair within reach is found and nothing beyond the dilated cells, by brute force.
+    /// Every pair within reach is found and nothing beyond the dilated cells, by brute force: of points that reach
+    /// equally far, and of others.
     #[test]
     fn selects_what_brute_force_selects() {
-        for seed in 0..40 {
+        for seed in 0..80 {
             let mut rng = fastrand::Rng::with_seed(seed);
+            let mean_radius = 0.02;
             let mut random = |n: usize| {
                 let mut s = Survivors::default();
                 for _ in 0..n {
                     s.x.push(rng.f32() * 9.0);
                     s.y.push(rng.f32());
                     s.z.push(rng.f32() * 2.0);
+                    if seed % 2 > 0 {
+                        // Two in three, up to eight times as far.
+                        let radii = (8.0 * rng.f32() - 2.0).max(0.0);
+                        s.further.push(radii * mean_radius);
+                    }
                 }
                 s
             };
@@ -267,31 +365,40 @@ mod tests {
                 min: Vec3::ZERO,
                 max: Vec3::new(9.0, 1.0, 2.0),
             };
-            let reach = 0.05 + 0.3 * (seed as f32 / 40.0);
+            let reach = 2.0 * mean_radius + 0.2 * (seed as f32 / 80.0);
             let (mut near_a, mut near_b) = (vec![], vec![]);
+            let side = |points| ZoneSide {
+                points,
+                mean_radius,
+            };
             zone(
-                &a,
-                &b,
-                &ZoneGrid::new(&bounds, reach),
+                [side(&a), side(&b)],
+                &bounds,
+                reach,
                 &mut ZoneScratch::default(),
                 &mut near_a,
                 &mut near_b,
             );
             for (p, q, near) in [(&a, &b, &near_a), (&b, &a, &near_b)] {
                 for i in 0..p.len() {
-                    let distance = (0..q.len())
-                        .map(|j| p.point(i).distance(q.point(j)))
-                        .fold(f32::INFINITY, f32::min);
+                    // How far a point of the other cloud is, in reaches of both.
+                    let share = |j: usize| {
+                        let reach = reach + p.further(i) + q.further(j);
+                        p.point(i).distance(q.point(j)) / reach
+                    };
+                    let nearest = (0..q.len()).map(share).fold(f32::INFINITY, f32::min);
                     let selected = near.contains(&(i as u32));
                     assert!(
-                        selected || distance > reach,
-                        "seed {seed}: point {i} at {distance} missed"
+                        selected || nearest > 1.0,
+                        "seed {seed}: point {i} at {nearest} missed"
                     );
-                    // Two neighbouring cells span at most two diagonals.
-                    let farthest = 2.0 * 3.0f32.sqrt() * reach * 1.0001;
+                    // Two neighbouring cells span at most two diagonals; cells are as large as the points of both
+                    // octaves reach, which are less than an octave wide.
+                    let octave = if p.further.is_empty() { 1.0 } else { 2.0 };
+                    let farthest = 2.0 * 3.0f32.sqrt() * octave * 1.0001;
                     assert!(
-                        !selected || distance <= farthest,
-                        "seed {seed}: point {i} at {distance}"
+                        !selected || nearest <= farthest,
+                        "seed {seed}: point {i} at {nearest}"
                     );
                 }
             }
