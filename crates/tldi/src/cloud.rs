@@ -127,7 +127,16 @@ impl<'a> PointCloud<'a> {
     }
 
     /// Whether some radius is twice the mean or more: in such a cloud what is near depends on the place, as its
-    /// resolution does.
+    /// resolution does. Cost: O(1).
+    ///
+    /// ```
+    /// use tldi::{PointCloud, glamx::Vec3};
+    /// let points = [Vec3::ZERO, Vec3::X, 2.0 * Vec3::X];
+    /// let with = |radii: &[f32]| PointCloud::builder(&points[..]).radii(radii.to_vec()).build();
+    /// assert!(!with(&[0.5, 0.8, 0.5])?.is_uneven());
+    /// assert!(with(&[0.5, 0.5, 4.0])?.is_uneven());
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
     pub fn is_uneven(&self) -> bool {
         self.max_radius >= 2.0 * self.mean_radius
     }

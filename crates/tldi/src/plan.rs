@@ -176,7 +176,14 @@ pub(crate) fn column_reach(params: &Params) -> f32 {
 const LEAST_PIXELS: f32 = 8.0;
 
 /// Edge in metres of the largest pixels that resolve a body of these extents, metres, whose points have this mean
-/// radius, metres: eight across its second longest extent, or as large as its points.
+/// radius, metres: eight across its second longest extent, or as large as its points. Cost: O(1).
+///
+/// ```
+/// use tldi::{glamx::Vec3, plan::largest_pixel};
+/// let ruler = Vec3::new(0.3, 0.04, 0.005);
+/// assert_eq!(largest_pixel(ruler, 0.001), 0.005);
+/// assert_eq!(largest_pixel(ruler, 0.02), 0.02);
+/// ```
 pub fn largest_pixel(extents: Vec3, radius: f32) -> f32 {
     let mut extents = extents.to_array();
     extents.sort_by(f32::total_cmp);
