@@ -25,7 +25,7 @@ const LARGE: [f32; 4] = [16.0, 8.0, 4.0, 2.0];
 const DEEP: f32 = 2.0;
 
 /// Large pixels through the overlap of the bounds from which on larger ones are taken.
-const THROUGH: f32 = 8.0;
+const THROUGH: f32 = 3.0;
 
 /// Points that are taken per large pixel of a surface seen face on.
 const POINTS_PER_PIXEL: f32 = 4.0;
@@ -44,6 +44,39 @@ pub(super) struct Window {
     cube: [i32; 3],
     /// Pairs of neighbouring large pixels between which they do.
     swaps: u32,
+}
+
+impl Window {
+    /// Edge, metres.
+    fn edge(query: &PairQuery) -> f32 {
+        WINDOW * query.params.pixel_size
+    }
+
+    /// The view of it, with the pixel grid of the look at all of the contact zone: it starts at a whole number of pixels.
+    fn camera(&self, query: &PairQuery, axes: &[Vec3]) -> VirtualCamera {
+        let mut camera = VirtualCamera::along(axes[self.view], query.params.pixel_size);
+        let [x, y, _] = self.cube.map(|c| c as f32);
+        camera.view_from_frame.translation = -Self::edge(query) * Vec3::new(x, y, 0.0);
+        camera.size = Some([WINDOW as u32; 2]);
+        camera
+    }
+
+    /// The plan of the pair for what `camera` sees of it.
+    fn plan(&self, query: &PairQuery, plan: &PairPlan, camera: &VirtualCamera) -> PairPlan {
+        let edge = Self::edge(query);
+        let near = edge * self.cube[2] as f32;
+        let cube = Aabb {
+            min: Vec3::new(0.0, 0.0, near),
+            max: Vec3::new(edge, edge, near + edge),
+        };
+        let [a, b] = [&query.a, &query.b].map(|surface| ring(surface, &query.params).widest());
+        let mut plan = plan.clone();
+        for side in &mut plan.sides {
+            side.region.other_from_frame = camera.view_from_frame;
+            side.region.other_bounds = cube.loosened(a.max(b));
+        }
+        plan
+    }
 }
 
 /// What a first look came to.
@@ -93,7 +126,7 @@ impl Scratch {
         result: &mut PairResult,
     ) -> FirstLook {
         let mut came_to = FirstLook::Nothing;
-        self.window_edge = WINDOW * query.params.pixel_size;
+        self.window_edge = Window::edge(query);
         let Some(through) = overlap(query) else {
             return came_to;
         };
@@ -113,8 +146,7 @@ impl Scratch {
                 depth = result.gap.map_or(0.0, |gap| -gap);
             }
             if depth >= DEEP * pixel {
-                came_to = FirstLook::Nothing;
-                if self.is_proven(query, plan, &result.axes) {
+                if self.is_proven(query, plan, &result.axes, &mut came_to) {
                     result.collides = true;
                     return FirstLook::Settled;
                 }
@@ -165,12 +197,47 @@ impl Scratch {
     }
 
     /// Whether small pixels show in a few windows that the surfaces cross.
-    fn is_proven(&mut self, query: &PairQuery, plan: &PairPlan, axes: &[Vec3]) -> bool {
+    fn is_proven(
+        &mut self,
+        query: &PairQuery,
+        plan: &PairPlan,
+        axes: &[Vec3],
+        came_to: &mut FirstLook,
+    ) -> bool {
+        let holds_all = self.a.points.are_all() && self.b.points.are_all();
+        if !holds_all {
+            *came_to = FirstLook::Nothing;
+        }
         rank(&mut self.windows);
         let mut crossings = Crossings::default();
         for k in 0..self.windows.len().min(MOST_WINDOWS) {
             let window = self.windows[k];
-            self.look_through(query, plan, axes, &window, &mut crossings);
+            let camera = window.camera(query, axes);
+            let plan = window.plan(query, plan, &camera);
+            let mut is_seen = true;
+            if holds_all {
+                for (side, plan) in [&mut self.a, &mut self.b].into_iter().zip(&plan.sides) {
+                    side.window.select(&side.points, &plan.region);
+                    std::mem::swap(&mut side.points, &mut side.window);
+                }
+            } else {
+                let pixel = query.params.pixel_size;
+                let strides = [query.a, query.b].map(|s| stride(s.mean_radius(), pixel));
+                is_seen = self.cull(query, &plan, strides);
+            }
+            if is_seen {
+                let seen = Seen {
+                    axes,
+                    view: window.view,
+                    ..Seen::default()
+                };
+                self.look_through(query, &plan, &camera, &seen, &mut crossings);
+            }
+            if holds_all {
+                for side in [&mut self.a, &mut self.b] {
+                    std::mem::swap(&mut side.points, &mut side.window);
+                }
+            }
             if crossings.are_enough() {
                 return true;
             }
@@ -240,44 +307,22 @@ impl Scratch {
         depths.fold(0.0, f32::max)
     }
 
-    /// Adds what the fine images show of crossings in a window.
+    /// Adds what small pixels show of crossings in a window, whose points both sides hold.
     fn look_through(
         &mut self,
         query: &PairQuery,
         plan: &PairPlan,
-        axes: &[Vec3],
-        window: &Window,
+        camera: &VirtualCamera,
+        seen: &Seen,
         crossings: &mut Crossings,
     ) {
         let (Surface::Cloud(a), Surface::Cloud(b)) = (query.a, query.b) else {
             return;
         };
-        let pixel = query.params.pixel_size;
-        let mut camera = VirtualCamera::along(axes[window.view], pixel);
-        let edge = self.window_edge;
-        // A whole number of pixels: the grid is that of the look at all of the contact zone.
-        let first = edge * Vec3::from_array(window.cube.map(|c| c as f32));
-        camera.view_from_frame.translation = -first.with_z(0.0);
-        camera.size = Some([WINDOW as u32; 2]);
-        let rings = [&query.a, &query.b].map(|surface| ring(surface, &query.params).widest());
-        let margin = rings[0].max(rings[1]);
-        let cube = Aabb {
-            min: Vec3::ZERO.with_z(first.z),
-            max: Vec3::splat(edge).with_z(first.z + edge),
-        };
-        let mut plan = plan.clone();
-        for side in &mut plan.sides {
-            side.region.other_from_frame = camera.view_from_frame;
-            side.region.other_bounds = cube.loosened(margin);
-        }
-        let strides = [query.a, query.b].map(|s| stride(s.mean_radius(), pixel));
-        if !self.cull(query, &plan, strides) {
-            return;
-        }
         let view_of = |cloud, frame_from_cloud| CloudView {
             cloud,
             frame_from_cloud,
-            camera: &camera,
+            camera,
             params: &query.params,
             merge_gap: query.params.merge_gap,
             sharpens: true,
@@ -286,16 +331,11 @@ impl Scratch {
         if self.look_at_clouds(&a, &b, plan.column_reach).is_none() {
             return;
         }
-        let seen = Seen {
-            axes,
-            view: window.view,
-            ..Seen::default()
-        };
         let mut nothing = PairResult::default();
         compare::compare(
             &self.a.image,
             &self.b.image,
-            &seen,
+            seen,
             &query.params,
             crossings,
             &mut nothing,

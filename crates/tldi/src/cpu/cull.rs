@@ -77,6 +77,20 @@ impl Survivors {
         self.further.extend_from_slice(&other.further);
     }
 
+    /// Takes those of `all` points, of a cloud that is even, that are in `region`.
+    pub(crate) fn select(&mut self, all: &Self, region: &Region) {
+        self.clear();
+        self.stride = all.stride;
+        for (i, point) in all.points().enumerate() {
+            if region.contains(point) {
+                self.x.push(point.x);
+                self.y.push(point.y);
+                self.z.push(point.z);
+                self.index.push(all.index[i]);
+            }
+        }
+    }
+
     fn append(&mut self, other: &Self) {
         self.x.extend_from_slice(&other.x);
         self.y.extend_from_slice(&other.y);

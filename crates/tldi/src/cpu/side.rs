@@ -21,6 +21,8 @@ use glamx::{DVec3, Mat3, Pose3, Vec3};
 #[derive(Default)]
 pub(super) struct Side {
     pub(super) points: Survivors,
+    /// Those in a window or, while that is looked through, all others with them.
+    pub(super) window: Survivors,
     pub(super) cull: CullScratch,
     pub(super) columns: Columns,
     /// Indices of the near points.
