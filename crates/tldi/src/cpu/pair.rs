@@ -70,7 +70,8 @@ impl Scratch {
             FirstLook::Culled(taken) => taken == strides,
             FirstLook::Nothing => false,
         };
-        if !is_found && !(self.cull(query, &plan, strides) && self.zone(query, &plan)) {
+        let is_near = is_found || self.cull(query, &plan, strides) && self.zone(query, &plan);
+        if !is_near {
             return;
         }
         let place = self.place(query);
