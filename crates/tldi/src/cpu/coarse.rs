@@ -10,7 +10,7 @@ use super::compare::{self, Crossings, Seen};
 use super::pair::{CommonPixels, Scratch};
 use super::side::CloudView;
 use crate::camera_policy::{MAX_VIEWS, aim};
-use crate::plan::{PairPlan, ring, stride};
+use crate::plan::{PairPlan, largest_pixel, ring, stride};
 use crate::{
     Aabb, BLOCK, PairQuery, PairResult, Params, Surface, Tldi, Variant, View, VirtualCamera,
 };
@@ -104,11 +104,15 @@ fn overlap(query: &PairQuery) -> Option<f32> {
     (!overlap.is_empty()).then(|| overlap.extents().min_element())
 }
 
-/// The largest of the large pixels, metres, in which what is so deep is at least `deep` pixels.
+/// The largest of the large pixels, metres, that resolve the smaller body and in which what is so deep is at least
+/// `deep` pixels.
 fn large_pixel(query: &PairQuery, depth: f32, deep: f32) -> Option<f32> {
     let radius = query.a.mean_radius().max(query.b.mean_radius());
     let pixels = LARGE.map(|large| large * query.params.pixel_size.max(radius));
-    pixels.into_iter().find(|pixel| deep * pixel <= depth)
+    let extents = [query.a, query.b].map(|surface| surface.bounds().extents());
+    let resolving = extents.map(|extents| largest_pixel(extents, pixels[LARGE.len() - 1]));
+    let largest = resolving[0].min(resolving[1]).min(depth / deep);
+    pixels.into_iter().find(|pixel| *pixel <= largest)
 }
 
 /// Every how many points of a cloud are enough for the first look.
