@@ -381,3 +381,121 @@ fn pixels(rect: &Rect) -> impl Iterator<Item = [usize; 2]> + use<> {
     let [width, height] = rect.size.map(|s| s as usize);
     (0..height).flat_map(move |j| (0..width).map(move |i| [i, j]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cpu::cull::Survivors;
+
+    const PIXEL: f32 = 0.1;
+
+    /// The image of points in the view frame; the i-th is of an exit where `exits` says so.
+    fn image(points: &[Vec3], exits: Option<&dyn Fn(usize) -> bool>) -> Tldi {
+        let mut culled = Survivors::default();
+        for point in points {
+            culled.x.push(point.x);
+            culled.y.push(point.y);
+            culled.z.push(point.z);
+        }
+        let mut camera = VirtualCamera::along(Vec3::Z, PIXEL);
+        camera.view_from_frame.rotation = glamx::Quat::IDENTITY;
+        let mut columns = Columns::default();
+        let seen = columns
+            .project(&culled, PIXEL, &camera)
+            .expect("is in view");
+        let kept: Vec<u32> = (0..points.len() as u32).collect();
+        let imaging = CellImaging {
+            camera: &camera,
+            pixel_size: PIXEL,
+            rect: seen.rect,
+            near: seen.near,
+        };
+        let mut image = Tldi::default();
+        Cells::default().image(&columns, &kept, exits, &imaging, &mut image);
+        image
+    }
+
+    /// Layers with the middles of their pixels.
+    fn layers(image: &Tldi) -> Vec<([f32; 2], Layer)> {
+        let all = pixels(&Rect {
+            origin: image.origin,
+            size: image.size,
+        });
+        let of_pixel = |(k, [i, j]): (usize, [usize; 2])| {
+            let middle =
+                [0, 1].map(|axis| PIXEL * (image.origin[axis] as f32 + [i, j][axis] as f32 + 0.5));
+            image.layers_of(k).iter().map(move |layer| (middle, *layer))
+        };
+        all.enumerate().flat_map(of_pixel).collect()
+    }
+
+    fn random_sheet(rng: &mut fastrand::Rng, depth: impl Fn(f32, f32) -> f32) -> Vec<Vec3> {
+        let point = |_| {
+            let (x, y) = (2.0 * rng.f32() - 1.0, 2.0 * rng.f32() - 1.0);
+            Vec3::new(x, y, depth(x, y))
+        };
+        (0..2400).map(point).collect()
+    }
+
+    /// Two tilted sheets, six points a pixel: the depth of the plane at the middle of each pixel, its normal, and which
+    /// way it faces.
+    #[test]
+    fn layers_are_on_the_planes_of_their_points() {
+        let mut rng = fastrand::Rng::with_seed(4);
+        for slope in [[0.0, 0.0], [0.5, -0.3], [-0.6, 0.5]] {
+            let plane = |x: f32, y: f32| slope[0] * x + slope[1] * y;
+            let front = random_sheet(&mut rng, plane);
+            let back = random_sheet(&mut rng, |x, y| plane(x, y) + 0.5);
+            let points = [front, back].concat();
+            let is_back = |i: usize| i >= 2400;
+            for oriented in [false, true] {
+                let image = image(&points, oriented.then_some(&is_back));
+                let found = layers(&image);
+                assert!(found.len() > 700, "{}", found.len());
+                for ([x, y], layer) in found {
+                    let of_front = (layer.depth - plane(x, y)).abs() < 0.25;
+                    let expected = plane(x, y) + if of_front { 0.0 } else { 0.5 };
+                    // Coordinates are in steps of 1/256 of a pixel.
+                    let tolerance = 0.02 * PIXEL * (1.0 + slope[0].abs() + slope[1].abs());
+                    assert!(
+                        (layer.depth - expected).abs() < tolerance,
+                        "{slope:?} {layer:?}"
+                    );
+                    let facing = match (oriented, of_front) {
+                        (false, _) => Facing::Unknown,
+                        (true, true) => Facing::Entry,
+                        (true, false) => Facing::Exit,
+                    };
+                    assert_eq!(layer.facing, facing);
+                    let out = if facing == Facing::Exit { -1.0 } else { 1.0 };
+                    let normal = out * Vec3::new(slope[0], slope[1], -1.0).normalize();
+                    assert!(layer.normal.distance(normal) < 0.05, "{slope:?} {layer:?}");
+                }
+            }
+        }
+    }
+
+    /// A level face and a wall down from its edge: the pixels of the edge are on the face. Without the planes of their
+    /// neighbours they are up to half a pixel below it.
+    #[test]
+    fn beside_an_edge_layers_are_of_one_face() {
+        let mut rng = fastrand::Rng::with_seed(5);
+        let mut points = random_sheet(&mut rng, |_, _| 0.0);
+        points.retain(|p| p.x < 0.03);
+        points.extend((0..1200).map(|_| Vec3::new(0.03, 2.0 * rng.f32() - 1.0, 0.3 * rng.f32())));
+        let image = image(&points, None);
+        let inside = |[x, y]: [f32; 2]| x < 0.05 && y.abs() < 0.9;
+        let found = layers(&image).into_iter().filter(|(at, _)| inside(*at));
+        let off: Vec<f32> = found.map(|(_, layer)| layer.depth.abs() / PIXEL).collect();
+        assert!(off.len() > 150, "{}", off.len());
+        assert!(off.iter().all(|off| *off < 0.1), "{off:?}");
+    }
+
+    #[test]
+    fn what_stands_alone_is_no_layer() {
+        let mut points = vec![Vec3::ZERO, Vec3::new(0.02, 0.01, 0.01)];
+        assert!(layers(&image(&points, None)).is_empty());
+        points.push(Vec3::new(-0.02, 0.03, 0.0));
+        assert!(!layers(&image(&points, None)).is_empty());
+    }
+}
