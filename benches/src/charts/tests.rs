@@ -88,6 +88,7 @@ fn frame(method: &str, placement: &str, points: usize, total_ms: f64) -> FrameRo
         contacts: 12,
         peak_mib: 1.0,
         floor_ratio: 9.0,
+        work: None,
     }
 }
 
@@ -147,7 +148,8 @@ fn stored_results_become_charts() {
     ];
     stored::write(&results.join("frames.json"), provenance("ccc3333"), rows).expect("written");
     let out = results.join("charts");
-    let files = draw_all(&results, &out).expect("they can be drawn");
+    let Drawn { files, skipped } = draw_all(&results, &out).expect("they can be drawn");
+    assert!(matches!(&skipped[..], [why] if why.contains("bvh_vs_tldi")));
     let expected = [
         "speed_accuracy",
         "false_answers",
