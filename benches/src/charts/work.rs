@@ -1,13 +1,14 @@
 //! How much of two clouds this project models, by placement and number of points.
 
 use super::figure::{Axis, Curve, Figure, Line, Look, Mark, Panel, Point};
+use super::ticks::label;
 use super::{looks, numbered, origin};
 use crate::stored::{FrameRow, Stored, WorkRow};
 
 type Run = Stored<FrameRow>;
 
 /// Room for words beside the last points, as a share of the axis, which is logarithmic.
-const WORDS: f64 = 0.32;
+const WORDS: f64 = 0.24;
 
 /// Least distance of words beside each other, as a share of the axis: a line of them.
 const LINE: f64 = 0.035;
@@ -58,7 +59,7 @@ fn figure(run: &Run, sizes: &[f64]) -> Figure {
             mark: Mark::None,
             line: Line::Dashed,
         },
-        points: points(sizes.iter().map(|n| (*n, 2.0 * n)), "points of both clouds"),
+        points: points(sizes.iter().map(|n| (*n, 2.0 * n))),
     };
     let of = |(k, name): (usize, &&str)| {
         let here = rows(run).filter(|(row, _)| row.placement == **name);
@@ -66,19 +67,29 @@ fn figure(run: &Run, sizes: &[f64]) -> Figure {
             .map(|(row, work)| (row.points as f64, work.modelled() as f64))
             .collect();
         modelled.sort_by(|p, q| p.0.total_cmp(&q.0));
-        Curve {
+        let curve = Curve {
             look: looks::placement_look(k),
-            points: points(modelled.into_iter(), name),
-        }
+            points: points(modelled.into_iter()),
+        };
+        ((*name).to_owned(), curve)
     };
-    let mut curves: Vec<Curve> = names.iter().enumerate().map(of).collect();
-    curves.push(given);
+    let mut named: Vec<(String, Curve)> = names.iter().enumerate().map(of).collect();
+    named.push(("points of both clouds".to_owned(), given));
     let mut x = Axis::log("points of each cloud (of the scan)", sizes.iter().copied());
     let [low, high] = x.range;
     x.range[1] = low * (high / low).powf(1.0 / (1.0 - WORDS));
-    let values = curves.iter().flat_map(|curve| &curve.points).map(|p| p.y);
+    x.ticks = Some(sizes.iter().map(|n| (*n, label(*n))).collect());
+    let values = named
+        .iter()
+        .flat_map(|(_, curve)| &curve.points)
+        .map(|p| p.y);
     let y = Axis::log("points and pixels modelled", values);
-    spread_words(&mut curves, &y);
+    let beside = words(&named, &y);
+    let curves = named
+        .into_iter()
+        .map(|(_, curve)| curve)
+        .chain(beside)
+        .collect();
     Figure {
         name: "work".to_owned(),
         title: "No more than the scene needs: what is modelled of two clouds".to_owned(),
@@ -98,28 +109,55 @@ fn figure(run: &Run, sizes: &[f64]) -> Figure {
         legend: Vec::new(),
         notes: vec![
             "Sums over all views and over looks with large pixels, through windows and with small pixels, of both \
-             clouds. Counted, not timed: the same on any machine."
+             clouds. Counted, not timed."
                 .to_owned(),
             origin([&run.provenance]),
         ],
     }
 }
 
-/// Words are beside the last point.
-fn points(values: impl Iterator<Item = (f64, f64)>, words: &str) -> Vec<Point> {
+fn points(values: impl Iterator<Item = (f64, f64)>) -> Vec<Point> {
     let plain = values.map(|(x, y)| Point {
         x,
         y,
         ..Point::default()
     });
-    let mut all: Vec<Point> = plain.collect();
-    if let Some(last) = all.last_mut() {
-        last.label = Some(words.to_owned());
-    }
-    all
+    plain.collect()
 }
 
-/// Moves the words of curves that end beside each other apart.
-fn spread_words(curves: &mut Vec<Curve>, y: &Axis) {
-    let _ = (curves, y, LINE);
+/// The names of curves, each beside its last point or, where others are there, below them.
+fn words(curves: &[(String, Curve)], y: &Axis) -> Vec<Curve> {
+    let [low, high] = y.range;
+    let line = (high / low).powf(LINE);
+    let ends = curves.iter().filter_map(|(name, curve)| {
+        let Point { x, y, .. } = curve.points.last()?;
+        Some((name, curve.look, *x, *y))
+    });
+    let mut ends: Vec<_> = ends.collect();
+    ends.sort_by(|p, q| q.3.total_cmp(&p.3));
+    let mut above = f64::MAX;
+    let beside = ends.into_iter().map(|(name, look, x, end)| {
+        // Words stand above their place: half a line lower their middle is there.
+        above = (end / line.sqrt()).min(above / line);
+        Curve {
+            look: Look {
+                mark: Mark::None,
+                line: Line::None,
+                ..look
+            },
+            points: vec![Point {
+                x,
+                y: above,
+                label: Some(format!("{name}: {}", short(end))),
+                ..Point::default()
+            }],
+        }
+    });
+    beside.collect()
+}
+
+/// With two digits that count.
+fn short(value: f64) -> String {
+    let step = 10f64.powf(value.max(1.0).log10().floor() - 1.0);
+    label((value / step).round() * step)
 }
