@@ -349,7 +349,7 @@ fn work_becomes_curves() {
         .filter_map(|curve| Some((curve.points[0].label.as_deref()?, curve.points[0].y)))
         .collect();
     let names = [
-        "points of both clouds: 4k",
+        "points of both clouds: 4000",
         "deeper: 190",
         "deep: 180",
         "apart: 0",
