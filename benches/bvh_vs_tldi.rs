@@ -18,7 +18,7 @@ use tldi_benches::model::Model;
 use tldi_benches::peers::{Found, Frame, Method, Peer, TldiPeer, all_peers};
 use tldi_benches::placements::{Placement, Source, bounds};
 use tldi_benches::stopwatch::Stopwatch;
-use tldi_benches::stored::{FrameRow, Provenance};
+use tldi_benches::stored::{FrameRow, LookedRow, Provenance, WorkRow};
 use tldi_wgpu::BackendChoice;
 
 #[global_allocator]
@@ -194,6 +194,7 @@ fn measure(
                 contacts: last.contacts,
                 peak_mib,
                 floor_ratio: 1e-3 * median(totals()) / floor_seconds,
+                work: last.work.map(WorkRow::from),
             }
         })
         .collect())
@@ -256,4 +257,36 @@ fn print(rows: &[FrameRow]) {
             row.floor_ratio
         );
     }
+    if let Some((row, work)) = rows.iter().find_map(|row| Some((row, row.work?))) {
+        print_work(row, &work);
+    }
+}
+
+/// The same at any number of threads.
+fn print_work(row: &FrameRow, work: &WorkRow) {
+    let looks = work.looks();
+    let sum = |part: fn(&LookedRow) -> usize| grouped(looks.iter().map(part).sum());
+    let [large, windows, fine] = looks.map(|look| grouped(look.points));
+    println!(
+        "{}, modelled: {large} + {windows} + {fine} of {} points (large pixels, windows, fine), \
+         {} pixels, {} layers; {} points passed a cull",
+        row.method,
+        grouped(row.points + row.points_b),
+        sum(|look| look.pixels),
+        sum(|look| look.layers),
+        grouped(work.culled)
+    );
+}
+
+/// With a comma between thousands.
+fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let mut words = String::new();
+    for (k, digit) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            words.push(',');
+        }
+        words.push(digit);
+    }
+    words
 }

@@ -2,7 +2,8 @@
 
 #![allow(
     clippy::print_stdout,
-    reason = "a list of what was drawn is the output"
+    clippy::print_stderr,
+    reason = "a list of what was drawn is the output, and of what was not goes beside it"
 )]
 
 use clap::Parser;
@@ -23,8 +24,12 @@ struct Args {
 
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
-    for file in draw_all(&args.results, args.out.as_ref().unwrap_or(&args.results))? {
+    let drawn = draw_all(&args.results, args.out.as_ref().unwrap_or(&args.results))?;
+    for file in drawn.files {
         println!("{}", file.display());
+    }
+    for missing in drawn.skipped {
+        eprintln!("{missing}");
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! What a frame of new points costs, by placement and number of points.
 
 use super::figure::{Axis, Curve, Entry, Figure, Panel, Point};
-use super::{looks, origin};
+use super::{looks, numbered, origin};
 use crate::stored::{FrameRow, Stored};
 
 /// How the names of peers in their best form end.
@@ -17,16 +17,7 @@ pub(super) fn figures(runs: &[Run]) -> Vec<Figure> {
             1 => by_placement(run),
             _ => by_points(run),
         };
-        // Two runs of one model.
-        let count = all
-            .iter()
-            .filter(|f| f.name.starts_with(&figure.name))
-            .count();
-        let name = match count {
-            0 => figure.name.clone(),
-            _ => format!("{}_{}", figure.name, count + 1),
-        };
-        all.push(Figure { name, ..figure });
+        all.push(numbered(&all, figure));
     }
     all
 }

@@ -77,6 +77,22 @@ pub(super) fn model_color(index: usize) -> Color {
     OF_MODELS[index % OF_MODELS.len()]
 }
 
+/// Of the `index`-th placement of a chart, of ours alone.
+pub(super) fn placement_look(index: usize) -> Look {
+    const MARKS: [Mark; 5] = [
+        Mark::Cross,
+        Mark::Disc,
+        Mark::Square,
+        Mark::Triangle,
+        Mark::Diamond,
+    ];
+    Look {
+        color: OF_MODELS[index % OF_MODELS.len()],
+        mark: MARKS[index % MARKS.len()],
+        line: Line::Thick,
+    }
+}
+
 /// Of the `index`-th resolution of the paper's image, beside ours.
 pub(super) fn resolution_color(index: usize) -> Color {
     [BLACK, BLUE, SKY, GREEN][index % 4]

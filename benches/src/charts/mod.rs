@@ -10,10 +10,12 @@ mod paint;
 mod speed_accuracy;
 mod sweeps;
 mod ticks;
+mod work;
 
 use crate::stored::{
     self, AccuracyRow, ContactRow, FrameRow, Measured, Provenance, Stored, StoredError,
 };
+use figure::Figure;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -83,9 +85,17 @@ impl Results {
     }
 }
 
-/// Draws all charts for which the folder `results` holds rows into `out`, as SVG and PNG; returns the
-/// files.
-pub fn draw_all(results: &Path, out: &Path) -> Result<Vec<PathBuf>, ChartError> {
+/// What became of the charts.
+#[derive(Debug, Default)]
+pub struct Drawn {
+    /// SVG and PNG of each.
+    pub files: Vec<PathBuf>,
+    /// Of those that stored rows do not tell enough for: what is missing.
+    pub skipped: Vec<String>,
+}
+
+/// Draws all charts for which the folder `results` holds rows into `out`, as SVG and PNG.
+pub fn draw_all(results: &Path, out: &Path) -> Result<Drawn, ChartError> {
     let all = Results::read(results)?;
     std::fs::create_dir_all(out).map_err(|source| StoredError::File {
         path: out.to_owned(),
@@ -95,11 +105,25 @@ pub fn draw_all(results: &Path, out: &Path) -> Result<Vec<PathBuf>, ChartError> 
     figures.extend(sweeps::figures(&all.accuracy));
     figures.extend(contact_quality::figures(&all.contacts));
     figures.extend(frames::figures(&all.frames));
-    let mut files = Vec::new();
-    for figure in figures {
-        files.extend(paint::save(&figure, out)?);
+    let mut drawn = Drawn::default();
+    match work::figures(&all.frames) {
+        Ok(work) => figures.extend(work),
+        Err(missing) => drawn.skipped.push(missing),
     }
-    Ok(files)
+    for figure in figures {
+        drawn.files.extend(paint::save(&figure, out)?);
+    }
+    Ok(drawn)
+}
+
+/// `figure` with a number where others have its name: of two runs of one model.
+fn numbered(others: &[Figure], figure: Figure) -> Figure {
+    let is_alike = |other: &&Figure| other.name.starts_with(&figure.name);
+    let name = match others.iter().filter(is_alike).count() {
+        0 => figure.name.clone(),
+        count => format!("{}_{}", figure.name, count + 1),
+    };
+    Figure { name, ..figure }
 }
 
 /// Where the numbers of a chart come from, in a line.

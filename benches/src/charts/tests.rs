@@ -88,6 +88,7 @@ fn frame(method: &str, placement: &str, points: usize, total_ms: f64) -> FrameRo
         contacts: 12,
         peak_mib: 1.0,
         floor_ratio: 9.0,
+        work: None,
     }
 }
 
@@ -147,7 +148,8 @@ fn stored_results_become_charts() {
     ];
     stored::write(&results.join("frames.json"), provenance("ccc3333"), rows).expect("written");
     let out = results.join("charts");
-    let files = draw_all(&results, &out).expect("they can be drawn");
+    let Drawn { files, skipped } = draw_all(&results, &out).expect("they can be drawn");
+    assert!(matches!(&skipped[..], [why] if why.contains("bvh_vs_tldi")));
     let expected = [
         "speed_accuracy",
         "false_answers",
@@ -294,6 +296,72 @@ fn peers_are_drawn_in_their_best_form() {
     let points: Vec<(f64, f64)> = panel.curves[0].points.iter().map(|p| (p.x, p.y)).collect();
     assert_eq!(points, [(1_000.0, 3.0), (2_000.0, 5.0)]);
     assert_eq!(panel.curves.len(), 1);
+}
+
+/// What is modelled becomes a curve a placement, with its name beside its end; nothing modelled has a place.
+#[test]
+fn work_becomes_curves() {
+    let row = |placement: &str, points: usize, modelled: usize| FrameRow {
+        work: Some(stored::WorkRow {
+            culled: 9 * modelled,
+            large: stored::LookedRow {
+                points: modelled,
+                pixels: 2 * modelled,
+                layers: 7 * modelled,
+            },
+            fine: stored::LookedRow {
+                points: 3 * modelled,
+                ..Default::default()
+            },
+            ..Default::default()
+        }),
+        ..frame("tldi (cpu)", placement, points, 2.0)
+    };
+    let run = |rows| Stored {
+        kind: FrameRow::KIND.to_owned(),
+        provenance: provenance("aaa1111"),
+        rows,
+    };
+    let counted = run(vec![
+        row("apart", 1_000, 0),
+        row("apart", 2_000, 0),
+        row("deep", 2_000, 30),
+        row("deep", 1_000, 10),
+        row("deeper", 1_000, 11),
+        row("deeper", 2_000, 31),
+        frame("bit grid", "deep", 4_000, 2.0),
+    ]);
+    let uncounted = run(vec![frame("tldi (cpu)", "deep", 1_000, 2.0)]);
+    let figures = work::figures(&[uncounted.clone(), counted]).expect("one run counted");
+    let [figure] = &figures[..] else {
+        panic!("a figure a run that counted");
+    };
+    let panel = &figure.panels[0];
+    let curve = |k: usize| -> Vec<(f64, f64)> {
+        let points = &panel.curves[k].points;
+        points.iter().map(|p| (p.x, p.y)).collect()
+    };
+    assert_eq!(curve(0), [(1_000.0, 0.0), (2_000.0, 0.0)]);
+    assert_eq!(curve(1), [(1_000.0, 60.0), (2_000.0, 180.0)]);
+    assert_eq!(curve(3), [(1_000.0, 2_000.0), (2_000.0, 4_000.0)]);
+    assert!(panel.y.has_zero && panel.x.place(2_000.0) < 0.8);
+    let words: Vec<(&str, f64)> = (panel.curves[4..].iter())
+        .filter_map(|curve| Some((curve.points[0].label.as_deref()?, curve.points[0].y)))
+        .collect();
+    let names = [
+        "points of both clouds: 4000",
+        "deeper: 190",
+        "deep: 180",
+        "apart: 0",
+    ];
+    assert_eq!(
+        words.iter().map(|(name, _)| *name).collect::<Vec<_>>(),
+        names
+    );
+    // A line apart.
+    let [deeper, deep] = [1, 2].map(|k| panel.y.place(words[k].1));
+    assert!(deeper - deep > 0.03, "{deeper} {deep}");
+    assert!(work::figures(&[uncounted]).is_err_and(|why| why.contains("bvh_vs_tldi")));
 }
 
 #[test]

@@ -46,7 +46,7 @@ fn linear(low: f64, high: f64) -> Vec<f64> {
 }
 
 /// As short as it can be: 0.05, 3, 20k, 5M.
-fn label(value: f64) -> String {
+pub(super) fn label(value: f64) -> String {
     let rounded = |value: f64| {
         let text = format!("{value:.4}");
         let text = text.trim_end_matches('0').trim_end_matches('.');

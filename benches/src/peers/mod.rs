@@ -28,8 +28,8 @@ pub use tri_mesh::TriMeshPeer;
 pub use voxels::VoxelsRebuild;
 
 use crate::stopwatch::Stopwatch;
-use ::tldi::Backend;
 use ::tldi::glamx::Vec3;
+use ::tldi::{Backend, Work};
 use rapier3d::geometry::ContactManifold;
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::partitioning::BvhBuildStrategy;
@@ -81,6 +81,8 @@ pub struct Found {
     pub contacts: usize,
     /// The deepest of them, of methods that tell it.
     pub deepest: Option<Deepest>,
+    /// How much was modelled, of methods that tell it.
+    pub work: Option<Work>,
 }
 
 /// The deepest contact of a frame.
@@ -102,6 +104,7 @@ impl Found {
             collides: contacts > 0,
             contacts,
             deepest: None,
+            work: None,
         }
     }
 }

@@ -164,6 +164,8 @@ impl Peer for TldiPeer {
                 contacts: results[0].contacts.len(),
                 deepest: deepest_contact(&results[0])
                     .map(|(normal, depth)| Deepest { normal, depth }),
+                // Other backends do not count.
+                work: (backend.name() == "cpu").then_some(results[0].work),
             }
         })
     }

@@ -2,6 +2,7 @@
 
 use super::Measured;
 use serde::{Deserialize, Serialize};
+use tldi::{Looked, Work};
 use tldi_tests::{ContactPair, Regime};
 
 /// Answers of one method, with its settings, to the cases of the accuracy protocol.
@@ -131,6 +132,72 @@ pub struct FrameRow {
     pub peak_mib: f64,
     /// Median total over the floor: one pass that transforms and culls both clouds.
     pub floor_ratio: f64,
+    /// How much was modelled in the last frame, of methods that tell it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub work: Option<WorkRow>,
+}
+
+/// How much of two clouds one comparison modelled, as [`Work`] has it.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, PartialEq, Eq)]
+pub struct WorkRow {
+    /// Points that passed a cull, of all culls.
+    pub culled: usize,
+    /// Looks with large pixels.
+    pub large: LookedRow,
+    /// Looks through small windows.
+    pub windows: LookedRow,
+    /// Fine looks at all of the contact zone.
+    pub fine: LookedRow,
+}
+
+impl WorkRow {
+    /// The looks: with large pixels, through windows, fine.
+    pub fn looks(&self) -> [LookedRow; 3] {
+        [self.large, self.windows, self.fine]
+    }
+
+    /// Points and pixels of all looks.
+    pub fn modelled(&self) -> usize {
+        let looks = self.looks();
+        looks.iter().map(|look| look.points + look.pixels).sum()
+    }
+}
+
+impl From<Work> for WorkRow {
+    fn from(work: Work) -> Self {
+        Self {
+            culled: work.culled,
+            large: work.large.into(),
+            windows: work.windows.into(),
+            fine: work.fine.into(),
+        }
+    }
+}
+
+/// What looks of one kind had to do.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, PartialEq, Eq)]
+pub struct LookedRow {
+    /// Points that were modelled.
+    pub points: usize,
+    /// Pixels of both images.
+    pub pixels: usize,
+    /// Layers of both images.
+    pub layers: usize,
+}
+
+impl From<Looked> for LookedRow {
+    fn from(looked: Looked) -> Self {
+        let Looked {
+            points,
+            pixels,
+            layers,
+        } = looked;
+        Self {
+            points,
+            pixels,
+            layers,
+        }
+    }
 }
 
 impl Measured for FrameRow {

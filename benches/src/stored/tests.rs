@@ -152,3 +152,32 @@ fn bad_results_are_refused_by_name_with_a_way_out() {
     std::fs::write(&good, other).expect("it can be written");
     assert!(matches!(refusal(&good).0, StoredError::Kind { .. }));
 }
+
+/// Rows of before anything was counted are read, and those that count nothing are written like them.
+#[test]
+fn work_is_optional() {
+    let old = r#"{"model": "ball", "points": 10, "points_b": 20, "placement": "deep", "method": "grid",
+        "threads": 1, "build_ms": 1.0, "query_ms": 1.0, "total_ms": 2.0, "least_ms": 1.5, "most_ms": 3.0,
+        "frames": 3, "collides": true, "contacts": 4, "peak_mib": 0.5, "floor_ratio": 9.0}"#;
+    let row: FrameRow = serde_json::from_str(old).expect("it is a row");
+    assert_eq!(row.work, None);
+    let written = serde_json::to_string(&row).expect("it can be written");
+    assert!(!written.contains("work"), "{written}");
+    let work = WorkRow {
+        culled: 7,
+        windows: LookedRow {
+            points: 1,
+            pixels: 20,
+            layers: 3,
+        },
+        ..WorkRow::default()
+    };
+    let counted = FrameRow {
+        work: Some(work),
+        ..row
+    };
+    let written = serde_json::to_string(&counted).expect("it can be written");
+    let read: FrameRow = serde_json::from_str(&written).expect("it is a row");
+    assert_eq!(read, counted);
+    assert_eq!(work.modelled(), 21);
+}

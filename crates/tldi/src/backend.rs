@@ -1,6 +1,6 @@
 //! The seam between callers and implementations: a batch of pairs in, a result per pair out.
 
-use crate::{CameraPolicy, ContactPatch, ContactPixel, Params, Surface, VirtualCamera};
+use crate::{CameraPolicy, ContactPatch, ContactPixel, Params, Surface, VirtualCamera, Work};
 use glamx::{Pose3, Vec3};
 use thiserror::Error;
 
@@ -71,6 +71,8 @@ pub struct PairResult {
     pub coarser: Option<f32>,
     /// The contact pixels grouped and reduced to what a solver needs, deepest patch first.
     pub patches: Vec<ContactPatch>,
+    /// How much was modelled to find this; zero from the GPU.
+    pub work: Work,
 }
 
 impl PairResult {
@@ -82,6 +84,7 @@ impl PairResult {
         self.axes.clear();
         self.contacts.clear();
         self.patches.clear();
+        self.work = Work::default();
     }
 }
 

@@ -38,6 +38,7 @@ mod supports;
 mod surface;
 #[allow(clippy::module_inception, reason = "the image is the crate's namesake")]
 mod tldi;
+mod work;
 
 pub use crate::tldi::{Facing, Layer, Tldi};
 pub use aabb::Aabb;
@@ -57,6 +58,7 @@ pub use params::{Params, Variant};
 pub use patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};
 pub use supports::{Supports, supports};
 pub use surface::{DeviceCloud, RayHit, RaySurface, Surface};
+pub use work::{Looked, Work};
 
 /// A view axis is kept from frame to frame while the zone's normals agree with it within this
 /// angle, in radians (10°).

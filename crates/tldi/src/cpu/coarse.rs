@@ -292,6 +292,7 @@ impl Scratch {
             || side_a.image_of_cells(&a, &imaging, touching),
             || side_b.image_of_cells(&b, &imaging, touching),
         );
+        self.work.large += self.looked(query);
         let seen = Seen {
             fold: Some(&self.fold),
             ..self.seen(query, plan, camera, axes, view)
@@ -335,6 +336,7 @@ impl Scratch {
         if self.look_at_clouds(&a, &b, plan.column_reach).is_none() {
             return;
         }
+        self.work.windows += self.looked(query);
         let mut nothing = PairResult::default();
         compare::compare(
             &self.a.image,

@@ -29,7 +29,7 @@ use crate::reach::Ring;
 use crate::supported::supported_surfaces;
 use crate::{
     Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,
-    Tldi, Variant, VirtualCamera, paper,
+    Tldi, Variant, VirtualCamera, Work, paper,
 };
 use cull::Region;
 use fold::ViewFold;
@@ -166,7 +166,11 @@ impl Backend for CpuBackend {
             .zip(results.par_iter_mut())
             .for_each(|(query, result)| {
                 result.clear();
-                this.with_scratch(|scratch| scratch.compare(query, result));
+                this.with_scratch(|scratch| {
+                    scratch.work = Work::default();
+                    scratch.compare(query, result);
+                    result.work = scratch.work;
+                });
             });
         Ok(())
     }

@@ -16,7 +16,8 @@ use crate::patches::PatchScratch;
 use crate::plan::{Approach, PairPlan, SidePlan, column_reach, stride};
 use crate::reach::Place;
 use crate::{
-    CameraPolicy, PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera, paper,
+    CameraPolicy, Looked, PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera,
+    Work, paper,
 };
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
@@ -50,6 +51,8 @@ pub(super) struct Scratch {
     pub(super) windows: Vec<Window>,
     /// Metres.
     pub(super) window_edge: f32,
+    /// Since it was cleared.
+    pub(super) work: Work,
 }
 
 impl Scratch {
@@ -168,7 +171,11 @@ impl Scratch {
                 )
             },
         );
-        let found = paper::compare(image_a, image_b, &query.params);
+        self.work.fine += Looked {
+            points: a.len() + b.len(),
+            ..self.looked(query)
+        };
+        let found = paper::compare(&self.a.image, &self.b.image, &query.params);
         result.collides = found.collides;
         result.gap = found.gap;
     }
@@ -193,6 +200,7 @@ impl Scratch {
             || cull(a, query.a, plan_a, strides[0]),
             || cull(b, query.b, plan_b, strides[1]),
         );
+        self.work.culled += self.a.points.len() + self.b.points.len();
         is_near_a && is_near_b
     }
 
@@ -363,6 +371,7 @@ impl Scratch {
         if looked.is_none() {
             return;
         }
+        self.work.fine += self.looked(query);
         compare::compare(
             &self.a.image,
             &self.b.image,
@@ -374,6 +383,19 @@ impl Scratch {
             &mut self.crossings,
             result,
         );
+    }
+
+    /// What both images hold, and how many points they are of.
+    pub(super) fn looked(&self, query: &PairQuery) -> Looked {
+        let mut looked = Looked::default();
+        for (side, surface) in [(&self.a, query.a), (&self.b, query.b)] {
+            if let Surface::Cloud(_) = surface {
+                looked.points += side.kept.len();
+            }
+            looked.pixels += side.image.pixel_count();
+            looked.layers += side.image.layers().len();
+        }
+        looked
     }
 
     /// Builds the images of two clouds where `a` is less than `reach` metres behind `b`; `None` if
