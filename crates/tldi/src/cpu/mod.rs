@@ -72,12 +72,28 @@ use std::sync::Mutex;
 #[derive(Default)]
 pub struct CpuBackend {
     pool: Mutex<Vec<Scratch>>,
+    is_without_first_look: bool,
 }
 
 impl CpuBackend {
     /// A backend with no memory taken yet.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// A backend that looks at all of every contact zone with small pixels, also where a first look with large ones
+    /// would settle what is deep: the reference for backends that do nothing else, as those on a GPU. Cost: in deep
+    /// contact 3 to 70 times that of [`new`](Self::new).
+    ///
+    /// ```
+    /// use tldi::{Backend, CpuBackend};
+    /// assert_eq!(CpuBackend::without_first_look().name(), CpuBackend::new().name());
+    /// ```
+    pub fn without_first_look() -> Self {
+        Self {
+            is_without_first_look: true,
+            ..Self::default()
+        }
     }
 
     /// Where a surface in straight motion first meets another, or `None` where it does not.
@@ -168,7 +184,7 @@ impl Backend for CpuBackend {
                 result.clear();
                 this.with_scratch(|scratch| {
                     scratch.work = Work::default();
-                    scratch.compare(query, result);
+                    scratch.compare(query, !this.is_without_first_look, result);
                     result.work = scratch.work;
                 });
             });

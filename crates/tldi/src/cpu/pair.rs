@@ -56,7 +56,13 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
-    pub(super) fn compare(&mut self, query: &PairQuery, result: &mut PairResult) {
+    /// Compares a pair, after a first look at it or at once.
+    pub(super) fn compare(
+        &mut self,
+        query: &PairQuery,
+        has_first_look: bool,
+        result: &mut PairResult,
+    ) {
         if query.params.variant() == Variant::Paper
             && let View::Fixed(camera) = query.view
         {
@@ -68,7 +74,11 @@ impl Scratch {
         };
         let pixel = query.params.pixel_size;
         let strides = [query.a, query.b].map(|surface| stride(surface.mean_radius(), pixel));
-        let is_found = match self.settle(query, &plan, result) {
+        let first_look = match has_first_look {
+            true => self.settle(query, &plan, result),
+            false => FirstLook::Nothing,
+        };
+        let is_found = match first_look {
             FirstLook::Settled => return,
             FirstLook::Culled(taken) => taken == strides,
             FirstLook::Nothing => false,
@@ -134,7 +144,7 @@ impl Scratch {
             view,
             ..*query
         };
-        self.compare(&larger, result);
+        self.compare(&larger, false, result);
         result.coarser = Some(coarser * result.coarser.unwrap_or(1.0));
     }
 
