@@ -128,6 +128,9 @@ impl CloudQuery {
             devices: Devices::of(backend),
             wall_seconds,
         };
+        // The grid of the contact pixels.
+        let pixel_size = params.pixel_size * result.coarser.unwrap_or(1.0);
+        let params = params.with_pixel_size(pixel_size);
         Ok(Answer {
             report,
             result,

@@ -230,7 +230,7 @@ impl Comparison {
                 continue;
             };
             let result = &self.results[comparison.query];
-            let pixel_size = self.pixel_sizes[comparison.query];
+            let pixel_size = self.pixel_sizes[comparison.query] * result.coarser.unwrap_or(1.0);
             let part_pose = part_pair.poses[0].unwrap_or(Pose::IDENTITY);
             let world_from_part = drawing.pose1 * part_pose;
             let zone = drawing.zone(part_pair);

@@ -23,9 +23,10 @@ pub struct StepReport {
     /// Pixels in which surfaces were close or penetrated, over the pairs that were compared and
     /// that rapier asked for.
     pub contact_pixels: usize,
-    /// By how much the pixels of a pair were made larger than [`Resolution`](crate::Resolution) says, the most of all
-    /// pairs that were compared and that rapier asked for: its image would have had too many
-    /// ([`PairResult::coarser`](tldi::PairResult::coarser)). `None` where all have the size that was asked for.
+    /// How many times as large as [`Resolution`](crate::Resolution) says the pixels of a pair were, the most of all
+    /// pairs that were compared and that rapier asked for: what is deep or coarse needs no smaller ones, and strewn points
+    /// have no room for them ([`PairResult::coarser`](tldi::PairResult::coarser)). `None` where all have the size that was
+    /// asked for.
     pub coarser_pixels: Option<f32>,
     /// Deepest penetration before the step over all contacts of clouds, sleeping ones included, in
     /// metres; 0 without any.

@@ -65,9 +65,9 @@ pub struct PairResult {
     pub axes: Vec<Vec3>,
     /// Pixels where the surfaces are within [`Params::prediction`] or penetrate.
     pub contacts: Vec<ContactPixel>,
-    /// By how much pixels were made larger than [`Params::pixel_size`], since the image would have had more than 4 Mi
-    /// pixels, and more than 16 for each point in reach, though empty rows and columns take none; `None` where they
-    /// were not. Gaps err by more then.
+    /// How many times as large as asked for the pixels of the contacts are, and the grid of their columns and rows
+    /// with them: where a first look settled what is deep, where the points that are near are coarser than the cloud's mean,
+    /// or where there were too many pixels for the points. `None` where they have the size of [`Params::pixel_size`].
     pub coarser: Option<f32>,
     /// The contact pixels grouped and reduced to what a solver needs, deepest patch first.
     pub patches: Vec<ContactPatch>,

@@ -176,6 +176,7 @@ impl Scratch {
             if depth >= DEEP * pixel {
                 if self.is_proven(query, plan, &result.axes, &mut came_to) {
                     result.collides = true;
+                    result.coarser = Some(pixel / query.params.pixel_size);
                     return FirstLook::Settled;
                 }
                 break;

@@ -88,6 +88,7 @@ impl Scratch {
             return;
         }
         let place = self.place(query);
+        result.coarser = (place.coarser > 1.0).then_some(place.coarser);
         self.merge_gaps = place.merging.map(|factor| factor * query.params.merge_gap);
         let query = &PairQuery {
             params: place.params(&query.params),
