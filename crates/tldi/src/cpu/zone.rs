@@ -18,6 +18,9 @@ use glamx::Vec3;
 /// get larger cells, which only makes the stage less selective.
 const MAX_CELLS: f32 = (1 << 22) as f32;
 
+/// Most pairs of points of two octaves that are measured: a millisecond. Of more, cells decide alone.
+const MOST_PAIRS: usize = 1 << 20;
+
 /// The grid and its bits, kept from call to call.
 #[derive(Default)]
 pub(crate) struct ZoneScratch {
@@ -302,10 +305,26 @@ fn of_all_octaves(
             locate(b.points, &grid, cells_b);
             grid.mark(a.of_class(class_a).map(|k| &cells_a[k]), bits);
             grid.dilate(bits, dilated);
-            b.add(class_b, cells_b, bits, is_near_b);
+            b.marked(class_b, cells_b, bits, near_b);
             grid.mark(b.of_class(class_b).map(|k| &cells_b[k]), bits);
             grid.dilate(bits, dilated);
-            a.add(class_a, cells_a, bits, is_near_a);
+            a.marked(class_a, cells_a, bits, near_a);
+            // Coarse cells are wide: what is in the next one may be far beyond the reach of the points.
+            let is_exact = class_a.further + class_b.further > 0.0
+                && near_a.len() * near_b.len() <= MOST_PAIRS;
+            let in_reach = |i: u32, j: u32| {
+                let [i, j] = [i as usize, j as usize];
+                let reach = reach + a.points.further(i) + b.points.further(j);
+                a.points.point(i).distance_squared(b.points.point(j)) <= reach * reach
+            };
+            for &i in near_a.iter() {
+                let is_near = !is_exact || near_b.iter().any(|&j| in_reach(i, j));
+                is_near_a[i as usize] |= u8::from(is_near);
+            }
+            for &j in near_b.iter() {
+                let is_near = !is_exact || near_a.iter().any(|&i| in_reach(i, j));
+                is_near_b[j as usize] |= u8::from(is_near);
+            }
         }
     }
     for (is_near, near) in [(is_near_a, near_a), (is_near_b, near_b)] {
@@ -326,12 +345,11 @@ impl ZoneSide<'_> {
         (0..self.points.len()).filter(holds)
     }
 
-    /// Marks as near the points of a class whose cells are marked.
-    fn add(&self, class: Class, cells: &[u32], bits: &[u64], is_near: &mut [u8]) {
-        for k in self.of_class(class) {
-            let cell = cells[k];
-            is_near[k] |= (bits[cell as usize / 64] >> (cell % 64) & 1) as u8;
-        }
+    /// Fills `near` with the points of a class whose cells are marked.
+    fn marked(&self, class: Class, cells: &[u32], bits: &[u64], near: &mut Vec<u32>) {
+        let is_marked = |k: &usize| bits[cells[*k] as usize / 64] >> (cells[*k] % 64) & 1 > 0;
+        near.clear();
+        near.extend(self.of_class(class).filter(is_marked).map(|k| k as u32));
     }
 }
 
