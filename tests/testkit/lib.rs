@@ -6,11 +6,13 @@ mod data;
 mod half_space;
 mod host;
 mod oracle;
+mod overlaps;
 mod pairs;
 mod policy;
 mod random;
 mod shapes;
 mod sheets;
+mod way_out;
 
 pub use accuracy::{
     ACCURACY_ROWS, ANGLE_BINS, ANGLE_STEP, AccuracyRow, CONTACT_SPACING, ContactCase,
@@ -22,8 +24,10 @@ pub use data::{data_file, load_cloud};
 pub use half_space::HalfSpace;
 pub use host::Host;
 pub use oracle::{OracleFragment, OracleLayer, OracleSurface, oracle_layers};
+pub use overlaps::{ClosedShape, Overlap, measure_overlaps};
 pub use pairs::{aimed, compare, compare_clouds, deepest_contact, deepest_point};
 pub use policy::PolicyChoice;
 pub use random::{random_pose, random_unit};
 pub use shapes::{Samples, sampled_box, sampled_plane, sampled_ramp, sampled_sphere};
 pub use sheets::{Sheet, standard_normal};
+pub use way_out::WayOut;

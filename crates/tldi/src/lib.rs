@@ -38,6 +38,7 @@ mod supports;
 mod surface;
 #[allow(clippy::module_inception, reason = "the image is the crate's namesake")]
 mod tldi;
+mod way_out;
 mod work;
 
 pub use crate::tldi::{Facing, Layer, Tldi};

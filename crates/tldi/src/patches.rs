@@ -4,12 +4,12 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
-use crate::cpu::sweep::SAME_FACE;
 use crate::gap_fit::GapFit;
 use crate::links::{Groups, Links, join, root};
 use crate::lone_points::{Culled, LonePoints};
 use crate::noise::allow_for_noise;
 use crate::part_shape::{Pixels, Shape, ShapeScratch, common_normal};
+use crate::way_out::WayOut;
 use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params};
 use arrayvec::ArrayVec;
 use glamx::Vec3;
@@ -52,6 +52,7 @@ pub struct PatchScratch {
     /// Union-find parents; after grouping, the group of each contact pixel.
     group: Vec<u32>,
     links: Links,
+    way_out: WayOut,
     lone_points: LonePoints,
     smooth: Vec<Smooth>,
     groups: Groups,
@@ -119,7 +120,7 @@ impl PatchScratch {
 
     fn link(&mut self, result: &mut PairResult, params: &Params) {
         order(&mut result.contacts);
-        drop_between_faces(result);
+        self.way_out.keep_least(result, params);
         self.links.find(&result.contacts, params);
     }
 
@@ -275,25 +276,6 @@ impl PatchScratch {
         for k in 0..self.group.len() as u32 {
             self.group[k as usize] = root(&mut self.group, k);
         }
-    }
-}
-
-/// Drops the contact pixels of faces that do not face each other and of which another view sees one
-/// better, as of a floor's edge and the wall behind it: far along the view, and near beside it. Where
-/// they are half of all or more there is nothing better.
-fn drop_between_faces(result: &mut PairResult) {
-    let PairResult { axes, contacts, .. } = result;
-    let is_between = |contact: &ContactPixel| {
-        let seen_better = |normal: Vec3| {
-            let here = normal.dot(axes[contact.view as usize]).abs();
-            axes.iter().any(|axis| normal.dot(*axis).abs() > here)
-        };
-        let lengths = contact.normal_a.length() * contact.normal_b.length();
-        contact.normal_a.dot(contact.normal_b) > -SAME_FACE * lengths
-            && (seen_better(contact.normal_a) || seen_better(contact.normal_b))
-    };
-    if axes.len() > 1 && 2 * contacts.iter().filter(|c| is_between(c)).count() < contacts.len() {
-        contacts.retain(|contact| !is_between(contact));
     }
 }
 
