@@ -55,6 +55,8 @@ mod collider;
 mod config;
 mod debug_render;
 mod dispatcher;
+#[cfg(doctest)]
+mod doc_examples;
 mod error;
 mod exact;
 mod impulses;
