@@ -8,11 +8,11 @@ use rapier3d::prelude::MassProperties;
 use surfels::Surfel;
 use tldi::PointCloud;
 
-/// What of a cloud has mass.
+/// Which part of a cloud has mass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MassModel {
-    /// The solid that the points enclose. A cloud that encloses nothing (an open scan, or one that
-    /// is inside out) counts as a shell, 2 mean radii thick.
+    /// The solid that the points enclose. A cloud that encloses nothing (open, or inside out)
+    /// counts as a shell with a thickness of 2 mean radii.
     #[default]
     Solid,
     /// A sheet of even thickness along the sampled surface.
@@ -27,18 +27,18 @@ pub enum MassModel {
 /// of 26° (5 % of its area) is still closed, and a cube without 29 % of one side.
 const OPEN: f64 = 0.05;
 
-/// A plate of thickness t has a volume of t / 2 for each m² of its two sides: what has less than
-/// this many mean radii is a sheet whose noise has two sides.
+/// A plate of thickness t has a volume of t / 2 for each m² of its two sides. If that is less than
+/// this many mean radii, the cloud is a sheet, and only its noise has two sides.
 const FLAT: f64 = 0.1;
 
 /// Mass properties of `cloud` at a density of 1 kg/m³, in the cloud's own frame.
 ///
-/// The cloud is taken as one small flat patch a point: its Voronoi cell among its neighbours, in
-/// its tangent plane, within 1.5 radii and up to the planes of neighbours across a sharp edge.
+/// Each point stands for one small flat patch: its Voronoi cell among its neighbours, in its
+/// tangent plane, within 1.5 radii and up to the planes of neighbours across a sharp edge.
 /// Integrals over the solid become sums over the patches by Gauss's theorem, ∫ x dV = ½ ∮ x² n dA
-/// and the like. Where the cloud has no normals, planes are fitted to 13 points; where they are not
-/// oriented, neighbours are made to agree and each connected part is taken as filled, so that a
-/// cavity without given normals counts as mass.
+/// and the like. If the cloud has no normals, planes are fitted to 13 points. If normals are not
+/// oriented, neighbours are made to agree, and each connected part counts as filled. So a cavity
+/// without given normals counts as mass.
 ///
 /// Error, as measured in the tests (volume; the inertia's is about the same):
 ///

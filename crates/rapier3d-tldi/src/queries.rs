@@ -1,8 +1,9 @@
-//! How far apart two shapes are of which at least one holds a cloud, and where.
+//! The distance and nearest points of two shapes, at least one of which holds a cloud.
 //!
-//! The surface of a cloud is a disc a sample, as for rays and projections ([`PointCloudShape`](crate::PointCloudShape)),
-//! with two differences: a cloud without normals has those of planes through 13 samples, and at an
-//! edge or a corner, where a disc would stand out by up to its radius, there is the bare sample.
+//! The surface of a cloud is one disc for each point, as for rays and projections
+//! ([`PointCloudShape`](crate::PointCloudShape)), with two differences. Without normals, discs lie
+//! on planes through 13 points. At an edge or a corner, a disc would stand out by up to its radius,
+//! so only the bare point counts.
 
 mod discs;
 mod nearest;

@@ -14,19 +14,20 @@ pub struct StepReport {
     /// Pairs that were not compared because the contacts of an earlier step still hold
     /// ([`TldiConfig::scatter`](crate::TldiConfig::scatter)).
     pub pairs_kept: usize,
-    /// Pairs that rapier asked for and the batch did not hold (their poses or shapes changed after
-    /// it, or rapier split the step): compared on the spot, one by one.
+    /// Pairs that rapier asked for and the batch did not hold. Their poses or shapes changed after
+    /// it, or rapier split the step. They were compared at once, one by one.
     pub pairs_missed: usize,
-    /// Pairs with a cloud whose colliders rapier holds to be in contact (closer than its
-    /// prediction distance), sleeping ones included.
+    /// Pairs with a cloud that rapier has in contact, that is, closer than its prediction distance.
+    /// Sleeping pairs count.
     pub pairs_in_contact: usize,
     /// Pixels in which surfaces were close or penetrated, over the pairs that were compared and
     /// that rapier asked for.
     pub contact_pixels: usize,
-    /// How many times as large as [`Resolution`](crate::Resolution) says the pixels of a pair were, the most of all
-    /// pairs that were compared and that rapier asked for: what is deep or coarse needs no smaller ones, and strewn points
-    /// have no room for them ([`PairResult::coarser`](tldi::PairResult::coarser)). `None` where all have the size that was
-    /// asked for.
+    /// The largest factor by which the pixels of a pair exceed [`Resolution`](crate::Resolution),
+    /// over all pairs that were compared and that rapier asked for. Deep contacts and coarse places
+    /// need no smaller pixels, and widely strewn points leave no room for them
+    /// ([`PairResult::coarser`](tldi::PairResult::coarser)). `None` if all pixels have the size
+    /// that was asked for.
     pub coarser_pixels: Option<f32>,
     /// Deepest penetration before the step over all contacts of clouds, sleeping ones included, in
     /// metres; 0 without any.
@@ -37,8 +38,8 @@ pub struct StepReport {
     pub backend: Arc<str>,
     /// Name of the device that compared it, where it was not the CPU.
     pub adapter: Option<Arc<str>>,
-    /// Why it was the CPU though a GPU would have been taken: there is none, or it failed. Nothing
-    /// is lost then.
+    /// Why the CPU compared the batch although a GPU was wanted: there is none, or it failed.
+    /// Nothing is lost.
     pub fallback: Option<Arc<str>>,
 }
 

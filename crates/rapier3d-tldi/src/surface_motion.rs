@@ -1,11 +1,11 @@
 //! The velocity of deforming surfaces, and how it reaches rapier's contacts.
 //!
-//! Rapier knows velocities of bodies. What a cloud's points do beside is told to its solver as the
-//! `tangent_velocity` of the solver contacts, which it treats as a motion of the first body's
-//! surface, along the normal as well. A penetration it undoes at a rate; so that a surface that
-//! comes nearer at some speed does not have to penetrate until that rate keeps up, contacts are
-//! told to be deeper by as much. What comes faster than rapier corrects pushes bodies before the step
-//! (`surface_push.rs`). The speed of what is sampled anew is measured (`sampled_motion.rs`).
+//! Rapier knows velocities of bodies, not of a cloud's points. The solver gets these as the
+//! `tangent_velocity` of its contacts. It treats that as a motion of the first body's surface,
+//! along the normal too. Rapier resolves a penetration at a rate. An approaching surface would have
+//! to penetrate until that rate keeps up, so contacts are reported deeper by that amount. Surfaces
+//! that approach faster than rapier corrects push bodies before the step (`surface_push.rs`). The
+//! speed of new samples is measured (`sampled_motion.rs`).
 
 use crate::PointCloudShape;
 use crate::sampled_motion::{Snapshot, way_along};

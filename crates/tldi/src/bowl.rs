@@ -1,4 +1,5 @@
-//! The bowl that gaps form around the contact of a round surface: where it is lowest, and how surely.
+//! The bowl that gaps form around the contact of a round surface: where it is lowest, and how
+//! certain that is.
 
 use crate::supports::ramp;
 use crate::{ContactPixel, ContactPoint};
@@ -25,12 +26,12 @@ const LOWEST: f32 = 1.5;
 /// points: a whole bowl, however oblong, widens alike in those, and along an edge only noise does.
 const LEAST_ALIKE: f32 = 0.3;
 
-/// Points that a bowl needs at least: it has five unknowns, and through as few points there is
-/// always one, with its lowest point anywhere.
+/// Fewest points of a bowl. It has five unknowns, so a bowl fits any five points, with its lowest
+/// point anywhere.
 const LEAST_POINTS: f32 = 6.0;
 
-/// Least spread of the squares of places, as a share of what they have in a disc, and least part of
-/// it that is not common to both axes: of places that differ less the bend is the noise of numbers.
+/// Least spread of the squares of places, as a share of that in a disc, and least part of it that
+/// the axes do not have in common. If places differ less, rounding decides the bend.
 const LEAST_SPREAD: f32 = 0.02;
 
 /// Pixels that have errors in common, since they see the same points. Measured: lowest points of a ball on a

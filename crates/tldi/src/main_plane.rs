@@ -1,4 +1,4 @@
-//! The plane on which most of some heights lie, whatever the others do.
+//! The plane on which most heights lie, whatever the others do.
 
 use glamx::{Mat3, Vec2, Vec3};
 

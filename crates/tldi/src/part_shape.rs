@@ -283,9 +283,9 @@ impl Shape {
     }
 }
 
-/// Unit normal from the first surface towards the second, from the means of unit normals of both:
-/// weighted by the inverse of their variance, so that the flat side of an edge on a face, and the
-/// smooth side of a noisy scan, decide.
+/// Unit normal from the first surface towards the second. It is the mean of both surfaces' mean
+/// normals, weighted by the inverse of their variances. So a face decides at an edge, and the
+/// smooth side decides on a noisy scan.
 pub(crate) fn common_normal(mean_a: Vec3, mean_b: Vec3) -> Option<Vec3> {
     let weighted = |mean: Vec3| {
         let spread = (1.0 - mean.length()).max(0.0);

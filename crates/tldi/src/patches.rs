@@ -15,7 +15,7 @@ use arrayvec::ArrayVec;
 use glamx::Vec3;
 use std::ops::Range;
 
-/// Most patches of one pair, the deepest: a solver gains nothing from more.
+/// Most patches of one pair. The deepest are kept; a solver gains nothing from more.
 pub const MAX_PATCHES: usize = 32;
 
 /// Linked pixels belong to one group if their smoothed normals are within 30°.
@@ -72,12 +72,12 @@ struct Part {
 }
 
 impl PatchScratch {
-    /// Confirms the contact pixels of `result`, settles what they say of `collides` and `gap`, as if
-    /// normals told inside from outside, and fills its patches, deepest first.
+    /// Confirms the contact pixels of `result`, derives `collides` and `gap` from them as if
+    /// normals told inside from outside, and fills the patches, deepest first.
     ///
-    /// The contact pixels may come in any order; they are left ordered by view, row, column and
-    /// gap, as the stage `compare` finds them. Cost: linear in them but for sorting the groups, and
-    /// them if need be.
+    /// The contact pixels may come in any order. Afterwards they are ordered by view, row, column
+    /// and gap, as the stage `compare` finds them. Cost: linear in their number, except for sorting
+    /// the groups, and the pixels if needed.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         self.link(result, params);
         self.reduce_linked(result, params, true);

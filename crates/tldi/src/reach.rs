@@ -1,8 +1,9 @@
-//! How far points reach: each as far as its own radius says.
+//! How far points reach: each by its own radius.
 //!
-//! A scan is coarse far from its sensor. Culled and looked for by the mean radius, a body smaller than the distance
-//! of the points around it would meet none of them; by the largest radius, most of the scan would be near. In a cloud
-//! that is even all points reach as far as their mean radius, in an [uneven](PointCloud::is_uneven) one at least so.
+//! A scan is coarse far from its sensor. With the mean radius, a body smaller than the distance of
+//! the points around it would meet none of them. With the largest radius, most of the scan would be
+//! near. In an even cloud, all points reach as far as the mean radius. In an
+//! [uneven](PointCloud::is_uneven) one, they reach at least that far.
 
 use crate::plan::largest_pixel;
 use crate::{Params, PointCloud, Radii, Surface};

@@ -1,4 +1,4 @@
-//! Which of many contact points a solver takes.
+//! Which of many contact points the solver gets.
 
 use crate::bowl::{Bowl, Floor, Lowest, Valley};
 use crate::main_plane::Plane;
@@ -12,13 +12,13 @@ use std::f32::consts::SQRT_2;
 pub struct Supports {
     /// Indices of up to [`PATCH_POINTS`] of the points.
     pub indices: ArrayVec<usize, PATCH_POINTS>,
-    /// Their gaps, in metres, about the plane that fits all gaps best or, the flatter they are, about the
-    /// one on which most of them lie.
+    /// Their gaps, in metres, about the plane that fits all gaps best. The flatter the gaps are,
+    /// the more it is the plane on which most of them lie.
     pub above_plane: ArrayVec<f32, PATCH_POINTS>,
     /// How steeply the gaps of that plane rise along the surface, metres per metre; 0 across points in a row.
     pub slope: Vec3,
-    /// 1 if so many of the gaps lie on one plane that the others are taken for errors, as at the rim of a
-    /// face whose normals are estimated; 0 if the gaps bend, or too few are on any plane.
+    /// 1 if so many gaps lie on one plane that the others count as errors, as at the rim of a face
+    /// with estimated normals. 0 if the gaps bend, or too few are on any plane.
     pub flatness: f32,
     /// Standard deviation, in metres, of the gaps about the plane that fits them best.
     pub roughness: f32,
@@ -26,8 +26,8 @@ pub struct Supports {
     /// that widens along the main axes, or does not bend. What is left of the roughness where the
     /// surfaces are round.
     pub roughness_about_bowl: f32,
-    /// The lowest point of that bowl, if it is one in both directions, among the points, and most of
-    /// the roughness.
+    /// The lowest point of that bowl. It is set if the gaps bend in both directions, the point is
+    /// among the points, and the bowl explains most of the roughness.
     pub lowest_of_bowl: Option<Lowest>,
     /// The floor of that bowl, if it is a valley: bent along one axis only.
     pub floor_of_valley: Option<Floor>,
@@ -52,19 +52,20 @@ const FLAT: [f32; 2] = [0.35, 0.5];
 /// plane as well.
 const UNBENT: [f32; 2] = [0.3, 0.5];
 
-/// Roughness, in the least, up to which there is no bend to speak of, and from which on there may be one.
+/// Roughness, in units of the least roughness, up to which there is no bend, and from which there
+/// may be one.
 const SMOOTH: [f32; 2] = [0.5, 1.0];
 
 /// How far from the floor of a valley points tell how low it is, in standard deviations across it.
 const NEAR_FLOOR: f32 = 0.4;
 
-/// Of points on one plane with unit normal `normal`, those on which a body would rest: in each of the four
-/// directions in which they reach out farthest, at right angles to each other, the one that is farthest
-/// out and lowest, √2 standard deviations of extent against one of roughness, which is taken to be at
-/// least `least_roughness` metres.
+/// Of points on one plane with unit normal `normal`, those on which a body would rest. There are
+/// four directions at right angles to each other, along which the points reach out farthest. Each
+/// gives the point that is farthest out and lowest: √2 standard deviations of extent count as much
+/// as one of roughness, which is at least `least_roughness` metres.
 ///
-/// Heights are measured from the plane that fits the gaps, so the choice does not depend on how far
-/// the body is tilted: a lifted edge stays in. Cost: linear in points.
+/// Heights are measured from the plane that fits the gaps. So the choice does not depend on the
+/// tilt of the body, and a lifted edge remains. Cost: linear in points.
 ///
 /// ```
 /// use tldi::{ContactPoint, supports, glamx::Vec3};

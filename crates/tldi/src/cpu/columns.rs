@@ -1,9 +1,9 @@
 //! Stage `columns`: the culled points in the view, and the columns of pixels in which the surfaces
 //! can meet.
 //!
-//! Where all of `a` is out of reach behind all of `b`, nothing of either needs to be modelled: the
-//! early rejection of the paper (section 5), by tiles of a few pixels in place of the whole image.
-//! In the columns that remain every layer of both is built, as deep contacts need.
+//! If all of `a` is out of reach behind all of `b`, neither needs to be drawn. This is the early
+//! rejection of the paper (section 5), for tiles of a few pixels instead of the whole image. In the
+//! remaining columns, all layers of both are built, because deep contacts need them.
 
 use super::cull::Survivors;
 use super::fold::{FARTHEST_PIXEL, ViewFold};

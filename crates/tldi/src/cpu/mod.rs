@@ -76,14 +76,14 @@ pub struct CpuBackend {
 }
 
 impl CpuBackend {
-    /// A backend with no memory taken yet.
+    /// A backend that has allocated nothing yet.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A backend that looks at all of every contact zone with small pixels, also where a first look with large ones
-    /// would settle what is deep: the reference for backends that do nothing else, as those on a GPU. Cost: in deep
-    /// contact 3 to 70 times that of [`new`](Self::new).
+    /// A backend without the first look: it draws the whole contact zone with small pixels, even
+    /// for deep contacts. It is the reference for backends that have no large pixels, such as the
+    /// GPU's. In deep contact it takes 3 to 70 times as long as [`new`](Self::new).
     ///
     /// ```
     /// use tldi::{Backend, CpuBackend};

@@ -1,9 +1,10 @@
 //! Stage `normals`, last part: beside an edge or a corner, a normal is that of the face.
 //!
-//! A neighbourhood that reaches over an edge has a plane between the faces, and pixels there would be
-//! on neither. A point whose neighbours are not on a plane adopts the planes of those of them that are flat, and that
-//! it is on; at a corner, where none is near enough, in a second pass what its neighbours have adopted. Where a
-//! surface bends or is noisy nothing is flat, and normals stay.
+//! A neighbourhood that reaches over an edge has a plane between the faces, and pixels there would
+//! be on neither. So a point whose neighbours are not on a plane takes the plane of a flat
+//! neighbour, if the point lies on it. At a corner no flat neighbour is near enough; there, a
+//! second pass takes what the neighbours have taken. Where a surface bends or is noisy, nothing is
+//! flat, and normals stay as they are.
 
 use super::lanes::multiversioned;
 use super::normals::{LANES, MAX_CANDIDATES, NormalScratch, SUPPORT, Sorted};

@@ -1,10 +1,10 @@
 //! Stage `sweep`: the fragments of each pixel become layers.
 //!
-//! Within a pixel the fragments are sorted by class (entry, exit, edge-on) and depth; a run whose
-//! depths follow each other within the merge gap (of what is steep, within a thickness) is one
-//! layer: the mean of its fragments or, at an edge, of those on one face, since tangent planes do not hold
-//! beyond it (normals that are means of both faces have planes that do). Sums are integers: a layer does not
-//! depend on the order of the points.
+//! Within a pixel, fragments are sorted by class (entry, exit, edge-on) and depth. A run whose
+//! depths follow each other within the merge gap (within a thickness on steep surfaces) is one
+//! layer. The layer is the mean of its fragments. At an edge it is the mean of those on one face,
+//! because tangent planes do not hold beyond the edge. (Planes of normals that are means of both
+//! faces do.) Sums are integers: a layer does not depend on the order of the points.
 
 use super::splat::{
     DEPTH_STEPS, DepthScale, EDGE_ON, Fragment, Fragments, Imaging, NORMAL_STEPS, Splat,
