@@ -19,7 +19,7 @@ const BROAD_PHASE_SLACK: f32 = 2.0 * 0.04;
 /// while sweeps stop the body in front of it again and again.
 const AHEAD: f32 = 1.0;
 
-/// Two colliders whose loosened bounds overlap and of which at least one holds a cloud.
+/// Two colliders whose widened bounds overlap. At least one holds a cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Candidate {
     /// The collider with the lower index: rapier's collider 1.

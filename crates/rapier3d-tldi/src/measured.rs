@@ -58,7 +58,8 @@ impl Measured {
         let size = bounds.map(|bounds| bounds.extents().length_squared());
         let shape1_is_smaller = size[0] < size[1];
         let smaller = bounds[usize::from(!shape1_is_smaller)].extents();
-        // What is smaller than the points are apart would be through them before they are looked at again.
+        // Otherwise a body smaller than the spacing of the points would be through them before they
+        // are compared again.
         let max_drift = config.scatter * coarsest.min(largest_pixel(smaller, 0.0));
         (max_drift > 0.0).then_some(Self {
             pos12: pair.pos12,

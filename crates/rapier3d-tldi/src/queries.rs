@@ -157,7 +157,8 @@ pub(crate) fn contact(
     Ok(Some(measured.unwrap_or_else(|| {
         let [point1, point2] = found.points;
         let apart = point2 - point1;
-        // Nearest points of surfaces that have passed through each other: as far as they are in.
+        // The surfaces have passed through each other. The distance of their nearest points is the
+        // penetration.
         let sign = if found.distance > 0.0 { 1.0 } else { -1.0 };
         let normal = (sign * apart).try_normalize().unwrap_or(found.normal);
         let distance = sign * apart.length();

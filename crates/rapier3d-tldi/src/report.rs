@@ -7,6 +7,26 @@ use std::sync::Arc;
 use tldi::Backend;
 
 /// What one step of a [`TldiPipeline`](crate::TldiPipeline) did.
+///
+/// ```
+/// # use rapier3d::prelude::*;
+/// # use rapier3d_tldi::prelude::*;
+/// # let points: Vec<Vector> = (0..441)
+/// #     .map(|i| 0.05 * Vector::new((i % 21) as f32 - 10.0, 0.0, (i / 21) as f32 - 10.0))
+/// #     .collect();
+/// # let mut world = PhysicsWorld::default();
+/// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// # tldi.attach(&mut world);
+/// # let floor = PointCloud::builder(points).radius(0.05).build()?;
+/// # world.insert(RigidBodyBuilder::fixed(), tldi.collider(floor));
+/// // A ball of 10 cm that is 1 mm deep in a floor of points.
+/// let body = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.099);
+/// world.insert(body, ColliderBuilder::ball(0.1));
+/// let report = tldi.step(&mut world)?;
+/// assert_eq!((report.pairs_batched, report.pairs_missed), (1, 0));
+/// assert_eq!(report.pairs_in_contact, 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepReport {
     /// Pairs of colliders that were compared in one batch before the step.
@@ -68,7 +88,30 @@ impl ComparedBy {
     }
 }
 
-/// A contact point between two colliders of which at least one holds a cloud.
+/// A contact point between two colliders, at least one of which holds a cloud.
+///
+/// ```
+/// # use rapier3d::prelude::*;
+/// # use rapier3d_tldi::prelude::*;
+/// # let points: Vec<Vector> = (0..441)
+/// #     .map(|i| 0.05 * Vector::new((i % 21) as f32 - 10.0, 0.0, (i / 21) as f32 - 10.0))
+/// #     .collect();
+/// # let mut world = PhysicsWorld::default();
+/// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// # tldi.attach(&mut world);
+/// # let floor = PointCloud::builder(points).radius(0.05).build()?;
+/// # world.insert(RigidBodyBuilder::fixed(), tldi.collider(floor));
+/// // A ball of 10 cm that is 1 mm deep in a floor of points.
+/// let body = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.099);
+/// world.insert(body, ColliderBuilder::ball(0.1));
+/// tldi.step(&mut world)?;
+/// for contact in tldi.contacts(&world.narrow_phase, &world.colliders) {
+///     // Below the ball, to within the radius of a point.
+///     assert!(contact.point.length() < 0.05, "{}", contact.point);
+///     assert!(contact.normal.y.abs() > 0.99, "{}", contact.normal);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// The collider with the lower index.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 use tldi::plan::stride;
 
-/// By how much pixels grow at once under [`Resolution::Time`]: half as many pixels.
+/// Factor by which pixels grow at once under [`Resolution::Time`]. It halves their number.
 const COARSER: f32 = std::f32::consts::SQRT_2;
 
 /// Largest pixel, in mean radii, that saves time while clouds are not thinned. Larger pixels reach
@@ -14,8 +14,8 @@ const CHEAPEST: f32 = 1.5;
 /// depend on the pixels.
 const COARSEST: f32 = 8.0;
 
-/// Pixels shrink again where a step takes less than this share of the time: finer pixels, of which
-/// there are twice as many, then take less than all of it.
+/// Pixels shrink again if a step takes less than this share of the budget. The finer pixels are
+/// twice as many, and then still fit into it.
 const LEFT: f32 = 0.4;
 
 /// What decides the edge of the pixels of a [`TldiPipeline`](crate::TldiPipeline).

@@ -10,8 +10,8 @@ const LEAST_PLAIN: f32 = 0.2;
 /// other.
 const PLAINLY: f32 = 0.5;
 
-/// Cosine between a motion and an axis from which on the motion tells from which side `b` came. One
-/// that passes along the surface more than it crosses it does not: a slope may lean either way.
+/// Least cosine between a motion and an axis at which the motion tells from which side `b` came.
+/// One that passes along the surface more than it crosses it does not: a slope may lean either way.
 const CROSSING: f32 = 0.5;
 
 /// For [`stage_constants`](crate::plan::stage_constants).

@@ -101,7 +101,7 @@ pub enum BackendError {
         /// What is not supported, and what to do instead.
         reason: &'static str,
     },
-    /// A device failed. What it says, and of which device.
+    /// A device failed. The text names the device and gives its message.
     #[error("{0}")]
     Device(String),
 }

@@ -10,15 +10,15 @@ use crate::{ContactPixel, ContactPoint};
 use arrayvec::ArrayVec;
 use glamx::{Mat3, Vec2, Vec3};
 
-/// Most faces that meet: what is pointed has three, or three of its faces tell.
+/// Most faces that meet. A corner has three, or three of its faces suffice.
 const MOST_FACES: usize = 3;
 
-/// How much the slopes of the gaps over two faces differ from which on they begin to be two, and from which on they
-/// are.
+/// Difference between the slopes of the gaps over two faces at which they begin to count as two,
+/// and at which they fully do.
 const APART: [f32; 2] = [0.5, 1.0];
 
-/// How much the slope of the gaps in a pixel may differ from that over its face, while that is sought and once it
-/// is found; of steep faces more.
+/// Largest difference between the slope of the gaps in a pixel and that over its face, while the
+/// face is searched and once it is found. Steep faces are allowed more.
 const NEAR_FACE: f32 = 0.3;
 const OF_FACE: f32 = 0.15;
 
@@ -31,7 +31,7 @@ const OF_FACES: [f32; 2] = [0.25, 0.45];
 /// explanation, and at which they do fail. A round surface is above its tangents.
 const ROUND: [f32; 2] = [0.1, 0.25];
 
-/// Most that faces meet below the lowest pixel, in pixels.
+/// Largest distance at which faces may meet below the lowest pixel, in pixels.
 const LOWEST: f32 = 1.0;
 
 /// Most by which a gap along the normal of the contact and one along the pixel's own differ.
@@ -89,8 +89,8 @@ impl Frame {
     }
 }
 
-/// By how much, in metres, the contact of `pixels` is lower than `deepest`, the lowest of the points that were fitted
-/// to them. `tangents` is overwritten.
+/// How far the contact of `pixels` is below `deepest`, the lowest of the points that were fitted to
+/// them, metres. `tangents` is overwritten.
 pub(crate) fn lower_by<'a>(
     pixels: impl Iterator<Item = &'a ContactPixel> + Clone,
     frame: &Frame,

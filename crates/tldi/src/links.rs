@@ -41,8 +41,9 @@ impl Links {
         let limit = SAME_SURFACE_PX * params.pixel_size;
         let mut first = 0;
         for view in contacts.chunk_by(|c, d| c.view == d.view) {
-            // The first contact pixel not before each of the pixels that come after one: they move on as it does, so
-            // that nothing is as large as the bounds of the pixels.
+            // For each pixel that comes after the present one, the first contact pixel that is not
+            // before it. These positions move on together, so no map as large as the bounds of the
+            // pixels is needed.
             let mut starts = [0; AFTER.len()];
             for (k, c) in view.iter().enumerate() {
                 for (start, offset) in starts.iter_mut().zip(AFTER) {

@@ -195,8 +195,8 @@ impl PatchScratch {
         }
     }
 
-    /// Pushes a patch for each of the groups on one plane, if they are several, and each a single spot: what
-    /// touches in two of them rolls on both. Returns whether they are.
+    /// Pushes one patch for each group on one plane, if there are several groups and each is a
+    /// single spot. A body that touches in two spots rolls on both. Returns whether they are.
     fn push_round_spots(
         &mut self,
         contacts: &[ContactPixel],
@@ -239,8 +239,8 @@ impl PatchScratch {
         shape.patch(members, &pixels, &mut self.shape, params)
     }
 
-    /// Averages normals over linked neighbours and fits the gaps to them: what is left of a sensor's
-    /// noise is a third.
+    /// Averages normals over linked neighbours and fits the gaps to them. A third of a sensor's
+    /// noise is left.
     fn smooth(&mut self, contacts: &[ContactPixel]) {
         let mut fit = GapFit::default();
         for (k, contact) in contacts.iter().enumerate() {
@@ -278,9 +278,9 @@ impl PatchScratch {
     }
 }
 
-/// Drops the contact pixels of faces that do not face each other and of which another view sees one
-/// better, as of a floor's edge and the wall behind it: far along the view, and near beside it. Where
-/// they are half of all or more there is nothing better.
+/// Drops contact pixels of faces that do not face each other, if another view sees one of the faces
+/// better. An example is a floor's edge and the wall behind it, which are far apart along the view
+/// and near beside it. Where they are half of all or more there is nothing better.
 fn drop_between_faces(result: &mut PairResult) {
     let PairResult { axes, contacts, .. } = result;
     let is_between = |contact: &ContactPixel| {

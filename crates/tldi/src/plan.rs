@@ -1,5 +1,5 @@
-//! What is known of a pair before any of its points is looked at; and the numbers that decide the
-//! stages. All backends start from here.
+//! What is known about a pair before any of its points is read, and the constants of the stages.
+//! All backends start from here.
 
 use crate::cpu::{columns, compare, normals, normals_sharpen, planes, splat, sweep};
 use crate::reach::{Ring, farthest};

@@ -33,9 +33,9 @@ pub struct Supports {
     pub floor_of_valley: Option<Floor>,
 }
 
-/// Most that lowness counts, in roughnesses: what is lower still is an odd one out, and would otherwise be
-/// chosen in all directions. On a flat face it does not count: a low point in the middle of an edge
-/// would take the place of both corners, and the body tip over the third.
+/// Limit of how much depth counts, in units of the roughness. A still lower point is an outlier,
+/// and would otherwise be chosen in all directions. On a flat face it does not count: a low point
+/// in the middle of an edge would take the place of both corners, and the body tip over the third.
 const LOWEST: f32 = 2.5;
 
 /// Least extent across the longest direction, as a share of that along it: less is rounding.
@@ -44,12 +44,13 @@ const LEAST_WIDTH: f32 = 1e-6;
 /// The same from which on points tell how steeply their gaps rise across: not those in a row.
 const LEAST_KNOWN_WIDTH: f32 = 0.1;
 
-/// Share of points on one plane from which on gaps begin to count as flat, and from which on they do.
-/// Measured: faces of 10 × 10 points have 0.6 on a plane and 0.43 on each other, where their rims meet.
+/// Share of points on one plane at which gaps begin to count as flat, and at which they fully do.
+/// Measured: faces of 10 × 10 points have 0.6 on a plane and 0.43 on each other, where their rims
+/// meet.
 const FLAT: [f32; 2] = [0.35, 0.5];
 
-/// The same for the share of the roughness that a bowl leaves: the gaps of what bends a little are all near a
-/// plane as well.
+/// The same for the share of the roughness that a bowl leaves. The gaps of a slightly bent surface
+/// are all near a plane, too.
 const UNBENT: [f32; 2] = [0.3, 0.5];
 
 /// Roughness, in units of the least roughness, up to which there is no bend, and from which there
@@ -309,8 +310,8 @@ mod tests {
         assert_eq!(cap(Vec2::new(0.02, 0.0)).lowest_of_bowl, None);
     }
 
-    /// A trough has a floor, as low as it is and as long, with its radius; one of which only the sides are seen has
-    /// none.
+    /// A trough has a floor, with its depth, length and radius. A trough whose sides alone are seen
+    /// has none.
     #[test]
     fn troughs_have_floors() {
         let trough = |is_seen: fn(i32) -> bool| {

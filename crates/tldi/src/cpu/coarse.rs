@@ -94,7 +94,7 @@ pub(super) enum FirstLook {
     Settled,
 }
 
-/// Where a first look is worth while: by how much the bounds overlap, metres.
+/// The overlap of the bounds, metres, if a first look is possible.
 fn overlap(query: &PairQuery) -> Option<f32> {
     let (Surface::Cloud(a), Surface::Cloud(b)) = (query.a, query.b) else {
         return None;

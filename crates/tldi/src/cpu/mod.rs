@@ -98,10 +98,11 @@ impl CpuBackend {
 
     /// Where a surface in straight motion first meets another, or `None` where it does not.
     ///
-    /// The distance is within a depth error of the images where the surfaces meet face on (0.1 r̄ of
-    /// the coarser cloud), and within a pixel over the cosine between normal and motion where they
-    /// do not. Surfaces are met from behind as well, but for solids with oriented normals, which
-    /// what is inside may leave. Cost: reading both clouds and the layers in the way of the motion.
+    /// The distance is within a depth error of the images where the surfaces meet face on (0.1 r̄
+    /// of the coarser cloud), and within a pixel over the cosine between normal and motion where
+    /// they do not. Surfaces are met from behind, too. Solids with oriented normals are not, so
+    /// that a body inside may leave. Cost: reading both clouds and the layers in the way of the
+    /// motion.
     ///
     /// # Errors
     /// [`BackendError::Unsupported`] with pair 0: no side is a cloud, or bad parameters.

@@ -19,10 +19,10 @@ const ON_PLANE: f32 = 0.1;
 /// Variance that noise explains, in its own: that of 20 points scatters by a third.
 const OF_NOISE: f32 = 2.0;
 
-/// Variance from which on neighbours are plainly not on a plane, in that up to which they are.
+/// Variance at which neighbours are plainly not on a plane, in units of that up to which they are.
 const OFF_PLANE: f32 = 4.0;
 
-/// Misfit of a plane, as a deviation in mean radii, from which on it is not flat, or a point not on it.
+/// Deviation from a plane, in mean radii, at which it is not flat, or a point is not on it.
 const FLAT: f32 = 0.05;
 
 /// For [`stage_constants`](crate::plan::stage_constants).

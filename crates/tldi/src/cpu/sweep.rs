@@ -177,8 +177,9 @@ pub(crate) fn is_edge_on(layer: &Layer) -> bool {
     layer.normal.z.abs() < EDGE_ON
 }
 
-/// How much the normal of a layer counts for a body whose outside is where the camera is (`side` −1) or beyond it (1):
-/// of an edge as far as its faces agree; in a groove both touch, each with its own normal.
+/// Weight of a layer's normal for a body whose outside is on the camera's side (`side` −1) or
+/// beyond the layer (1). At an edge it is how far the faces agree. In a groove both faces touch,
+/// each with its own normal, and it is 1.
 pub(crate) fn share_of(layer: &Layer, side: f32) -> f32 {
     let is_edge = layer.agreement * side * layer.normal.z > 0.0;
     if is_edge { layer.agreement.abs() } else { 1.0 }
