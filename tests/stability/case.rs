@@ -54,9 +54,9 @@ impl Scale {
 pub(crate) struct Scene {
     /// Name on the command line and in rows.
     pub(crate) name: &'static str,
-    /// What is shown, in one sentence.
+    /// What happens.
     pub(crate) about: &'static str,
-    /// What passes, in one sentence.
+    /// What passes.
     pub(crate) rule: &'static str,
     /// Its cases.
     pub(crate) cases: fn(&Scale) -> Vec<Case>,

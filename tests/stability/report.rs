@@ -141,7 +141,7 @@ impl Report {
         if !passed.is_empty() {
             let _infallible = writeln!(
                 text,
-                "\nDeclared as failures of `tldi`, but passed here: {}.",
+                "\nKnown failures of `tldi` that passed in this run: {}.",
                 passed.join("; ")
             );
         }
@@ -200,9 +200,12 @@ impl Report {
         }
     }
 
-    /// What each scene is, and what passes.
+    /// What each scene is, and what passes, folded.
     fn scenes_text(&self) -> String {
-        let mut text = String::from("| scene | what happens | what passes |\n|---|---|---|\n");
+        let mut text = String::from(
+            "<details><summary>What each scene is, and what passes</summary>\n\n\
+             | scene | what happens | what passes |\n|---|---|---|\n",
+        );
         for scene in SCENES {
             let _infallible = writeln!(
                 text,
@@ -210,6 +213,7 @@ impl Report {
                 scene.name, scene.about, scene.rule
             );
         }
+        text.push_str("\n</details>\n");
         text
     }
 
@@ -250,7 +254,7 @@ impl Report {
         let (scenes, table) = (self.scenes_text(), self.markdown());
         write(
             file,
-            &format!("{before}{BEGIN}\n\n{scenes}\n{table}\n{END}{after}"),
+            &format!("{before}{BEGIN}\n\n{table}\n{scenes}\n{END}{after}"),
         )
     }
 }

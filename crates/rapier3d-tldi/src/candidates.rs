@@ -9,17 +9,17 @@ use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet, RigidBo
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
 
-/// By how much rapier's broad phase loosens a collider's bounds so that it need not look at small
-/// motions, in units of `length_unit`: twice `CHANGE_DETECTION_FACTOR` in rapier3d's
-/// `broad_phase_bvh/mod.rs`, since a collider may have moved by as much inside them.
+/// How much rapier's broad phase widens a collider's bounds, in units of `length_unit`, so that it
+/// can ignore small motions. It is twice `CHANGE_DETECTION_FACTOR` in rapier3d's
+/// `broad_phase_bvh/mod.rs`, because a collider may have moved by that much inside them.
 const BROAD_PHASE_SLACK: f32 = 2.0 * 0.04;
 
-/// How far contacts are looked for where bodies close fast, in mean radii of the coarser cloud: a surface that
-/// is new in every step may be out of rapier's prediction distance every time, while sweeps stop the body
-/// before it again and again.
+/// How far contacts are searched when bodies approach fast, in mean radii of the coarser cloud.
+/// Without it, a surface that is new in every step could stay beyond rapier's prediction distance,
+/// while sweeps stop the body in front of it again and again.
 const AHEAD: f32 = 1.0;
 
-/// Two colliders whose loosened bounds overlap and of which at least one holds a cloud.
+/// Two colliders whose widened bounds overlap. At least one holds a cloud.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Candidate {
     /// The collider with the lower index: rapier's collider 1.
@@ -228,8 +228,9 @@ pub(crate) fn effective_prediction(
     base.max(dt * (velocity(body1) - velocity(body2)).length()) + skins
 }
 
-/// The gap up to which contacts are looked for, in metres: as far as rapier asks, or as the bodies close
-/// in the step, but then no farther than [`AHEAD`]. Rapier keeps what is reached within the step.
+/// The largest gap at which contacts are searched, in metres: what rapier asks, or the way by which
+/// the bodies approach in the step, then at most [`AHEAD`]. Rapier keeps the contacts that are
+/// reached within the step.
 pub(crate) fn contact_reach(
     collider1: &Collider,
     collider2: &Collider,

@@ -6,8 +6,8 @@ use rapier3d::parry::shape::Shape;
 use tldi::plan::largest_pixel;
 use tldi::{CameraPolicy, Params, Variant};
 
-/// Contacts are looked for up to this many standard deviations of told noise, so that the gaps of what
-/// just touches are fitted to what is around it on all sides.
+/// Contacts are searched up to this many standard deviations of given noise. So the fit at a light
+/// contact has points around it on all sides.
 const FITTED: f32 = 3.0;
 
 /// Settings of a [`TldiPipeline`](crate::TldiPipeline), the same for all its pairs.
@@ -23,17 +23,16 @@ const FITTED: f32 = 3.0;
 pub struct TldiConfig {
     /// Which construction and comparison of the layers to use.
     pub variant: Variant,
-    /// From where pairs are looked at; sensors, by default, from [all
+    /// How view axes are chosen. By default, sensors are looked at from [all
     /// directions](CameraPolicy::AllDirections).
     pub camera_policy: CameraPolicy,
     /// How large pixels are: a number of radii, or what an error or time budget allows.
     pub resolution: Resolution,
-    /// By how much measured gaps scatter from one comparison to the next, in mean radii of the
-    /// pair's coarser cloud. A solver that was fed this noise would keep bodies from coming to
-    /// rest. So contacts are kept, riding on their bodies, until the pair has moved by as much
-    /// relative to each other; and gaps within the roughness that a contact shows of itself, up to
-    /// twice as much, count as touching, be they open or penetrations. 0 measures in every step and
-    /// pushes out all of it.
+    /// How much measured gaps vary from one comparison to the next, in mean radii of the pair's
+    /// coarser cloud. This noise would keep bodies from coming to rest. So contacts stay fixed to
+    /// their bodies until the pair has moved by this distance. Gaps and penetrations within the
+    /// contact's own roughness, at most twice this distance, count as touching. With 0, every step
+    /// measures anew and corrects every penetration.
     pub scatter: f32,
 }
 
@@ -49,7 +48,7 @@ impl Default for TldiConfig {
 }
 
 impl TldiConfig {
-    /// The settings for what only asks whether surfaces meet: by default they are looked at from all
+    /// The settings of a query that only asks whether surfaces meet. By default, it looks from all
     /// directions.
     pub(crate) fn for_intersection(self) -> Self {
         let camera_policy = match self.camera_policy {

@@ -45,7 +45,8 @@ impl Default for TldiDebugRenderMode {
     }
 }
 
-/// Most points that are drawn of one cloud, and contact pixels of one pair: of more, every n-th.
+/// Most points of one cloud, and contact pixels of one pair, that are drawn. If there are more,
+/// every n-th is drawn.
 pub const DEBUG_POINT_LIMIT: usize = 10_000;
 
 /// Colours, as hue in degrees, saturation, lightness and alpha.
@@ -64,15 +65,16 @@ const NORMAL_PIXELS: f32 = 2.0;
 impl TldiPipeline {
     /// Draws clouds and contacts at the colliders' present poses.
     ///
-    /// Nothing is kept from the step for this: the pairs that rapier's narrow phase holds, sleeping
-    /// ones included, are compared again, one by one, on the CPU, as a pair is that the batch
-    /// missed. So it costs as much as a step's comparison (nothing for
-    /// [`POINTS`](TldiDebugRenderMode::POINTS) alone), and what is drawn is what is. What
-    /// [`DebugRenderBackend::filter_object`] declines is neither compared nor drawn: points belong
-    /// to a [`DebugRenderObject::Collider`], all else to a [`DebugRenderObject::ContactPair`].
+    /// The step keeps nothing for this. All pairs of rapier's narrow phase, sleeping ones included,
+    /// are compared again on the CPU, one by one. So the picture shows the present state, and it
+    /// costs as much as the comparison of a step (nothing for
+    /// [`POINTS`](TldiDebugRenderMode::POINTS) alone). Objects that
+    /// [`DebugRenderBackend::filter_object`] declines are neither compared nor drawn. Points belong
+    /// to a [`DebugRenderObject::Collider`], everything else to a
+    /// [`DebugRenderObject::ContactPair`].
     ///
-    /// Rapier's own [`DebugRenderPipeline`](rapier3d::pipeline::DebugRenderPipeline) draws nothing
-    /// for a cloud, and the contacts that its last step used.
+    /// Rapier's own [`DebugRenderPipeline`](rapier3d::pipeline::DebugRenderPipeline) draws the
+    /// contacts of the last step, and nothing for a cloud.
     ///
     /// # Errors
     /// [`TldiError::Pair`] where a pair cannot be compared; what was drawn before stays.

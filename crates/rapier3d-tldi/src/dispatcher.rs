@@ -21,12 +21,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use tldi::PairResult;
 
-/// Answers rapier's questions about pairs with a cloud, from the results that its pipeline
-/// prepared, or else by a comparison on the spot. Got from
+/// Answers rapier's questions about pairs with a cloud. It takes the results that the pipeline
+/// prepared, or compares the pair at once. Get it from
 /// [`TldiPipeline::dispatcher`](crate::TldiPipeline::dispatcher).
 ///
-/// It must come first in a chain: rapier's default dispatcher answers some pairs with custom
-/// shapes wrongly (no contacts) where it should decline.
+/// It must come first in a chain. Rapier's default dispatcher answers some pairs with custom shapes
+/// wrongly (no contacts) instead of declining them.
 ///
 /// | question | pairs with a cloud | other pairs |
 /// |---|---|---|
@@ -37,36 +37,37 @@ use tldi::PairResult;
 /// | shape casts, straight and turning | where the surfaces first meet | declined |
 ///
 /// # Shape casts
-/// The time of a straight cast is good to 0.2 r̄ of the coarser cloud over the speed where surfaces
-/// meet face on, and to a pixel over the cosine between normal and motion where they do not; a target
-/// distance counts along the motion. With `stop_at_penetration` off, and in turning casts, what touches
-/// at the start is passed unless the motion goes on towards it by more than a pixel, and so is what
-/// only the outer two pixels of the moving shape would meet, or three where it goes on by no more. Turning casts are early by up to a
-/// pixel; what a shape touches for less than it takes to turn by half its CCD thickness may be passed. In a step
-/// of the pipeline they do not stop a shape, from behind, at a sheet that its contacts push it out of.
-/// Cost: reading both clouds and the layers in the way, for each piece in which the shape turns by that
-/// and, of pieces in which something is met, for each in which it displaces no point by more than half a
-/// pixel (64 of either at the most).
+/// The distance of a straight cast is exact to 0.2 r̄ of the coarser cloud if surfaces meet face
+/// on. Otherwise it is exact to a pixel divided by the cosine between normal and motion. A target
+/// distance counts along the motion. With `stop_at_penetration` off, and in turning casts, a shape
+/// passes two things: surfaces that touch it at the start, unless the motion goes on towards them
+/// by more than a pixel; and surfaces that only its rim would meet. The rim is two pixels wide, or
+/// three where the motion goes on by no more than that. Turning casts are early by up to a pixel.
+/// They may miss a surface that the shape touches only briefly: for less than it takes to turn by
+/// half its CCD thickness. In a step of the pipeline, they ignore, from behind, a sheet that the
+/// shape's contacts push it out of. Cost: both clouds and the layers in the way are read once for
+/// each piece. A coarse piece turns the shape by half its CCD thickness. If something is met in it,
+/// fine pieces displace no point by more than half a pixel. There are at most 64 of each.
 ///
 /// # Distances, nearest points and contacts
-/// The surface of a cloud is a disc a sample, as for rays ([`PointCloudShape`](crate::PointCloudShape));
-/// a cloud without normals has those of planes through 13 samples, and at an edge or a corner there
-/// is the bare sample. Of compounds the nearest parts count, and are named. Shapes intersect where
-/// discs cross each other or a surface, where a sample is inside a solid of rapier's, and where the
-/// nearest discs of two clouds with oriented normals lie behind each other. A body inside a cloud,
-/// surfaces apart, does not intersect it.
+/// The surface of a cloud is one disc for each point, as for rays
+/// ([`PointCloudShape`](crate::PointCloudShape)). Without normals, discs lie on planes through 13
+/// points. At an edge or a corner, only the bare point counts. Of compounds, the nearest parts
+/// count and are named. Shapes intersect if discs cross each other or a surface, if a point is
+/// inside one of rapier's solids, or if the nearest discs of two clouds with oriented normals lie
+/// behind each other. A body inside a cloud with the surfaces apart does not intersect it.
 ///
-/// Accuracy, for samples of radius r (spacing r): where smooth surfaces with radii of curvature R₁
-/// and R₂ are nearest, a distance is within r²/2 · (1/R₁ + 1/R₂) of the true one, exact for planes;
-/// closer ones may count as touching. At the edges and corners of a box it is too large by what
-/// the outermost samples are short of them. Estimated normals add 0.03 r, the edges of rapier's own
-/// shapes 0.15 r. How deep shapes are that intersect is measured by a comparison, on the spot.
+/// Accuracy, for points of radius r and spacing r: between smooth surfaces with radii of curvature
+/// R₁ and R₂, a distance is within r²/2 · (1/R₁ + 1/R₂) of the true one. It is exact for planes.
+/// Shapes that are closer than this may count as touching. At the edges and corners of a box, the
+/// distance is too large by the gap between the outermost points and the edge. Estimated normals
+/// add 0.03 r, the edges of rapier's own shapes 0.15 r. If shapes intersect, a comparison measures
+/// the depth.
 ///
-/// Cost: O(log n) for each sample that may be nearest. On curved surfaces these are few; of faces
-/// that lie flat on each other it is all, as in rapier's own answers for meshes. 3,000 samples
-/// against a shape of rapier's take 15–180 µs, against a cloud of 10,000 0.4–1.5 ms, flat on its
-/// face 3 ms (one core). The tree, and the normals of a cloud without, are built when first asked
-/// for.
+/// Cost: O(log n) for each point that may be nearest. These are few on curved surfaces, and all on
+/// faces that lie flat on each other, as in rapier's own answers for meshes. On one core, 3,000
+/// points against one of rapier's shapes take 15–180 µs, against a cloud of 10,000 points 0.4–1.5
+/// ms, and 3 ms flat on its face. The tree, and missing normals, are built on first use.
 ///
 /// ```
 /// use rapier3d::parry::query::QueryDispatcher;

@@ -6,9 +6,20 @@ use tldi::{BackendError, CloudError};
 
 /// Why a step of a [`TldiPipeline`](crate::TldiPipeline) failed.
 ///
-/// Rapier drops the errors of its narrow phase, and the bodies concerned fall through each other;
-/// here they are kept and returned by the pipeline's next
-/// [`finish`](crate::TldiPipeline::finish) or [`step`](crate::TldiPipeline::step).
+/// Rapier drops errors of its narrow phase, and the bodies concerned fall through each other. Here
+/// such errors are kept, and the pipeline's next [`finish`](crate::TldiPipeline::finish) or
+/// [`step`](crate::TldiPipeline::step) returns them.
+///
+/// ```
+/// use rapier3d::prelude::*;
+/// use rapier3d_tldi::prelude::*;
+/// let mut world = PhysicsWorld::default();
+/// let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// assert_eq!(tldi.step(&mut world), Err(TldiError::NotAttached));
+/// tldi.attach(&mut world);
+/// assert!(tldi.step(&mut world).is_ok());
+/// # Ok::<(), TldiError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TldiError {

@@ -1,9 +1,9 @@
-//! Rapier's own shapes as [`RaySurface`]s: where a ray enters and leaves them, and how far a point
-//! is from them.
+//! Rapier's own shapes as [`RaySurface`]s: where a ray enters and leaves them, and their distance
+//! from a point.
 //!
-//! Rays and distances are computed here in `f64` from the shapes' `f32` data and not by parry's
-//! ray casts, which report the first hit only, turn normals towards the ray, and find hits on
-//! curved shapes by an iteration in `f32`.
+//! Rays and distances are computed here, in `f64` from the shapes' `f32` data. Parry's ray casts do
+//! not suffice: they report only the first hit, turn normals towards the ray, and iterate in `f32`
+//! on curved shapes.
 
 mod convex;
 mod distance;
@@ -21,7 +21,7 @@ use rapier3d::parry::shape::{
 };
 use tldi::{Aabb, RayHit, RaySurface};
 
-/// A shape of rapier's seen through rays, in the shape's own frame.
+/// One of rapier's shapes as rays see it, in the shape's own frame.
 ///
 /// | shape | crossings | inside |
 /// |---|---|---|
@@ -34,12 +34,12 @@ use tldi::{Aabb, RayHit, RaySurface};
 /// | any other | by repeated ray casts, see below | by the shape's own test |
 ///
 /// Crossings are within `f32` rounding of the shape's size, divided by the cosine of the angle
-/// between ray and normal. A ray through the edge or vertex that triangles share crosses one of
-/// them (or none, or two of opposite facing, at a silhouette), as if it were shifted by an
-/// infinitesimal amount: crossings of a closed mesh come in pairs.
+/// between ray and normal. A ray through a shared edge or vertex of triangles crosses one of them,
+/// as if it were shifted by an infinitesimal amount. At a silhouette it crosses none, or two of
+/// opposite facing. So crossings of a closed mesh come in pairs.
 ///
-/// A custom shape is cast upon again and again from just behind the hit before; crossings closer
-/// than 10⁻⁵ of its size are missed.
+/// For a custom shape, rays are cast repeatedly, each from just behind the last hit. Crossings
+/// closer than 10⁻⁵ of its size are missed.
 ///
 /// ```
 /// use rapier3d::prelude::*;

@@ -58,8 +58,8 @@ pub(crate) fn separate(points: &mut [PushedPoint], bodies: &mut RigidBodySet) {
 }
 
 impl PushedPoint {
-    /// Raises the speed at which the bodies separate to what it has to be, or takes back what other
-    /// points made needless.
+    /// Raises the separation speed of the bodies to the required one, or withdraws an impulse that
+    /// other points made unnecessary.
     fn solve(&mut self, bodies: &mut RigidBodySet) {
         let [first, second] = self.bodies;
         let separating = (velocity_at(bodies, second, self.point)

@@ -1,9 +1,9 @@
-//! Dynamic point clouds as rapier bodies: rapier3d's narrow phase for pairs of colliders of which
-//! at least one is a point cloud, by thickened layered depth images ([`tldi`]).
+//! Dynamic point clouds as rapier bodies. The crate is rapier3d's narrow phase for pairs of
+//! colliders with at least one point cloud, by thickened layered depth images ([`tldi`]).
 //!
-//! A cloud is a collider like any other: fixed (a scan), dynamic (a scanned object), kinematic (a
-//! robot's link), with points that stay or that are new in every step. It collides with other
-//! clouds and with all of rapier's shapes.
+//! A cloud is a collider like any other: fixed (a scan), dynamic (a scanned object) or kinematic (a
+//! robot's link). Its points may stay, or be new in every step. It collides with other clouds and
+//! with all of rapier's shapes.
 //!
 //! ```
 //! use rapier3d::{glamx::Vec3Swizzles, prelude::*};
@@ -55,6 +55,8 @@ mod collider;
 mod config;
 mod debug_render;
 mod dispatcher;
+#[cfg(doctest)]
+mod doc_examples;
 mod error;
 mod exact;
 mod impulses;

@@ -158,8 +158,8 @@ fn emptied(manifolds: &mut Vec<ContactManifold>, index: usize) -> &mut ContactMa
     manifold
 }
 
-/// Writes the points of `patch`: what is within its roughness, and `scatter` metres, of touching
-/// touches.
+/// Writes the points of `patch`. A gap within the patch's roughness, and within `scatter` metres,
+/// counts as touching.
 fn write_patch(
     patch: &ContactPatch,
     pair: &PartPair,

@@ -1,10 +1,10 @@
-//! Until when measured contacts hold.
+//! How long measured contacts stay valid.
 //!
-//! Every comparison samples the surfaces anew and its depths scatter by up to a tenth of the coarser
-//! cloud's point radius. Fed to a solver in every step, this noise keeps bodies from coming to
-//! rest. So contacts are measured only once the pair has moved by as much as that; until then the
-//! points that were found ride on their bodies. Rapier does the same for its own shapes
-//! (`contact_recycling`), with a distance that does not know how fine the cloud is.
+//! Every comparison samples the surfaces anew, and its depths vary by up to a tenth of the coarser
+//! cloud's point radius. In every step, this noise would keep bodies from coming to rest. So
+//! contacts are measured again only after the pair has moved by that distance. Until then they stay
+//! fixed to their bodies. Rapier does the same for its own shapes (`contact_recycling`), with a
+//! distance that does not depend on the cloud.
 
 use crate::TldiConfig;
 use crate::parts::{PartPair, ShapePair, clouds_of};
@@ -14,8 +14,9 @@ use rapier3d::parry::shape::Shape;
 use tldi::plan::largest_pixel;
 use tldi::{ContactPatch, PairResult};
 
-/// Whether a pair touches in one or two round spots or lines: it rolls there, and a point that rides on the bodies
-/// would soon be behind. One that stays a tenth of a radius behind drives a ball like a slope.
+/// Whether a pair touches in one or two round spots or lines. Such a pair rolls, and a point that
+/// is fixed to the bodies would soon be late. A point that is late by a tenth of a radius drives a
+/// ball like a slope.
 pub(crate) fn rolls(parts: &[PartPair], results: &[PairResult]) -> bool {
     let patches = (parts.iter())
         .filter_map(|part| part.comparison.as_ref())
@@ -57,7 +58,8 @@ impl Measured {
         let size = bounds.map(|bounds| bounds.extents().length_squared());
         let shape1_is_smaller = size[0] < size[1];
         let smaller = bounds[usize::from(!shape1_is_smaller)].extents();
-        // What is smaller than the points are apart would be through them before they are looked at again.
+        // Otherwise a body smaller than the spacing of the points would be through them before they
+        // are compared again.
         let max_drift = config.scatter * coarsest.min(largest_pixel(smaller, 0.0));
         (max_drift > 0.0).then_some(Self {
             pos12: pair.pos12,

@@ -1,8 +1,9 @@
-//! How far apart two shapes are of which at least one holds a cloud, and where.
+//! The distance and nearest points of two shapes, at least one of which holds a cloud.
 //!
-//! The surface of a cloud is a disc a sample, as for rays and projections ([`PointCloudShape`](crate::PointCloudShape)),
-//! with two differences: a cloud without normals has those of planes through 13 samples, and at an
-//! edge or a corner, where a disc would stand out by up to its radius, there is the bare sample.
+//! The surface of a cloud is one disc for each point, as for rays and projections
+//! ([`PointCloudShape`](crate::PointCloudShape)), with two differences. Without normals, discs lie
+//! on planes through 13 points. At an edge or a corner, a disc would stand out by up to its radius,
+//! so only the bare point counts.
 
 mod discs;
 mod nearest;
@@ -156,7 +157,8 @@ pub(crate) fn contact(
     Ok(Some(measured.unwrap_or_else(|| {
         let [point1, point2] = found.points;
         let apart = point2 - point1;
-        // Nearest points of surfaces that have passed through each other: as far as they are in.
+        // The surfaces have passed through each other. The distance of their nearest points is the
+        // penetration.
         let sign = if found.distance > 0.0 { 1.0 } else { -1.0 };
         let normal = (sign * apart).try_normalize().unwrap_or(found.normal);
         let distance = sign * apart.length();

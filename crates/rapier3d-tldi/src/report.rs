@@ -7,6 +7,26 @@ use std::sync::Arc;
 use tldi::Backend;
 
 /// What one step of a [`TldiPipeline`](crate::TldiPipeline) did.
+///
+/// ```
+/// # use rapier3d::prelude::*;
+/// # use rapier3d_tldi::prelude::*;
+/// # let points: Vec<Vector> = (0..441)
+/// #     .map(|i| 0.05 * Vector::new((i % 21) as f32 - 10.0, 0.0, (i / 21) as f32 - 10.0))
+/// #     .collect();
+/// # let mut world = PhysicsWorld::default();
+/// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// # tldi.attach(&mut world);
+/// # let floor = PointCloud::builder(points).radius(0.05).build()?;
+/// # world.insert(RigidBodyBuilder::fixed(), tldi.collider(floor));
+/// // A ball of 10 cm that is 1 mm deep in a floor of points.
+/// let body = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.099);
+/// world.insert(body, ColliderBuilder::ball(0.1));
+/// let report = tldi.step(&mut world)?;
+/// assert_eq!((report.pairs_batched, report.pairs_missed), (1, 0));
+/// assert_eq!(report.pairs_in_contact, 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepReport {
     /// Pairs of colliders that were compared in one batch before the step.
@@ -14,19 +34,20 @@ pub struct StepReport {
     /// Pairs that were not compared because the contacts of an earlier step still hold
     /// ([`TldiConfig::scatter`](crate::TldiConfig::scatter)).
     pub pairs_kept: usize,
-    /// Pairs that rapier asked for and the batch did not hold (their poses or shapes changed after
-    /// it, or rapier split the step): compared on the spot, one by one.
+    /// Pairs that rapier asked for and the batch did not hold. Their poses or shapes changed after
+    /// it, or rapier split the step. They were compared at once, one by one.
     pub pairs_missed: usize,
-    /// Pairs with a cloud whose colliders rapier holds to be in contact (closer than its
-    /// prediction distance), sleeping ones included.
+    /// Pairs with a cloud that rapier has in contact, that is, closer than its prediction distance.
+    /// Sleeping pairs count.
     pub pairs_in_contact: usize,
     /// Pixels in which surfaces were close or penetrated, over the pairs that were compared and
     /// that rapier asked for.
     pub contact_pixels: usize,
-    /// How many times as large as [`Resolution`](crate::Resolution) says the pixels of a pair were, the most of all
-    /// pairs that were compared and that rapier asked for: what is deep or coarse needs no smaller ones, and strewn points
-    /// have no room for them ([`PairResult::coarser`](tldi::PairResult::coarser)). `None` where all have the size that was
-    /// asked for.
+    /// The largest factor by which the pixels of a pair exceed [`Resolution`](crate::Resolution),
+    /// over all pairs that were compared and that rapier asked for. Deep contacts and coarse places
+    /// need no smaller pixels, and widely strewn points leave no room for them
+    /// ([`PairResult::coarser`](tldi::PairResult::coarser)). `None` if all pixels have the size
+    /// that was asked for.
     pub coarser_pixels: Option<f32>,
     /// Deepest penetration before the step over all contacts of clouds, sleeping ones included, in
     /// metres; 0 without any.
@@ -37,8 +58,8 @@ pub struct StepReport {
     pub backend: Arc<str>,
     /// Name of the device that compared it, where it was not the CPU.
     pub adapter: Option<Arc<str>>,
-    /// Why it was the CPU though a GPU would have been taken: there is none, or it failed. Nothing
-    /// is lost then.
+    /// Why the CPU compared the batch although a GPU was wanted: there is none, or it failed.
+    /// Nothing is lost.
     pub fallback: Option<Arc<str>>,
 }
 
@@ -67,7 +88,30 @@ impl ComparedBy {
     }
 }
 
-/// A contact point between two colliders of which at least one holds a cloud.
+/// A contact point between two colliders, at least one of which holds a cloud.
+///
+/// ```
+/// # use rapier3d::prelude::*;
+/// # use rapier3d_tldi::prelude::*;
+/// # let points: Vec<Vector> = (0..441)
+/// #     .map(|i| 0.05 * Vector::new((i % 21) as f32 - 10.0, 0.0, (i / 21) as f32 - 10.0))
+/// #     .collect();
+/// # let mut world = PhysicsWorld::default();
+/// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// # tldi.attach(&mut world);
+/// # let floor = PointCloud::builder(points).radius(0.05).build()?;
+/// # world.insert(RigidBodyBuilder::fixed(), tldi.collider(floor));
+/// // A ball of 10 cm that is 1 mm deep in a floor of points.
+/// let body = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.099);
+/// world.insert(body, ColliderBuilder::ball(0.1));
+/// tldi.step(&mut world)?;
+/// for contact in tldi.contacts(&world.narrow_phase, &world.colliders) {
+///     // Below the ball, to within the radius of a point.
+///     assert!(contact.point.length() < 0.05, "{}", contact.point);
+///     assert!(contact.normal.y.abs() > 0.99, "{}", contact.normal);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// The collider with the lower index.

@@ -1,28 +1,28 @@
-//! How large the pixels are in which pairs are compared: a setting, or what a budget allows.
+//! The size of the pixels in which pairs are compared: given, or chosen by a budget.
 
 use std::time::Duration;
 use tldi::plan::stride;
 
-/// By how much pixels grow at once under [`Resolution::Time`]: half as many pixels.
+/// Factor by which pixels grow at once under [`Resolution::Time`]. It halves their number.
 const COARSER: f32 = std::f32::consts::SQRT_2;
 
-/// Greatest pixel, in mean radii, that saves anything while clouds are not thinned: larger ones reach
-/// farther from the contact and show more points (`cargo run --release --bin budgets`).
+/// Largest pixel, in mean radii, that saves time while clouds are not thinned. Larger pixels reach
+/// farther from the contact and take more points (`cargo run --release --bin budgets`).
 const CHEAPEST: f32 = 1.5;
 
-/// Greatest pixel under [`Resolution::Time`], in mean radii: beyond, what does not depend on the pixels
-/// takes most of the time.
+/// Largest pixel under [`Resolution::Time`], in mean radii. Beyond it, most of the time does not
+/// depend on the pixels.
 const COARSEST: f32 = 8.0;
 
-/// Pixels shrink again where a step takes less than this share of the time: finer pixels, of which
-/// there are twice as many, then take less than all of it.
+/// Pixels shrink again if a step takes less than this share of the budget. The finer pixels are
+/// twice as many, and then still fit into it.
 const LEFT: f32 = 0.4;
 
 /// What decides the edge of the pixels of a [`TldiPipeline`](crate::TldiPipeline).
 ///
-/// Cost follows the number of pixels and points in the contact zone; of clouds much finer than
-/// pixels only as many points are looked at as pixels show. Bodies that are only a few pixels in
-/// size get finer ones, whatever is chosen here.
+/// Cost follows the number of pixels and points in the contact zone. Clouds that are much finer
+/// than the pixels are thinned to what the pixels can show. Bodies of only a few pixels get finer
+/// pixels, whatever this says.
 ///
 /// ```
 /// use rapier3d_tldi::prelude::*;
@@ -34,18 +34,18 @@ const LEFT: f32 = 0.4;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Resolution {
-    /// An edge of so many mean radii of the pair's coarser cloud, greater than 0. 1 resolves the
-    /// most that the points tell.
+    /// The edge of a pixel in mean radii of the pair's coarser cloud, greater than 0. 1 shows all
+    /// that the points tell.
     Radii(f32),
-    /// An error budget in metres, greater than 0. Gaps err by less than a pixel, at the corners of what
-    /// touches the most: pixels of this edge, but not smaller than a mean radius, nor
-    /// between 1.5 and the 4.1 radii from which on only a part of the points is looked at, which
-    /// cost more than 1.5.
+    /// An error budget in metres, greater than 0. It is the edge of the pixels, because gaps err by
+    /// less than a pixel, most at corners. Pixels are not smaller than a mean radius. Between 1.5
+    /// and 4.1 radii, 1.5 is taken: larger pixels cost more, until at 4.1 radii only a part of the
+    /// points is read.
     Error(f32),
-    /// A time budget for the comparisons of a step, longer than zero: a mean radius, but coarser by
-    /// and by, up to 8 and not between 1.5 and 4.1, while they take longer. What a step costs beside its pixels, a pass over the
-    /// points that are near, stays. Results then depend on the machine and its load: not for
-    /// simulations that are to be repeated.
+    /// A time budget for the comparisons of a step, longer than zero. Pixels begin with a mean
+    /// radius and grow while a step takes longer, up to 8 radii and not between 1.5 and 4.1. The
+    /// pass over the near points remains. Results depend on the machine and its load, so do not use
+    /// this in simulations that must be repeatable.
     Time(Duration),
 }
 

@@ -1,11 +1,12 @@
 //! Round contacts as of the middle of the step.
 //!
-//! Rapier holds a contact's points for a whole step, of which a body that rolls on one spot is behind by half a
-//! step at the end: seen from its centre of mass, gravity and contact are then a little off in the direction in
-//! which it turns. What rocks gains energy from it, in rapier's own shapes as well: a ball with its weight below
-//! the middle, 5 cm off its rest, rocks up to 10 rad/s and never comes to rest. So the points of round contacts are
-//! moved to where they will be, seen from the centre of mass, when half of the step is over. A ball's stay
-//! where they are.
+//! Rapier keeps a contact's points for a whole step. A body that rolls on one spot moves on
+//! meanwhile. On average the points are late by half a step. Seen from its centre of mass, gravity
+//! and contact are then a little off in the direction of the turn. A rocking body gains energy from
+//! this, also with rapier's own shapes: a ball with its weight below the middle, 5 cm off its rest,
+//! rocks at up to 10 rad/s and never comes to rest. So the points of round contacts are moved to
+//! where they will be after half of the step, seen from the centre of mass. The points of a ball
+//! stay where they are.
 
 use crate::candidates::{parent_of, pose_of};
 use crate::prepared::Batch;
@@ -14,8 +15,8 @@ use rapier3d::geometry::ColliderSet;
 use rapier3d::math::{AngVector, Vector};
 use tldi::ContactPatch;
 
-/// Most of a turn, in radians, that is foreseen: surfaces that turn farther in half a step have other radii of
-/// curvature there.
+/// Largest turn that is predicted, in radians. Surfaces that turn farther in half a step have other
+/// radii of curvature there.
 const FARTHEST_TURN: f32 = 0.1;
 
 /// Moves the round contacts of a batch that has its results to the middle of a step of `dt` seconds.

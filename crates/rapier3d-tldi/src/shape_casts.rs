@@ -1,11 +1,12 @@
 //! Shape casts: straight ones, and those of bodies that turn while they move.
 //!
-//! A turning body is cast in pieces. In each the rotation is that of the piece's middle and the
-//! middle of the smaller shape moves straight; what this displaces by is added to what counts as
-//! met, so that an impact is found too early rather than too late. What is beside that way and only
-//! turns towards the other shape is told by the contacts within its reach at the piece's beginning.
-//! Most motions meet nothing but what touches already, so pieces are first as long as a body may turn
-//! that rapier takes for slow, and those in which something is met are cast again in short ones.
+//! A turning body is cast in pieces. Within a piece, the rotation is that of the piece's middle,
+//! and the middle of the smaller shape moves straight. This displaces points. The displacement is
+//! added to the distance at which surfaces count as met, so an impact is found too early rather
+//! than too late. Some points do not lie in the way and only turn towards the other shape. Contacts
+//! within reach at the beginning of the piece find them. Most motions meet only what touches
+//! already. So pieces are long at first: as far as a body may turn that rapier calls slow. Only
+//! pieces in which something is met are cast again in short ones.
 
 use crate::exact::ExactShape;
 use crate::parts::{ShapePair, has_cloud, part, part_count, surface};
@@ -24,29 +25,32 @@ use tldi::{Impact, ImpactQuery, Params, Penetration};
 /// Most pieces of the motion of a body that turns.
 const MAX_PIECES: f32 = 64.0;
 
-/// By how much a piece may displace a point from where it truly is, in pixels. Less than the rim
-/// that casts of turning bodies spare.
+/// Largest displacement of a point within a piece, in pixels. It is less than the rim that casts of
+/// turning bodies leave out.
 const MAX_DISPLACEMENT: f32 = 0.5;
 
-/// The same, in CCD thicknesses, of pieces that only tell whether anything is met: the ends of a body then turn by
-/// half a thickness, from which on rapier takes it for fast.
+/// The same for pieces that only say whether anything is met, in CCD thicknesses. The ends of a
+/// body then turn by half a thickness; rapier calls a faster body fast.
 const SLOW: f32 = 0.25;
 
-/// Distance in pixels up to which surfaces count as touching: what their measured gap scatters by
-/// (0.1), twice, since contacts are kept until a pair has moved by as much.
+/// Distance in pixels up to which surfaces count as touching. It is twice the scatter of measured
+/// gaps (0.1), because contacts are kept until a pair has moved by that much.
 const TOUCHING: f32 = 0.2;
 
-/// How far off in multiples of it surfaces are met that close by more than it in a piece of a motion that goes on: the
-/// next piece may measure them as touching already.
+/// Factor of [`TOUCHING`] for fast surfaces: those that close by more than [`TOUCHING`] in one
+/// piece of a motion that continues. They are met at this larger distance. Otherwise the next piece
+/// could already measure them as touching, and miss them.
 const CLOSING: f32 = 1.5;
 
-/// Way in pixels within which a sweep of what is in contact holds it: contacts there are as uncertain.
+/// A sweep that stops a touching body within this distance, in pixels, holds it. Contacts are no
+/// more certain than that.
 const BLOCKED: f32 = 1.0;
 
-/// Depth in pixels from which on a pair is deep in contact: what slides over noise is not.
+/// Depth in pixels from which a pair is deep in contact. Bodies that slide over noise are
+/// shallower.
 const DEEP: f32 = 0.5;
 
-/// Longest straight cast in pixels: what the images resolve in depth.
+/// Longest straight cast in pixels. Images resolve no more in depth.
 const MAX_PIXELS: f32 = 131_072.0;
 
 /// Least cosine between normal and motion by which a target distance is divided: beyond, the

@@ -1,11 +1,11 @@
 //! The velocity of deforming surfaces, and how it reaches rapier's contacts.
 //!
-//! Rapier knows velocities of bodies. What a cloud's points do beside is told to its solver as the
-//! `tangent_velocity` of the solver contacts, which it treats as a motion of the first body's
-//! surface, along the normal as well. A penetration it undoes at a rate; so that a surface that
-//! comes nearer at some speed does not have to penetrate until that rate keeps up, contacts are
-//! told to be deeper by as much. What comes faster than rapier corrects pushes bodies before the step
-//! (`surface_push.rs`). The speed of what is sampled anew is measured (`sampled_motion.rs`).
+//! Rapier knows velocities of bodies, not of a cloud's points. The solver gets these as the
+//! `tangent_velocity` of its contacts. It treats that as a motion of the first body's surface,
+//! along the normal too. Rapier resolves a penetration at a rate. An approaching surface would have
+//! to penetrate until that rate keeps up, so contacts are reported deeper by that amount. Surfaces
+//! that approach faster than rapier corrects push bodies before the step (`surface_push.rs`). The
+//! speed of new samples is measured (`sampled_motion.rs`).
 
 use crate::PointCloudShape;
 use crate::sampled_motion::{Snapshot, way_along};
@@ -15,7 +15,7 @@ use rapier3d::math::Vector;
 use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
 use tldi::PointCloud;
 
-/// What is known of the motion of the clouds that got other points since the last step.
+/// The known motion of clouds that got other points since the last step.
 #[derive(Default)]
 pub(crate) struct SurfaceMotions {
     motions: Vec<SurfaceMotion>,
@@ -24,7 +24,7 @@ pub(crate) struct SurfaceMotions {
     /// does not move.
     undoing: [f32; 2],
     dt: f32,
-    /// Closing speed in m/s from which on bodies are pushed, or were in this step.
+    /// Least closing speed at which bodies are pushed, or were pushed in this step, m/s.
     least_push: f32,
     pushed: bool,
     /// Memory of those that were forgotten.
@@ -137,7 +137,7 @@ impl SurfaceMotions {
         self.pushed = false;
     }
 
-    /// Closing speed in m/s from which on bodies are pushed; says that they were.
+    /// Least closing speed at which bodies are pushed, m/s. Records that they were.
     pub(crate) fn begin_push(&mut self) -> f32 {
         self.pushed = true;
         self.least_push
@@ -224,8 +224,26 @@ fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector
     if total > 0.0 { sum / total } else { nearest.1 }
 }
 
-/// Hooks that hand the velocities of deforming clouds to rapier's solver, around those of the user.
-/// Got from [`TldiPipeline::hooks`](crate::TldiPipeline::hooks).
+/// Hooks around the user's own, which give the velocities of deforming clouds to rapier's solver.
+/// Get them from [`TldiPipeline::hooks`](crate::TldiPipeline::hooks).
+///
+/// ```
+/// use rapier3d::prelude::*;
+/// use rapier3d_tldi::prelude::*;
+/// let mut world = PhysicsWorld::default();
+/// let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// tldi.attach(&mut world);
+/// // What `TldiPipeline::step` does; `()` stands for hooks and event handler of your own.
+/// tldi.prepare(
+///     world.gravity,
+///     &world.integration_parameters,
+///     &world.bodies,
+///     &world.colliders,
+/// )?;
+/// world.step_with_events(&tldi.hooks(&()), &());
+/// tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
+/// # Ok::<(), TldiError>(())
+/// ```
 pub struct TldiHooks<'a> {
     pub(crate) motions: &'a SurfaceMotions,
     pub(crate) inner: &'a dyn PhysicsHooks,

@@ -1,10 +1,10 @@
-//! What a fast surface meets takes up its velocity.
+//! A body in the way of a fast surface takes its velocity.
 //!
-//! Rapier undoes a penetration at `max_corrective_velocity` at the most (3 m/s in a world of human
-//! size) and gives no velocity for it: a surface that moves faster passes through what it meets. A
-//! body has its own velocity in rapier's solver, a surface that deforms has not. So before the step
-//! bodies that such a surface is about to penetrate are given its velocity along the normal, as an
-//! inelastic impact would.
+//! Rapier resolves a penetration at `max_corrective_velocity` at most (3 m/s in a world of human
+//! size), and gives the body no velocity for it. So a faster surface passes through bodies. In
+//! rapier's solver a body has a velocity, but a deforming surface has none. Therefore, before the
+//! step, a body that such a surface is about to penetrate gets the surface's velocity along the
+//! normal, as in an inelastic impact.
 
 use crate::candidates::pose_of;
 use crate::impulses::{PushedPoint, separate, velocity_at};
@@ -16,8 +16,8 @@ use rapier3d::geometry::{Collider, ColliderSet};
 use rapier3d::math::{Pose, Vector};
 use tldi::PairResult;
 
-/// Steps in which a penetration is undone: what moves as fast as the surface rapier leaves as deep in
-/// it as it is. So much faster than the surface it is in the end.
+/// Steps in which a penetration is resolved. A body that moves exactly as fast as the surface would
+/// stay as deep as it is, so it ends up a little faster than the surface.
 const UNDONE_IN: f32 = 6.0;
 
 /// Gives the bodies in the way of surfaces that close faster than `least_speed` m/s their velocity.

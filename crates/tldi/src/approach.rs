@@ -10,8 +10,8 @@ const LEAST_PLAIN: f32 = 0.2;
 /// other.
 const PLAINLY: f32 = 0.5;
 
-/// Cosine between a motion and an axis from which on the motion tells from which side `b` came. One
-/// that passes along the surface more than it crosses it does not: a slope may lean either way.
+/// Least cosine between a motion and an axis at which the motion tells from which side `b` came.
+/// One that passes along the surface more than it crosses it does not: a slope may lean either way.
 const CROSSING: f32 = 0.5;
 
 /// For [`stage_constants`](crate::plan::stage_constants).
@@ -140,16 +140,16 @@ impl Approach {
         self.half_extents.dot((self.larger_from_a * axis).abs())
     }
 
-    /// Weight of the direction to `b`: 1 where it lies outside of where the bounds meet, or comes
-    /// from there; less inside, but enough to decide between walls that are alike.
+    /// Weight of the direction to `b`. It is 1 if `b` lies outside the overlap of the bounds, or
+    /// comes from there. Inside it is less, but enough to decide between two similar walls.
     pub fn plainness(&self) -> f32 {
         let inside = self.half_extent(self.direction()).max(f32::MIN_POSITIVE);
         (self.toward_b().length() / inside).clamp(LEAST_PLAIN, 1.0)
     }
 
-    /// Whether `b` lies on the side of `a` that `axis` points away from, so surely that nothing else
-    /// needs to be asked: its middle, or where it came from, is plainly off the points of `a` that
-    /// are near, or else outside of where the bounds meet.
+    /// Whether `b` surely lies on the side of `a` that `axis` points away from. This is so if its
+    /// middle, or the place it came from, is plainly off the near points of `a`, or outside the
+    /// overlap of the bounds.
     pub(crate) fn side_by_position(&self, axis: Vec3) -> Option<bool> {
         let side = |from: Vec3| match self.sheet {
             Some(sheet) => self.body.side(sheet, axis, from),
@@ -163,10 +163,10 @@ impl Approach {
         before.or_else(|| side(Vec3::ZERO))
     }
 
-    /// Towards which side of `a` `b` seems to lie, or to come from, along `axis`, when nothing is sure: by
-    /// its middle and the near points where they may be a sheet, in half extents of the body, since the
-    /// bounds of a sheet that is not level in its own frame hold a body on either side of it; elsewhere
-    /// by the bounds, as a cosine.
+    /// The side of `a` on which `b` seems to lie, or from which it seems to come, along `axis`,
+    /// when nothing is certain. If the near points may be a sheet, `b`'s middle and these points
+    /// decide, in half extents of the body: the bounds of a tilted sheet hold a body on either side
+    /// of it. Elsewhere the bounds decide, as a cosine.
     pub(crate) fn leaning(&self, axis: Vec3) -> f32 {
         match self.sheet {
             Some(sheet) => self.body.share_along(axis, sheet, -self.motion),

@@ -1,4 +1,4 @@
-//! The seam between callers and implementations: a batch of pairs in, a result per pair out.
+//! The interface of a backend: a batch of pairs goes in, one result for each pair comes out.
 
 use crate::{CameraPolicy, ContactPatch, ContactPixel, Params, Surface, VirtualCamera, Work};
 use glamx::{Pose3, Vec3};
@@ -14,17 +14,17 @@ pub enum View {
         /// What decides the axes.
         policy: CameraPolicy,
         /// Motion of `b` relative to `a` over the step, gravity included, in the frame of `a`,
-        /// metres: tells from which side `b` comes, where the bounds and normals do not.
+        /// metres. It tells from which side `b` comes if bounds and normals do not.
         motion: Vec3,
-        /// Axis of the pair's main view in the frame before, in the frame of `a`: the side that `b`
-        /// was on is kept, and the axis while the zone's normals agree with it within
+        /// Axis of the pair's main view in the last frame, in the frame of `a`. `b` stays on its
+        /// side. The axis is kept while the normals of the contact zone agree with it within
         /// [`AXIS_HYSTERESIS`](crate::AXIS_HYSTERESIS), so that the pixel grid does not flicker.
         last_axis: Option<Vec3>,
     },
 }
 
 impl View {
-    /// Aimed at the contact zone, and where it shows no crossing, in all directions; without motion or
+    /// Aimed at the contact zone and, if it shows no crossing, in all directions. Without motion or
     /// memory.
     pub fn aimed() -> Self {
         Self::Aim {
@@ -53,25 +53,26 @@ pub struct PairQuery<'a> {
 /// What the comparison of one pair found. All vectors are in the frame of the first surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PairResult {
-    /// Whether the views show that the surfaces cross, in more than one place, or that the solids
-    /// overlap where normals tell inside from outside. Walls that cross where all views see them
-    /// edge-on are missed: [`CameraPolicy::AllDirections`] leaves no such walls.
+    /// Whether the surfaces cross in more than one place, as far as the views show, or, if normals
+    /// tell inside from outside, the solids overlap. Walls that all views see edge-on are missed.
+    /// [`CameraPolicy::AllDirections`] leaves no such walls.
     pub collides: bool,
     /// Least signed gap in metres over all pixels that both surfaces cover (negative:
     /// penetration), or `None` where no pixel is shared within reach.
     pub gap: Option<f32>,
-    /// Axes of the views that contacts are from, unit length, from `b` towards `a`; empty after an early
-    /// rejection.
+    /// Unit axes of the views in which contacts were found, from `b` towards `a`. Empty after an
+    /// early rejection.
     pub axes: Vec<Vec3>,
     /// Pixels where the surfaces are within [`Params::prediction`] or penetrate.
     pub contacts: Vec<ContactPixel>,
-    /// How many times as large as asked for the pixels of the contacts are, and the grid of their columns and rows
-    /// with them: where a first look settled what is deep, where the points that are near are coarser than the cloud's mean,
-    /// or where there were too many pixels for the points. `None` where they have the size of [`Params::pixel_size`].
+    /// The factor by which the pixels of the contacts, and their grid of columns and rows, are
+    /// larger than [`Params::pixel_size`]. There are three reasons: a first look settled a deep
+    /// contact, the near points are coarser than the cloud's mean, or there were too many pixels
+    /// for the points. `None` if the pixels have the size that was asked for.
     pub coarser: Option<f32>,
     /// The contact pixels grouped and reduced to what a solver needs, deepest patch first.
     pub patches: Vec<ContactPatch>,
-    /// How much was modelled to find this; zero from the GPU.
+    /// How much was drawn to find this. The GPU leaves it at zero.
     pub work: Work,
 }
 
@@ -100,7 +101,7 @@ pub enum BackendError {
         /// What is not supported, and what to do instead.
         reason: &'static str,
     },
-    /// A device failed. What it says, and of which device.
+    /// A device failed. The text names the device and gives its message.
     #[error("{0}")]
     Device(String),
 }
@@ -116,13 +117,13 @@ pub trait Backend: Send {
         None
     }
 
-    /// Why batches are compared on the CPU though a GPU would be taken; `None` where nothing failed.
+    /// Why the CPU compares batches although a GPU was wanted. `None` if nothing failed.
     fn fallback(&self) -> Option<&str> {
         None
     }
 
-    /// Compares every pair of the batch; `results` gets one entry a pair, in order. Entries that
-    /// are already there are reused, so that a warm caller allocates nothing.
+    /// Compares every pair of the batch. `results` gets one entry for each pair, in order. Existing
+    /// entries are reused, so a warm caller allocates nothing.
     fn compare(
         &mut self,
         batch: &[PairQuery<'_>],

@@ -1,11 +1,12 @@
-//! The bowl that gaps form around the contact of a round surface: where it is lowest, and how surely.
+//! The bowl that gaps form around the contact of a round surface: where it is lowest, and how
+//! certain that is.
 
 use crate::supports::ramp;
 use crate::{ContactPixel, ContactPoint};
 use glamx::{Vec2, Vec3};
 
-/// Share of the roughness that a bowl leaves at the most. A small flat face whose rim is bent by
-/// estimated normals is no bowl, nor is a crease.
+/// Largest share of the roughness that a bowl may leave. A small flat face whose rim is bent by
+/// estimated normals is no bowl. Neither is a crease.
 const UNEXPLAINED: f32 = 0.1;
 
 /// The same of at least [`MANY`] points: noise of a quarter of a radius leaves a third of a ball's.
@@ -14,27 +15,28 @@ const UNEXPLAINED_OF_MANY: f32 = 0.5;
 /// The same of a valley: the ends of a cylinder are bent by their rims.
 const UNEXPLAINED_OF_VALLEY: f32 = 0.4;
 
-/// Points from which on noise is told from a rim or a crease.
+/// Number of points from which noise can be told from a rim or a crease.
 const MANY: f32 = 30.0;
 
-/// Farthest that the lowest point of a bowl is from the middle of the points, in standard deviations
-/// along each main axis. In a disc the rim is at 2.
+/// Largest distance of a bowl's lowest point from the middle of the points, in standard deviations
+/// along each main axis. The rim of a disc is at 2.
 const LOWEST: f32 = 1.5;
 
-/// By how much less a bowl may widen along one main axis than along the other, in standard deviations of its
-/// points: a whole bowl, however oblong, widens alike in those, and along an edge only noise does.
+/// Least ratio between the widening of a bowl along its two main axes, in standard deviations of
+/// its points. In these units, a whole bowl widens equally, however oblong it is. Along an edge,
+/// only noise widens.
 const LEAST_ALIKE: f32 = 0.3;
 
-/// Points that a bowl needs at least: it has five unknowns, and through as few points there is
-/// always one, with its lowest point anywhere.
+/// Fewest points of a bowl. It has five unknowns, so a bowl fits any five points, with its lowest
+/// point anywhere.
 const LEAST_POINTS: f32 = 6.0;
 
-/// Least spread of the squares of places, as a share of what they have in a disc, and least part of
-/// it that is not common to both axes: of places that differ less the bend is the noise of numbers.
+/// Least spread of the squares of places, as a share of that in a disc, and least part of it that
+/// the axes do not have in common. If places differ less, rounding decides the bend.
 const LEAST_SPREAD: f32 = 0.02;
 
-/// Pixels that have errors in common, since they see the same points. Measured: lowest points of a ball on a
-/// plane whose samples are noisy scatter 1.5 times as much as if each pixel erred for itself.
+/// Pixels that share their errors because they see the same points. Measured: the lowest points of
+/// a ball on a noisy plane vary 1.5 times as much as with independent pixels.
 const ALIKE: f32 = 2.4;
 
 /// Standard errors within which the lowest point of a bowl is taken to be.
@@ -48,8 +50,9 @@ pub(crate) const GAP_PER_SLOPE: f32 = 2.0;
 /// over 5 × 5 pixels keeps 0.39.
 const OFF_FIT: f32 = 0.92;
 
-/// Errors of gaps, in pixels, from which on they begin to be noise, and from which on they are. Those of smooth
-/// surfaces are 0.01 to 0.04, those of samples with noise of a quarter of a radius 0.12 to 0.2.
+/// Errors of gaps, in pixels, at which they begin to count as noise, and at which they fully do.
+/// Those of smooth surfaces are 0.01 to 0.04, those of samples with noise of a quarter of a radius
+/// 0.12 to 0.2.
 const NOISE: [f32; 2] = [0.04, 0.06];
 
 /// Most by which normals and gaps tell different radii of a surface: beyond, the normals are not those of the
@@ -84,7 +87,8 @@ pub(crate) struct Valley {
     pub(crate) across: usize,
     /// Where its floor is along that axis, in standard deviations.
     pub(crate) place: f32,
-    /// By how much the gaps rise with the square of the distance from there, in standard deviations, metres.
+    /// Rise of the gaps with the square of the distance from there, metres; distances in standard
+    /// deviations.
     pub(crate) bend: f32,
 }
 
@@ -279,7 +283,7 @@ mod tests {
         }
     }
 
-    /// What widens along one axis only, as around the edge of a box, is no bowl, whatever noise there is.
+    /// Gaps that widen along one axis only, as around the edge of a box, are no bowl, at any noise.
     #[test]
     fn a_noisy_edge_is_no_bowl() {
         let mut rng = Rng::with_seed(13);

@@ -41,8 +41,8 @@ pub struct VirtualCamera {
     pub view_from_frame: Pose3,
     /// How view coordinates become pixels.
     pub projection: Projection,
-    /// Number of columns and rows of a fixed image; `None` lets the image follow what is seen
-    /// (orthographic cameras only).
+    /// Number of columns and rows of a fixed image. With `None`, the image is as large as what the
+    /// camera sees (orthographic cameras only).
     pub size: Option<[u32; 2]>,
 }
 

@@ -1,13 +1,13 @@
 //! Stage `aim`: the axes from which a pair is looked at.
 //!
-//! A camera should see the touching surfaces face on: depths along its axis are then distances. So
-//! the first axis is the top eigenvector of Σ n nᵀ over the near points of both surfaces. An axis
-//! along the motion is right for an impact, but looks along the surface whenever bodies slide,
-//! spin or rest. Where both surfaces also meet on faces that the first axis sees edge-on (a corner,
-//! a groove), up to two more axes follow.
+//! A camera should see the touching surfaces face on, because depths along its axis are then
+//! distances. So the first axis is the main eigenvector of Σ n nᵀ over the near points of both
+//! surfaces. An axis along the motion suits an impact, but looks along the surface when bodies
+//! slide, spin or rest. Up to two more axes follow if the surfaces also meet on faces that the
+//! first axis sees edge-on, as in a corner or a groove.
 //!
-//! What the motion, the bounds, the last axis and the outside of the surfaces tell is on which side
-//! of `a` lies `b`: the sign of the axis.
+//! The sign of the axis says on which side of `a` the body `b` lies. The motion, the bounds, the
+//! last axis and the outsides of the surfaces decide it.
 
 use crate::AXIS_HYSTERESIS;
 use crate::approach::Approach;
@@ -17,19 +17,18 @@ use glamx::{DMat3, DVec3, Mat3, Vec3};
 
 /// How the axes of a pair's views are chosen.
 ///
-/// The first is for contacts, the second for questions whether surfaces meet. All others are there to be
-/// compared with the first: see the chart of contact errors against the angle of motion, and the
-/// stability suite.
+/// The first is for contacts, the second for the question whether surfaces meet. The others exist
+/// for comparison: see the chart of contact errors against the angle of motion, and the stability
+/// suite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum CameraPolicy {
     /// By the normals of the contact zone; kept from frame to frame while they agree with it within
     /// [`AXIS_HYSTERESIS`]; up to three views.
     #[default]
     ContactZone,
-    /// As [`ContactZone`](Self::ContactZone), whose views all contacts come from. Where these show no
-    /// crossing, further views look for one, until three axes span all directions: what asks
-    /// whether surfaces meet should not miss walls that cross where the others see them edge-on. Up to
-    /// two more views.
+    /// As [`ContactZone`](Self::ContactZone), whose views give all contacts. If they show no
+    /// crossing, up to two more views follow, until three axes span all directions. So a query
+    /// whether surfaces meet does not miss walls that the first views see edge-on.
     AllDirections,
     /// One view against the motion of `b` relative to `a`; without motion, by the bounds.
     Motion,
@@ -55,13 +54,13 @@ const SUPPORTED: f32 = 0.5;
 const LEAST_SHARE: f32 = 0.05;
 
 /// Mean of n·v, over the normals that face an axis, below which their signs say nothing about the
-/// side (a ring around a deep contact has its normals all around the axis); likewise the least
+/// side. (A ring around a deep contact has normals all around the axis.) It is also the least
 /// cosine between an axis and the last one.
 const CONCLUSIVE: f32 = 0.3;
 
-/// Weight of the direction to `b`, where it plainly lies or comes from there, beside the normals of a
-/// surface: where bodies are deep in each other or their sides are flush, normals point all around.
-/// Turns the axis of a flat contact by 8° at the most.
+/// Weight of the direction to `b`, if `b` plainly lies or comes from there, beside the normals of a
+/// surface. It matters if bodies are deep in each other or their sides are flush, because normals
+/// then point all around. It turns the axis of a flat contact by 8° at most.
 const HINT_WEIGHT: f32 = 0.5;
 
 /// Weight of the last axis beside the normals of a surface.
@@ -178,10 +177,10 @@ fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec
 
 /// The axis or its opposite, such that it points from `b` towards `a`; and whether anything told.
 ///
-/// The side that a body was on it keeps, whatever it looks like now: that is what holds it on a
-/// sheet without an inside. Next come surfaces that both show their outsides to each other, then
-/// where the body plainly lies; one surface alone, which may be thin and passed already, only tells
-/// of what is deep in it.
+/// A body keeps its side, whatever it looks like now. This holds it on a sheet without an inside.
+/// Next, two surfaces that show each other their outsides decide; then the place where the body
+/// plainly lies. One surface alone may be thin and passed already, so it only decides about deep
+/// bodies.
 fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3, bool) {
     let conclusive = |sign: f32| (sign.abs() >= CONCLUSIVE).then_some(sign > 0.0);
     let by_memory = conclusive(approach.last_axis.map_or(0.0, |last| axis.dot(last)))

@@ -14,13 +14,13 @@ pub struct ContactPixel {
     pub point_a: Vec3,
     /// Point on the second surface, metres; on the same ray as `point_a`.
     pub point_b: Vec3,
-    /// Outward normal of the first surface (towards the second), of unit length on a face and shorter at an edge
-    /// ([`Layer::agreement`](crate::Layer::agreement)).
+    /// Outward normal of the first surface, towards the second. It has unit length on a face and is
+    /// shorter at an edge ([`Layer::agreement`](crate::Layer::agreement)).
     pub normal_a: Vec3,
-    /// Outward normal of the second surface (towards the first), as long likewise.
+    /// Outward normal of the second surface, towards the first, with its length as for `normal_a`.
     pub normal_b: Vec3,
-    /// Signed distance between the surfaces along the normal, metres; negative: penetration, cut to
-    /// what the neighbouring pixels confirm.
+    /// Signed distance between the surfaces along the normal, metres. A penetration is negative,
+    /// and cut to what the neighbouring pixels confirm.
     pub gap: f32,
 }
 
@@ -55,29 +55,30 @@ impl ContactPoint {
     }
 }
 
-/// Most points in one patch: what a solver manifold takes.
+/// Most points in one patch, as many as a solver's manifold takes.
 pub const PATCH_POINTS: usize = 4;
 
-/// Neighbouring contact pixels of like normal, reduced to a few points chosen for depth and extent.
+/// Neighbouring contact pixels with one normal, reduced to a few points that are far out or deep.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactPatch {
     /// Unit normal from the first surface towards the second, in the frame of the first.
     pub normal: Vec3,
     /// One to [`PATCH_POINTS`] points.
     pub points: arrayvec::ArrayVec<ContactPoint, PATCH_POINTS>,
-    /// Where the gaps form a bowl, along both of its main axes a vector as long as the relative radius of
-    /// curvature of the surfaces, 1 / (1 / R_a + 1 / R_b), metres: the bowl's lowest point moves by as much for
-    /// each radian that they turn. That point is the only one, and what touches there rolls; where noise leaves
-    /// open where it is, there are four around it, as far apart. Along a line, as of a cylinder on a floor, the
-    /// second vector is zero and the points are the line's ends.
+    /// Set if the gaps form a bowl, so that the contact rolls. There is one vector along each main
+    /// axis, as long as the relative radius of curvature of the surfaces, 1 / (1 / R_a + 1 / R_b),
+    /// metres. The bowl's lowest point moves by that length for each radian of turn. The lowest
+    /// point is then the only one. If noise hides where it is, four points stand around it at the
+    /// distance of the uncertainty. On a line, such as a cylinder on a floor, the second vector is
+    /// zero, and the points are the ends of the line.
     pub relative_radii: Option<[Vec3; 2]>,
-    /// Standard deviation, in metres, of the gaps about a plane or, where they form one, a bowl: how
-    /// far the measured gap of one point can be trusted.
+    /// Standard deviation of the gaps about a plane or bowl, in metres. It says how far the gap of
+    /// one point can be trusted.
     pub roughness: f32,
 }
 
 impl ContactPatch {
-    /// Whether the surfaces touch in one round spot, or along a line, on which they roll.
+    /// Whether the surfaces touch in one round spot, or along a line, and so roll.
     pub fn is_round(&self) -> bool {
         self.relative_radii.is_some()
     }

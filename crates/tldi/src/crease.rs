@@ -1,37 +1,37 @@
-//! How low a contact is where faces meet in an edge or a corner.
+//! How deep a contact is at an edge or a corner.
 //!
-//! Pixels see such a contact beside its lowest place, and what is fitted through them is rounded: edges
-//! would be felt 0.3 pixels too high, corners 0.5. Their normals tell the faces, and the contact is
-//! where the planes of these meet. An edge that is rounded by less than two pixels is taken for sharp:
-//! in the pixels on it all are.
+//! Pixels see such a contact beside its lowest place, and a fit through them is rounded: edges
+//! would be 0.3 pixels too high, corners 0.5. Their normals tell the faces, and the contact is
+//! where the planes of the faces meet. An edge that is rounded by less than two pixels counts as
+//! sharp, because in its pixels all edges are round.
 
 use crate::supports::ramp;
 use crate::{ContactPixel, ContactPoint};
 use arrayvec::ArrayVec;
 use glamx::{Mat3, Vec2, Vec3};
 
-/// Most faces that meet: what is pointed has three, or three of its faces tell.
+/// Most faces that meet. A corner has three, or three of its faces suffice.
 const MOST_FACES: usize = 3;
 
-/// How much the slopes of the gaps over two faces differ from which on they begin to be two, and from which on they
-/// are.
+/// Difference between the slopes of the gaps over two faces at which they begin to count as two,
+/// and at which they fully do.
 const APART: [f32; 2] = [0.5, 1.0];
 
-/// How much the slope of the gaps in a pixel may differ from that over its face, while that is sought and once it
-/// is found; of steep faces more.
+/// Largest difference between the slope of the gaps in a pixel and that over its face, while the
+/// face is searched and once it is found. Steep faces are allowed more.
 const NEAR_FACE: f32 = 0.3;
 const OF_FACE: f32 = 0.15;
 
-/// Least share of the pixels of a face, and share of those of all faces from which on these begin to be what is
-/// there, and from which on they are: noise has normals of all kinds.
+/// Least share of the pixels that a face needs. And the share of the pixels of all faces at which
+/// faces begin to explain the contact, and at which they fully do. Noise has normals of all kinds.
 const LEAST_SHARE: f32 = 0.05;
 const OF_FACES: [f32; 2] = [0.25, 0.45];
 
-/// How far in pixels the lowest pixel is above all faces where these begin not to be what is there, and where
-/// they are not: what is round is above its tangents.
+/// Height in pixels of the lowest pixel above all faces at which faces begin to fail as an
+/// explanation, and at which they do fail. A round surface is above its tangents.
 const ROUND: [f32; 2] = [0.1, 0.25];
 
-/// Most that faces meet below the lowest pixel, in pixels.
+/// Largest distance at which faces may meet below the lowest pixel, in pixels.
 const LOWEST: f32 = 1.0;
 
 /// Most by which a gap along the normal of the contact and one along the pixel's own differ.
@@ -89,8 +89,8 @@ impl Frame {
     }
 }
 
-/// By how much, in metres, the contact of `pixels` is lower than `deepest`, the lowest of the points that were fitted
-/// to them. `tangents` is overwritten.
+/// How far the contact of `pixels` is below `deepest`, the lowest of the points that were fitted to
+/// them, metres. `tangents` is overwritten.
 pub(crate) fn lower_by<'a>(
     pixels: impl Iterator<Item = &'a ContactPixel> + Clone,
     frame: &Frame,

@@ -25,7 +25,8 @@ impl Gathered {
         for axis in [&mut self.x, &mut self.y, &mut self.z] {
             axis.resize(count, 0.0);
         }
-        // Block by block, so that its bounds are taken of what is still in the core's cache.
+        // Block by block, so that the points are still in the core's cache when its bounds are
+        // taken.
         let (x, y, z) = (&mut self.x, &mut self.y, &mut self.z);
         let blocks = x
             .chunks_mut(BLOCK)

@@ -12,25 +12,26 @@ pub struct ImpactQuery<'a> {
     pub b: Surface<'a>,
     /// From the frame of `b` into the frame of `a`, before the motion.
     pub a_from_b: Pose3,
-    /// The motion of `b`, in the frame of `a`, metres; it does not turn. Up to 2¹⁷ merge gaps
-    /// (2.6 km for radii of 1 cm) are resolved.
+    /// The motion of `b` in the frame of `a`, metres, without a turn. Up to 2¹⁷ merge gaps (2.6 km
+    /// for radii of 1 cm) are resolved.
     pub motion: Vec3,
-    /// What is nearer than this along the motion at its beginning, metres, touches already: it is
-    /// met only if the motion goes on towards it by more than a pixel, and what is behind it may be
-    /// met instead.
+    /// Surfaces that are nearer than this along the motion at its beginning, metres, touch already.
+    /// They are met only if the motion goes on towards them by more than a pixel. Otherwise the
+    /// surface behind them may be met.
     pub touching: f32,
-    /// Whether the rim of `b` passes what it meets: a body that slides along a rough surface is not
-    /// stopped by it. It is two pixels wide, and a third one where the motion does not go on by more
-    /// than three towards what is there; less where `b` is not wider than that.
+    /// Whether the rim of `b` is left out, so that a rough surface does not stop a body that slides
+    /// along it. The rim is two pixels wide, or three where the motion goes on by no more than
+    /// three pixels towards what is there. It is narrower if `b` itself is.
     pub core_only: bool,
-    /// How `b` is in `a` before the motion, if it is known on which side of `a` it belongs: on its way there it
-    /// passes what it is in.
+    /// The penetration of `b` into `a` before the motion, if its side of `a` is known. On its way
+    /// there, `b` passes the surface that it is in.
     pub penetration: Option<Penetration>,
     /// Parameters of the images; `prediction` adds to the region that is looked at.
     pub params: Params,
 }
 
-/// How a surface is in another one that has no inside. Vectors are in the frame of the first surface.
+/// The penetration of a surface into another one that has no inside. Vectors are in the frame of
+/// the first surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Penetration {
     /// Unit normal from the first surface towards where the second one belongs.

@@ -1,5 +1,5 @@
 //! Thickened layered depth images (TLDI) of point clouds: collision, gap and contacts between
-//! unstructured point sets that may be all new in every frame.
+//! unstructured point sets. The points may all be new in every frame.
 //!
 //! This crate knows nothing of physics engines, GPUs or file formats; `rapier3d-tldi` connects it
 //! to rapier.
@@ -61,6 +61,6 @@ pub use supports::{Supports, supports};
 pub use surface::{DeviceCloud, RayHit, RaySurface, Surface};
 pub use work::{Looked, Work};
 
-/// A view axis is kept from frame to frame while the zone's normals agree with it within this
-/// angle, in radians (10°).
+/// A view axis is kept from frame to frame while the normals of the contact zone agree with it
+/// within this angle, in radians (10°).
 pub const AXIS_HYSTERESIS: f32 = 0.1745;

@@ -1,4 +1,4 @@
-//! Which contact pixels continue each other, and which of them that confirms.
+//! Which contact pixels continue each other, and which penetrations their neighbours confirm.
 
 use crate::{ContactPixel, PairResult, Params};
 use std::ops::Range;
@@ -6,11 +6,11 @@ use std::ops::Range;
 /// Neighbouring pixels are linked if their points on either surface are within this many pixels.
 const SAME_SURFACE_PX: f32 = 3.0;
 
-/// Linked neighbours, of eight, that confirm a penetration of a layer's thickness (the merge gap);
-/// fewer confirm as much less. At the rim of a body a ray runs along its side, whose depth is
-/// uncertain, or misses a layer and seems to run inside as far as the next one. Such pixels are
-/// alone or follow the rim in rows of one or two; surfaces that truly are so deep in each other
-/// overlap over more.
+/// Linked neighbours, of eight, that confirm a penetration of a layer's thickness (the merge gap).
+/// Fewer confirm proportionally less. At the rim of a body, a ray runs along its side, whose depth
+/// is uncertain, or misses a layer and seems to run inside up to the next one. Such pixels are
+/// alone or follow the rim in rows of one or two. Surfaces that really are so deep in each other
+/// overlap over more pixels.
 const CONFIRMING: u32 = 5;
 
 /// From a pixel to its neighbours that come after it, row by row: columns and rows.
@@ -41,8 +41,9 @@ impl Links {
         let limit = SAME_SURFACE_PX * params.pixel_size;
         let mut first = 0;
         for view in contacts.chunk_by(|c, d| c.view == d.view) {
-            // The first contact pixel not before each of the pixels that come after one: they move on as it does, so
-            // that nothing is as large as the bounds of the pixels.
+            // For each pixel that comes after the present one, the first contact pixel that is not
+            // before it. These positions move on together, so no map as large as the bounds of the
+            // pixels is needed.
             let mut starts = [0; AFTER.len()];
             for (k, c) in view.iter().enumerate() {
                 for (start, offset) in starts.iter_mut().zip(AFTER) {

@@ -1,8 +1,9 @@
 //! Points that stand alone beside a surface: flying pixels, dust.
 //!
-//! A splat around a few points is no surface. A point stands alone if its fourth nearest neighbour is
-//! much farther away than that of one of these four is from it. So the points of a wire, of a coarse
-//! part of a scan and of a body that consists of a few points do not.
+//! Splats around a few points are no surface. A point stands alone if its fourth nearest neighbour
+//! is much farther away than the fourth neighbour of one of these four is from that one. By this
+//! rule, the points of a wire, of a coarse part of a scan and of a body of few points do not stand
+//! alone.
 
 use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
 use crate::cpu::zone::AroundPlaces;

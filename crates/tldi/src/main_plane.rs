@@ -1,21 +1,21 @@
-//! The plane on which most of some heights lie, whatever the others do.
+//! The plane on which most heights lie, whatever the others do.
 
 use glamx::{Mat3, Vec2, Vec3};
 
-/// Fewer heights tell nothing of a plane.
+/// Fewest heights that determine a plane.
 const LEAST_HEIGHTS: usize = 12;
 
 /// Of more heights every second, third and so on is enough: they tell a plane to a twentieth of their
 /// deviation.
 const MOST_HEIGHTS: usize = 384;
 
-/// Rounds of the fit, and by how much the deviation that counts shrinks in each: from all that there
-/// are to `near`, a factor of 20.
+/// Rounds of the fit, and the factor by which the deviation that counts shrinks in each: 20 in all,
+/// from all heights to `near`.
 const ROUNDS: i32 = 6;
 const NARROWER: f32 = 0.6;
 
-/// What the heights that count must tell at least of a plane, as a share of what as many, of unit
-/// variance, would: in a row they leave a slope open.
+/// Least information about a plane in the heights that count, as a share of that in as many heights
+/// of unit variance. Heights in a row leave a slope undetermined.
 const LEAST_KNOWN: f32 = 1e-3;
 
 /// A plane over places: its height at the origin, and its slopes.

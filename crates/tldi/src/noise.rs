@@ -1,4 +1,4 @@
-//! What the noise of points alone makes of a least gap, where a user tells how large it is.
+//! How far known noise of the points shortens the least gap.
 
 use crate::{PairQuery, PairResult};
 
@@ -8,8 +8,9 @@ use crate::{PairQuery, PairResult};
 /// contacts of meshes of 1,000 points.
 const CLOSER_PX: f32 = 0.7;
 
-/// Raises the gap of `result` by what noise makes of it, and takes back a collision that noise alone
-/// explains. `fitted` is the least gap of surfaces fitted to neighbouring contact pixels, if there are any.
+/// Adds to the gap of `result` what noise took from it, and withdraws a collision that noise alone
+/// explains. `fitted` is the least gap of surfaces fitted to neighbouring contact pixels, if there
+/// are any.
 pub(crate) fn allow_for_noise(result: &mut PairResult, fitted: Option<f32>, query: &PairQuery) {
     let noise = 0.5 * (query.a.noise().powi(2) + query.b.noise().powi(2));
     if noise == 0.0 {

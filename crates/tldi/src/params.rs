@@ -5,10 +5,11 @@ use bytemuck::{Pod, Zeroable};
 /// Which construction of the layers and which comparison a pair uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Variant {
-    /// Flat cylinders, stacks, Gaussian blending, range overlap with compression ρ: the method of
-    /// Radwan, Ohrhallinger and Wimmer (Graphics Interface 2014), kept as the baseline.
+    /// The method of Radwan, Ohrhallinger and Wimmer (Graphics Interface 2014), kept as the
+    /// baseline: flat cylinders, stacks, Gaussian blending, range overlap with compression ρ.
     Paper,
-    /// Oriented splats and sign change: sharper by an order of magnitude, needs no closed surface.
+    /// Oriented splats and sign change. It is an order of magnitude sharper and needs no closed
+    /// surface.
     #[default]
     Oriented,
 }
@@ -27,16 +28,16 @@ pub enum Variant {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Params {
-    /// Edge of a pixel at the surface, in metres. Coarser than r̄ loses detail, finer costs time
-    /// and lets noise through; r̄ was best (design notes, "What was tried", 3).
+    /// Edge of a pixel at the surface, in metres. Larger pixels than r̄ lose detail. Smaller ones
+    /// cost time and let noise through. r̄ was best (design notes, "What was tried", 3).
     pub pixel_size: f32,
-    /// Fragments of one pixel whose depths follow each other by no more than this belong to one layer, in
-    /// metres; by more, the noisier the cloud is told to be, and where the surface is steep by a thickness.
-    /// Sheets farther apart than this are two.
+    /// Largest distance in depth between successive fragments of one layer, in metres. It is larger
+    /// for clouds with given noise, and a thickness where the surface is steep. Sheets farther
+    /// apart than this are two layers.
     pub merge_gap: f32,
-    /// How thick a surface is, in metres: layers of neighbouring pixels whose depths differ by no more
-    /// continue each other, and what is no deeper in a surface touches it. Two balls of radius r̄ overlap in
-    /// depth up to 2 r̄.
+    /// Thickness of a surface, in metres. Layers of neighbouring pixels continue each other if
+    /// their depths differ by no more than this. A body that is no deeper than this in a surface
+    /// touches it. Two balls of radius r̄ overlap in depth up to 2 r̄.
     pub thickness: f32,
     /// Contacts with a gap up to this are reported, in metres (rapier's prediction distance).
     pub prediction: f32,

@@ -26,13 +26,13 @@ const LEAST_ROUGHNESS: f32 = 0.05;
 /// Band above the smallest gap, in pixels, over which the deepest point is a mean.
 const DEEPEST_BAND: f32 = 0.1;
 
-/// By how much that point must be deeper than the support points to count, in roughnesses: on flat
-/// faces it is noise, and four corners bear more than three.
+/// How much deeper than the support points that point must be to count, in units of the roughness.
+/// On flat faces the difference is noise, and four corners carry more than three.
 const DEEPER: f32 = 0.4;
 
-/// Roughness, in pixels, from which on a bend of the surfaces does not count as such. Gaps that rise
-/// through all of the support band, as around a ball's contact, deviate from a plane by 0.29; those
-/// of a small face whose rim is blurred by estimated normals by 0.1.
+/// Roughness, in pixels, above which a bend of the surfaces does not count. Gaps that rise through
+/// all of the support band, as around a ball's contact, deviate from a plane by 0.29; those of a
+/// small face whose rim is blurred by estimated normals by 0.1.
 const LEAST_RISE: f32 = 0.15;
 
 /// Share of the variance of normals across a valley that a steady turn explains at least. Measured: 0.98 and more of
@@ -135,8 +135,8 @@ impl Shape {
         members.partition_point(|&m| !behind(m))
     }
 
-    /// The patch's support points and, in place of the highest of these, its deepest point where
-    /// that is clearly deeper (a ball's).
+    /// The patch's support points. If its deepest point is clearly deeper, as a ball's is, it
+    /// replaces the highest of them.
     pub(crate) fn patch(
         &self,
         members: &[u32],
@@ -283,9 +283,9 @@ impl Shape {
     }
 }
 
-/// Unit normal from the first surface towards the second, from the means of unit normals of both:
-/// weighted by the inverse of their variance, so that the flat side of an edge on a face, and the
-/// smooth side of a noisy scan, decide.
+/// Unit normal from the first surface towards the second. It is the mean of both surfaces' mean
+/// normals, weighted by the inverse of their variances. So a face decides at an edge, and the
+/// smooth side decides on a noisy scan.
 pub(crate) fn common_normal(mean_a: Vec3, mean_b: Vec3) -> Option<Vec3> {
     let weighted = |mean: Vec3| {
         let spread = (1.0 - mean.length()).max(0.0);

@@ -15,7 +15,7 @@ use arrayvec::ArrayVec;
 use glamx::Vec3;
 use std::ops::Range;
 
-/// Most patches of one pair, the deepest: a solver gains nothing from more.
+/// Most patches of one pair. The deepest are kept; a solver gains nothing from more.
 pub const MAX_PATCHES: usize = 32;
 
 /// Linked pixels belong to one group if their smoothed normals are within 30°.
@@ -73,12 +73,12 @@ struct Part {
 }
 
 impl PatchScratch {
-    /// Confirms the contact pixels of `result`, settles what they say of `collides` and `gap`, as if
-    /// normals told inside from outside, and fills its patches, deepest first.
+    /// Confirms the contact pixels of `result`, derives `collides` and `gap` from them as if
+    /// normals told inside from outside, and fills the patches, deepest first.
     ///
-    /// The contact pixels may come in any order; they are left ordered by view, row, column and
-    /// gap, as the stage `compare` finds them. Cost: linear in them but for sorting the groups, and
-    /// them if need be.
+    /// The contact pixels may come in any order. Afterwards they are ordered by view, row, column
+    /// and gap, as the stage `compare` finds them. Cost: linear in their number, except for sorting
+    /// the groups, and the pixels if needed.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         self.link(result, params);
         self.reduce_linked(result, params, true);
@@ -196,8 +196,8 @@ impl PatchScratch {
         }
     }
 
-    /// Pushes a patch for each of the groups on one plane, if they are several, and each a single spot: what
-    /// touches in two of them rolls on both. Returns whether they are.
+    /// Pushes one patch for each group on one plane, if there are several groups and each is a
+    /// single spot. A body that touches in two spots rolls on both. Returns whether they are.
     fn push_round_spots(
         &mut self,
         contacts: &[ContactPixel],
@@ -240,8 +240,8 @@ impl PatchScratch {
         shape.patch(members, &pixels, &mut self.shape, params)
     }
 
-    /// Averages normals over linked neighbours and fits the gaps to them: what is left of a sensor's
-    /// noise is a third.
+    /// Averages normals over linked neighbours and fits the gaps to them. A third of a sensor's
+    /// noise is left.
     fn smooth(&mut self, contacts: &[ContactPixel]) {
         let mut fit = GapFit::default();
         for (k, contact) in contacts.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! What is known of a pair before any of its points is looked at; and the numbers that decide the
-//! stages. All backends start from here.
+//! What is known about a pair before any of its points is read, and the constants of the stages.
+//! All backends start from here.
 
 use crate::cpu::{columns, compare, normals, normals_sharpen, planes, splat, sweep};
 use crate::reach::{Ring, farthest};
@@ -15,13 +15,13 @@ pub use crate::cpu::splat::DepthScale;
 pub use crate::cpu::zone::ZoneGrid;
 
 /// Columns in which the surfaces are farther apart along the view than this many thicknesses, or
-/// prediction distances, are not modelled. A contact at the prediction distance is as far along
-/// the view where its normal is 60° off (beyond, depths along the view tell no distance); surfaces
-/// that cross between neighbouring pixels are at most two thicknesses apart in both.
+/// prediction distances, are not drawn. A contact at the prediction distance is that far along the
+/// view if its normal is 60° off; beyond 60°, depths along the view are no distances. Surfaces that
+/// cross between neighbouring pixels are at most two thicknesses apart in both.
 const REACH: f32 = 2.0;
 
-/// Depth in pixels to which a body that has sunk below all of a surface is looked for. Points that
-/// are culled in vain cost little; the deeper ones of two large clouds would be many.
+/// Depth in pixels to which a body is searched that has sunk below all of a surface. Points that
+/// are culled in vain cost little, but two large clouds have many deeper points.
 const SUNK: f32 = 16.0;
 
 /// Points that are kept per pixel of a surface seen face on: enough for the mean of a layer. With 1,
@@ -32,8 +32,9 @@ const POINTS_PER_PIXEL: f32 = 8.0;
 /// surface to aim it; more do not sharpen the mean of their normals.
 pub const AIM_SAMPLES: usize = 512;
 
-/// Whether the normal at a near point is one of those that aim the camera: about every `step`-th is,
-/// chosen by the point's index in its cloud, in whatever order the points are found.
+/// Whether the normal at a near point is one of those that aim the camera. About every `step`-th
+/// is. The point's index in its cloud decides, so the order in which points are found does not
+/// matter.
 pub fn is_aim_sample(index: u32, step: u32) -> bool {
     hash(index).is_multiple_of(step.max(1))
 }
@@ -52,8 +53,9 @@ pub struct PairPlan {
     pub overlap: Aabb,
     /// What is kept of each side.
     pub sides: [SidePlan; 2],
-    /// Distance in metres up to which points of both sides are near each other; those of [uneven
-    /// clouds](crate::PointCloud::is_uneven) farther, by as much as their radii exceed the mean.
+    /// Distance in metres up to which points of both sides are near each other. In [uneven
+    /// clouds](crate::PointCloud::is_uneven) it is longer by the amount by which radii exceed the
+    /// mean.
     pub zone_reach: f32,
     /// Distance in metres along a view up to which the surfaces of a column can matter to each
     /// other.
@@ -170,9 +172,9 @@ pub(crate) fn column_reach(params: &Params) -> f32 {
     REACH * params.thickness.max(params.prediction)
 }
 
-/// Pixels that the smaller one of a pair is at least across, in its second longest extent: of what
-/// is smaller a penetration could not be told from the noise of single rays. Fewer only where its
-/// own points are no finer.
+/// Least number of pixels across the smaller body, in its second longest extent. With fewer, a
+/// penetration looks like the noise of single rays. There are fewer only if the body's own points
+/// are no finer.
 const LEAST_PIXELS: f32 = 8.0;
 
 /// Edge in metres of the largest pixels that resolve a body of these extents, metres, whose points have this mean
@@ -199,8 +201,9 @@ pub fn stride(mean_radius: f32, pixel_size: f32) -> usize {
     ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
 }
 
-/// Which of the first `stride` points of a cloud's `block`-th block is the first that is taken: another one
-/// in each block, or of the rows of an image, which whole blocks may fill, only some columns would be left.
+/// The first point that is taken of a cloud's `block`-th block, less than `stride`. It differs from
+/// block to block. Otherwise only some columns would remain of a depth image, whose rows may fill
+/// whole blocks.
 pub fn first_taken(block: usize, stride: usize) -> usize {
     hash(block as u32) as usize % stride
 }
@@ -212,9 +215,8 @@ fn within_reach(query: &PairQuery, reach: f32) -> bool {
         && a.transformed(&query.a_from_b.inverse()).intersects(&b)
 }
 
-/// By how much more than what can touch is culled, metres: splats reach a radius beyond their
-/// points, on both sides; normals that are estimated here need their neighbours, or they would err
-/// at the rim.
+/// How far beyond the touching region points are kept, metres. Splats reach a radius beyond their
+/// points, on both sides. Estimated normals need their neighbours, or they would err at the rim.
 pub(crate) fn ring(surface: &Surface, params: &Params) -> Ring {
     let is_bare = match surface {
         Surface::Cloud(cloud) => cloud.normals().is_none(),
@@ -229,9 +231,10 @@ pub(crate) fn ring(surface: &Surface, params: &Params) -> Ring {
     Ring::new(surface, 2.0 + support)
 }
 
-/// Bounds of both surfaces, each in its own frame; those of the larger one with what of a body may
-/// be behind it, where the bounds of a floor do not reach: all of a body that passes through them,
-/// of others as much as up to their middle, but no more than [`SUNK`] and what they moved.
+/// Bounds of both surfaces, each in its own frame. Those of the larger one include the part of the
+/// body that may be behind it, where a floor's bounds do not reach. For a body that passes through
+/// the bounds, that is all of it. For others, it is the part up to their middle, but no more than
+/// [`SUNK`] and their motion.
 fn bounds_with_inside(query: &PairQuery) -> [Aabb; 2] {
     let (a, b) = (query.a.bounds(), query.b.bounds());
     let moved = match query.view {

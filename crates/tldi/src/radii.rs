@@ -84,10 +84,11 @@ pub(crate) fn mean_and_max(radii: &Radii<'_>) -> (f32, f32) {
 }
 
 /// `scale` × the distance to the `k`-th nearest other position (the farthest, where there are
-/// fewer; what is rounded differently is the same one), for each point; `k` is at least 1. With m the median of that over all distinct positions,
-/// radii above [`CAP_PER_MEDIAN`] × m are lowered to it, and radii that [`check_coordinates`] would
-/// refuse are raised to what it accepts, but not above m: a few points that nearly coincide do not
-/// make a cloud unusable, while coordinates too large for its typical spacing do.
+/// fewer; what is rounded differently is the same one), for each point; `k` is at least 1. Let m be
+/// the median of that over all distinct positions. Radii above [`CAP_PER_MEDIAN`] × m are lowered
+/// to it. Radii that [`check_coordinates`] would refuse are raised to what it accepts, but not
+/// above m. So a few points that nearly coincide do not make a cloud unusable, but coordinates too
+/// large for its typical spacing do.
 pub(crate) fn knn_radii(tree: &KdTree, k: usize, scale: f32) -> Result<Vec<f32>, CloudError> {
     if tree.distinct() < 2 {
         return Err(CloudError::NoSpacing { count: tree.len() });

@@ -1,14 +1,16 @@
-//! How far points reach: each as far as its own radius says.
+//! How far points reach: each by its own radius.
 //!
-//! A scan is coarse far from its sensor. Culled and looked for by the mean radius, a body smaller than the distance
-//! of the points around it would meet none of them; by the largest radius, most of the scan would be near. In a cloud
-//! that is even all points reach as far as their mean radius, in an [uneven](PointCloud::is_uneven) one at least so.
+//! A scan is coarse far from its sensor. With the mean radius, a body smaller than the distance of
+//! the points around it would meet none of them. With the largest radius, most of the scan would be
+//! near. In an even cloud, all points reach as far as the mean radius. In an
+//! [uneven](PointCloud::is_uneven) one, they reach at least that far.
 
 use crate::plan::largest_pixel;
 use crate::{Params, PointCloud, Radii, Surface};
 
-/// How many times as large as `expected` a mean radius is where surfaces are near: the nearest power of two, at least 1.
-/// Steps of an octave, since what is near changes with each motion, and gaps would change with it.
+/// How many times as large as `expected` a mean radius is where surfaces are near: the nearest
+/// power of two, at least 1. It moves in octaves: the near points change with each motion, and gaps
+/// would otherwise change with them.
 pub(crate) fn coarsening(near: f32, expected: f32) -> f32 {
     (near / expected).max(1.0).log2().round().exp2()
 }
@@ -148,8 +150,9 @@ impl Place {
         merging: [1.0; 2],
     };
 
-    /// From the mean radii in metres of the points of both that are near; 0 of an exact surface. Pixels follow the
-    /// coarser ones, as far as they resolve the smaller surface; merge gaps each their own.
+    /// From the mean radii in metres of the points of both that are near; 0 of an exact surface.
+    /// Pixels follow the coarser side, as far as they resolve the smaller surface. Each side's
+    /// merge gap follows its own points.
     pub(crate) fn new(params: &Params, surfaces: [&Surface; 2], near: [f32; 2]) -> Self {
         let [a, b] = surfaces;
         let [near_a, near_b] = near;

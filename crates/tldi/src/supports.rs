@@ -1,4 +1,4 @@
-//! Which of many contact points a solver takes.
+//! Which of many contact points the solver gets.
 
 use crate::bowl::{Bowl, Floor, Lowest, Valley};
 use crate::main_plane::Plane;
@@ -12,13 +12,13 @@ use std::f32::consts::SQRT_2;
 pub struct Supports {
     /// Indices of up to [`PATCH_POINTS`] of the points.
     pub indices: ArrayVec<usize, PATCH_POINTS>,
-    /// Their gaps, in metres, about the plane that fits all gaps best or, the flatter they are, about the
-    /// one on which most of them lie.
+    /// Their gaps, in metres, about the plane that fits all gaps best. The flatter the gaps are,
+    /// the more it is the plane on which most of them lie.
     pub above_plane: ArrayVec<f32, PATCH_POINTS>,
     /// How steeply the gaps of that plane rise along the surface, metres per metre; 0 across points in a row.
     pub slope: Vec3,
-    /// 1 if so many of the gaps lie on one plane that the others are taken for errors, as at the rim of a
-    /// face whose normals are estimated; 0 if the gaps bend, or too few are on any plane.
+    /// 1 if so many gaps lie on one plane that the others count as errors, as at the rim of a face
+    /// with estimated normals. 0 if the gaps bend, or too few are on any plane.
     pub flatness: f32,
     /// Standard deviation, in metres, of the gaps about the plane that fits them best.
     pub roughness: f32,
@@ -26,16 +26,16 @@ pub struct Supports {
     /// that widens along the main axes, or does not bend. What is left of the roughness where the
     /// surfaces are round.
     pub roughness_about_bowl: f32,
-    /// The lowest point of that bowl, if it is one in both directions, among the points, and most of
-    /// the roughness.
+    /// The lowest point of that bowl. It is set if the gaps bend in both directions, the point is
+    /// among the points, and the bowl explains most of the roughness.
     pub lowest_of_bowl: Option<Lowest>,
     /// The floor of that bowl, if it is a valley: bent along one axis only.
     pub floor_of_valley: Option<Floor>,
 }
 
-/// Most that lowness counts, in roughnesses: what is lower still is an odd one out, and would otherwise be
-/// chosen in all directions. On a flat face it does not count: a low point in the middle of an edge
-/// would take the place of both corners, and the body tip over the third.
+/// Limit of how much depth counts, in units of the roughness. A still lower point is an outlier,
+/// and would otherwise be chosen in all directions. On a flat face it does not count: a low point
+/// in the middle of an edge would take the place of both corners, and the body tip over the third.
 const LOWEST: f32 = 2.5;
 
 /// Least extent across the longest direction, as a share of that along it: less is rounding.
@@ -44,27 +44,29 @@ const LEAST_WIDTH: f32 = 1e-6;
 /// The same from which on points tell how steeply their gaps rise across: not those in a row.
 const LEAST_KNOWN_WIDTH: f32 = 0.1;
 
-/// Share of points on one plane from which on gaps begin to count as flat, and from which on they do.
-/// Measured: faces of 10 × 10 points have 0.6 on a plane and 0.43 on each other, where their rims meet.
+/// Share of points on one plane at which gaps begin to count as flat, and at which they fully do.
+/// Measured: faces of 10 × 10 points have 0.6 on a plane and 0.43 on each other, where their rims
+/// meet.
 const FLAT: [f32; 2] = [0.35, 0.5];
 
-/// The same for the share of the roughness that a bowl leaves: the gaps of what bends a little are all near a
-/// plane as well.
+/// The same for the share of the roughness that a bowl leaves. The gaps of a slightly bent surface
+/// are all near a plane, too.
 const UNBENT: [f32; 2] = [0.3, 0.5];
 
-/// Roughness, in the least, up to which there is no bend to speak of, and from which on there may be one.
+/// Roughness, in units of the least roughness, up to which there is no bend, and from which there
+/// may be one.
 const SMOOTH: [f32; 2] = [0.5, 1.0];
 
 /// How far from the floor of a valley points tell how low it is, in standard deviations across it.
 const NEAR_FLOOR: f32 = 0.4;
 
-/// Of points on one plane with unit normal `normal`, those on which a body would rest: in each of the four
-/// directions in which they reach out farthest, at right angles to each other, the one that is farthest
-/// out and lowest, √2 standard deviations of extent against one of roughness, which is taken to be at
-/// least `least_roughness` metres.
+/// Of points on one plane with unit normal `normal`, those on which a body would rest. There are
+/// four directions at right angles to each other, along which the points reach out farthest. Each
+/// gives the point that is farthest out and lowest: √2 standard deviations of extent count as much
+/// as one of roughness, which is at least `least_roughness` metres.
 ///
-/// Heights are measured from the plane that fits the gaps, so the choice does not depend on how far
-/// the body is tilted: a lifted edge stays in. Cost: linear in points.
+/// Heights are measured from the plane that fits the gaps. So the choice does not depend on the
+/// tilt of the body, and a lifted edge remains. Cost: linear in points.
 ///
 /// ```
 /// use tldi::{ContactPoint, supports, glamx::Vec3};
@@ -308,8 +310,8 @@ mod tests {
         assert_eq!(cap(Vec2::new(0.02, 0.0)).lowest_of_bowl, None);
     }
 
-    /// A trough has a floor, as low as it is and as long, with its radius; one of which only the sides are seen has
-    /// none.
+    /// A trough has a floor, with its depth, length and radius. A trough whose sides alone are seen
+    /// has none.
     #[test]
     fn troughs_have_floors() {
         let trough = |is_seen: fn(i32) -> bool| {

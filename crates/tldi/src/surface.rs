@@ -31,8 +31,8 @@ pub trait RaySurface: Sync {
     fn is_closed(&self) -> bool;
 }
 
-/// A point cloud, without normals, of which only a device holds the points: what the host must know
-/// of it. Made by the device's backend, which alone can compare it.
+/// A point cloud without normals whose points only a device holds. This is what the host knows
+/// about it. Made by the device's backend, which alone can compare it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeviceCloud {
     /// Number by which the backend knows it.

@@ -9,7 +9,7 @@ use glamx::Vec3;
 pub enum Facing {
     /// The ray enters the body: the outward normal points towards the camera.
     Entry = -1,
-    /// Normals are not oriented: either may be.
+    /// Unknown, because normals are not oriented.
     Unknown = 0,
     /// The ray leaves the body.
     Exit = 1,
@@ -24,12 +24,12 @@ pub struct Layer {
     pub far: f32,
     /// Depth of the surface.
     pub depth: f32,
-    /// Unit normal in the view frame; outward where `facing` is known, else towards the camera.
-    /// Zero where the variant does not estimate one.
+    /// Unit normal in the view frame. It points outward if `facing` is known, else towards the
+    /// camera. It is zero if the variant does not estimate one.
     pub normal: Vec3,
-    /// 1 on a face. Where the normals of what was merged are those of several, the layer is that of one face, and this the
-    /// length of the mean of all unit normals, at most 0.97: at an edge, seen from where `normal` points, positive; in a
-    /// groove negative.
+    /// How far the merged normals agree: 1 on a face. If they belong to several faces, the layer is
+    /// that of one face, and this is the length of the mean of all unit normals, at most 0.97. It
+    /// is positive at an edge, seen from where `normal` points, and negative in a groove.
     pub agreement: f32,
     /// Which way the layer faces.
     pub facing: Facing,

@@ -1,11 +1,13 @@
-//! What the comparison of a pair had to do.
+//! The work of a comparison.
 
 use std::ops::AddAssign;
 
-/// How much of two clouds a comparison had to model: sums over all that it did, also over what it gave up on the way.
+/// How much of two clouds a comparison drew. Sums over everything it did, including looks that it
+/// gave up.
 ///
-/// Counts depend on the pair alone, not on threads or the machine. The CPU backend fills them. The GPU backend leaves
-/// them at zero, but for the pairs that it leaves to the CPU. Cost: a few additions a view.
+/// The counts depend only on the pair, not on threads or the machine. The CPU backend fills them.
+/// The GPU backend leaves them at zero, except for pairs that it leaves to the CPU. Cost: a few
+/// additions for each view.
 ///
 /// ```
 /// use tldi::{Backend, CpuBackend, PairQuery, Params, PointCloud, Surface, View};
@@ -36,12 +38,12 @@ use std::ops::AddAssign;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Points of both clouds that passed a cull to where the surfaces may meet, of all culls: a point counts in each
-    /// that it passed.
+    /// Points of both clouds that passed the cull to where the surfaces may meet. A point counts
+    /// once for each cull that it passed.
     pub culled: usize,
     /// Looks with large pixels at a part of the points.
     pub large: Looked,
-    /// Looks through small windows, which prove what large pixels show.
+    /// Looks through small windows, which prove crossings that large pixels show.
     pub windows: Looked,
     /// Looks with pixels of [`Params::pixel_size`](crate::Params::pixel_size) at all of the contact zone.
     pub fine: Looked,
@@ -57,11 +59,12 @@ impl Work {
     }
 }
 
-/// What looks of one kind had to do, over all views.
+/// The work of all looks of one kind, over all views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Looked {
-    /// Points of the clouds that were modelled: that got a normal and a splat, or that were added to a cell. A point
-    /// counts in each view that models it. Points that only decide normals of others are not among them.
+    /// Points that were drawn: they got a normal and a splat, or were added to a cell. A point
+    /// counts once for each view that draws it. Points that only decide the normals of others do
+    /// not count.
     pub points: usize,
     /// Pixels of the rectangles of both images, empty ones too.
     pub pixels: usize,

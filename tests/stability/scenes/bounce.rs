@@ -11,10 +11,11 @@ use tldi::glamx::{Vec2, Vec3};
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "bounce",
-    about: "A ball and a box of 0.2 m fall 1 m onto a plane, with restitutions from 0 to 1; \
-            r̄ = 2 cm.",
-    rule: "Height of the first rebound within 3 cm (3 % of the fall) of the primitive's and of e² × \
-           1 m (and, for others than primitives, as far as the primitive itself is off); mechanical energy never above the initial one by more than 1 %.",
+    about: "A ball and a box of 0.2 m fall 1 m onto a plane. Restitution goes from 0 to 1; r̄ = \
+            2 cm.",
+    rule: "The first rebound is within 3 cm (3 % of the fall) of the primitive's height and of \
+           e² × 1 m. Others may also be off by as much as the primitive is. Mechanical energy \
+           never exceeds the initial one by more than 1 %.",
     cases,
 };
 

@@ -10,11 +10,11 @@ use tldi::glamx::Vec3;
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "deep-start",
-    about: "Boxes and balls of 0.2 m start 10 to 80 % inside a floor (a box of 1 × 0.6 × 1 m) or \
-            inside each other (there without gravity); r̄ = 2 cm.",
-    rule: "Out of the nearer side within 3 s: on the floor within r̄ of the height at which it rests, \
-           apart from each other to within r̄, and when they first are, more along the line on which \
-           they overlapped than sideways; never faster than 2 m/s.",
+    about: "Boxes and balls of 0.2 m start 10 to 80 % inside a floor (a box of 1 × 0.6 × 1 m), \
+            or inside each other without gravity; r̄ = 2 cm.",
+    rule: "They leave by the nearer side within 3 s: on the floor to within r̄ of their height \
+           at rest, apart from each other to within r̄. They part along the line on which they \
+           overlapped more than sideways. They are never faster than 2 m/s.",
     cases,
 };
 

@@ -11,11 +11,12 @@ use tldi_tests::{Samples, Sheet, standard_normal};
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "density",
-    about: "A box of 0.2 m rests on planes whose points are 2 mm apart on one side and 20 mm on the \
-            other (100:1 by area), occur 4 or 12 times, have 1 % flying pixels up to 0.2 m above, \
-            or the range noise of a Kinect 1.5 m away; radii from 7 neighbours, no normals.",
-    rule: "After 3 s every lower corner of the box is within 1 local r̄ of the plane (local: mean \
-           radius of the cloud at that corner).",
+    about: "A box of 0.2 m rests on a plane with one flaw: points 2 mm apart on one side and 20 \
+            mm on the other (100:1 by area); points that occur 4 or 12 times; 1 % flying pixels \
+            up to 0.2 m above; the range noise of a Kinect 1.5 m away. Radii are from 7 \
+            neighbours; there are no normals.",
+    rule: "After 3 s, every lower corner of the box is within 1 local r̄ of the plane. Local r̄ \
+           is the mean radius of the cloud at that corner.",
     cases,
 };
 

@@ -12,14 +12,15 @@ use tldi::glamx::{Quat, Vec2, Vec3};
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "grazing",
-    about: "A box and a ball of 0.2 m lie 0.3 r̄ deep in a sheet, and a ball in a groove of two sheets \
-            at 90°; the samples of both sides are turned together, in their own frames, through 0 to \
-            90° about each axis; r̄ = 2 cm.",
-    rule: "At every angle each sheet has contacts; deepest gap within 0.15 r̄ of the truth for the box \
-           and 0.3 r̄ for the ball, normals of contacts that push within 1° and 5°; between neighbouring angles the gap \
-           changes by no more than those bounds. (A splat's plane is off by at most half a pixel × \
-           tan 45° × the 30 % of its slope that is damped, 0.15 r̄; on a ball of radius R a disc of \
-           radius r̄ is off by r̄²/2R = 0.1 r̄ more.)",
+    about: "A box and a ball of 0.2 m lie 0.3 r̄ deep in a sheet, and a ball in a groove of two \
+            sheets at 90°. The samples of both sides turn together, in their own frames, through \
+            0 to 90° about each axis; r̄ = 2 cm.",
+    rule: "At every angle, each sheet has contacts. The deepest gap is within 0.15 r̄ of the \
+           truth for the box and 0.3 r̄ for the ball. Normals of contacts that push are within \
+           1° and 5°. Between neighbouring angles the gap changes by no more than those bounds. \
+           (A splat's plane is off by at most half a pixel × tan 45° × the 30 % of its slope \
+           that is damped: 0.15 r̄. On a ball of radius R, a disc of radius r̄ is off by r̄²/2R \
+           = 0.1 r̄ more.)",
     cases,
 };
 

@@ -11,12 +11,12 @@ use tldi_tests::Samples;
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "holes",
-    about: "A box (turned by 20°) and a ball of 0.2 m over a square hole in a floor (r̄ = 2 cm) of \
-            half to twice their width; a ball that falls into the shadow behind a box of which a \
-            camera saw only the front.",
-    rule: "Falls through where the hole is wider than the body by more than 2 r̄ on each side, and \
-           not where it is as wide as the body or less (as wide: the ball's hole is 0.95 of its \
-           width; in between nothing is asked). In the shadow, free fall to 1 % and ≤ r̄ sideways.",
+    about: "A box (turned by 20°) and a ball of 0.2 m over a square hole in a floor (r̄ = 2 cm), \
+            half to twice as wide as they are. A ball falls into the shadow behind a box of \
+            which a camera saw only the front.",
+    rule: "The body falls through if the hole is wider by more than 2 r̄ on each side. It does \
+           not if the hole is as wide as the body or narrower (for the ball: 0.95 of its width). \
+           In between, nothing is asked. In the shadow: free fall to 1 %, and ≤ r̄ sideways.",
     cases,
 };
 

@@ -11,11 +11,12 @@ use tldi::glamx::{Quat, Vec2, Vec3};
 pub(crate) const SCENE: Scene = Scene {
     name: "moving-cloud",
     about: "A wall (one layer of points, r̄ = 2 cm) sweeps 1.5 m at 0.5 to 5 m/s over a box or a \
-            ball of 0.2 m that rests on a plane: as a kinematic body; as a fixed body whose points \
-            move; and as a fixed body that is sampled anew in every frame (only then has the wall no \
-            velocity that a method could know of).",
-    rule: "The wall never passes the body's middle, and pushes it as far as it goes, less 2 r̄ \
-           (where it is sampled anew only the former: rapier closes penetrations at 3 m/s at most).",
+            ball of 0.2 m that rests on a plane. The wall is a kinematic body, a fixed body \
+            whose points move, or a fixed body that is sampled anew in every frame. Only in the \
+            last case has it no velocity that a method could know.",
+    rule: "The wall never passes the body's middle, and pushes it as far as the wall goes, less \
+           2 r̄. A wall that is sampled anew only has to not pass: rapier resolves penetrations \
+           at 3 m/s at most.",
     cases,
 };
 

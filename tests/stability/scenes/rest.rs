@@ -11,11 +11,12 @@ use tldi::glamx::{Vec2, Vec3};
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "rest",
-    about: "A box, a ball and a bunny of 0.3 m on a plane, points 2 cm apart (r̄ = 2 cm, the bunny's 0.5 cm), whose \
-            samples stay or are drawn anew in every frame (σ = 0.25 r̄ along the normal).",
-    rule: "Samples that stay: asleep within 2 s; from then on, over 10 s, drift ≤ 0.1 r̄ and turn \
-           ≤ 0.1°, and the box within 0.1° of upright. New samples: RMS speed over the last 5 of \
-           12 s ≤ 1 cm/s.",
+    about: "A box, a ball and a bunny of 0.3 m lie on a plane. Points are 2 cm apart (r̄ = 2 cm; \
+            the bunny's 0.5 cm). Samples stay, or are drawn anew in every frame (σ = 0.25 r̄ \
+            along the normal).",
+    rule: "Samples that stay: asleep within 2 s; over the next 10 s, drift ≤ 0.1 r̄ and turn ≤ \
+           0.1°; the box within 0.1° of upright. New samples: RMS speed ≤ 1 cm/s over the last 5 \
+           of 12 s.",
     cases,
 };
 

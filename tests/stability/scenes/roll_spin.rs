@@ -10,13 +10,14 @@ use tldi::glamx::{Vec2, Vec3};
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "roll-spin",
-    about: "A ball of 0.3 m rolls 10 m, a rod of 0.6 m spins flat on the floor at 10 rad/s, and a \
-            round top (a ball) spins upright at 50 rad/s; a roly-poly doll (the ball, its centre of mass \
-            10 cm below the middle) rocks for 10 s, 5° off its rest at first; r̄ = 2 cm.",
-    rule: "Way of the ball in 10 m / v seconds, angle and speed of the spins after 1 s within 5 % of \
-           the primitive's (of the initial spin's where that is larger); the ball's heading within \
-           1°; rod and top stay within r̄ of their place; the doll rocks no faster in the last two \
-           seconds than in the first two.",
+    about: "A ball of 0.3 m rolls 10 m. A rod of 0.6 m spins flat on the floor at 10 rad/s. A \
+            round top (a ball) spins upright at 50 rad/s. A roly-poly doll (the ball, its centre \
+            of mass 10 cm below the middle) rocks for 10 s and starts 5° off its rest; r̄ = 2 \
+            cm.",
+    rule: "Compared with the primitive, within 5 %: the ball's way in 10 m / v seconds, and the \
+           angle and speed of the spins after 1 s (5 % of the initial spin where that is \
+           larger). The ball's heading is within 1°. Rod and top stay within r̄ of their place. \
+           The doll rocks no faster in the last two seconds than in the first two.",
     cases,
 };
 

@@ -10,11 +10,11 @@ use tldi::glamx::{Vec2, Vec3};
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "scale-shift",
-    about: "A box of 0.2 m falls 2 cm onto a plane (r̄ = 2 cm): as it is, half a pixel aside, 1 km \
-            away (by poses, or in the clouds' own coordinates), and scaled to 1 mm, 1 cm, 10 m and \
-            100 m (gravity, samples and `length_unit` alike).",
-    rule: "Asleep within 2 s, within 0.1 r̄ of its height and of its place and 0.1° of upright, in \
-           units of the scene (for 1 km: plus four steps of `f32` at 1 km, 0.012 r̄).",
+    about: "A box of 0.2 m falls 2 cm onto a plane (r̄ = 2 cm): as it is; half a pixel aside; 1 \
+            km away (by poses, or in the clouds' own coordinates); scaled to 1 mm, 1 cm, 10 m \
+            and 100 m (gravity, samples and `length_unit` alike).",
+    rule: "Asleep within 2 s, within 0.1 r̄ of its height and place, and within 0.1° of upright, \
+           in units of the scene. For 1 km, four steps of `f32` at 1 km are added: 0.012 r̄.",
     cases,
 };
 

@@ -10,10 +10,10 @@ use tldi::glamx::{Vec2, Vec3};
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "stack",
-    about: "10 boxes of 0.2 m, each a cloud of its own (r̄ = 2 cm), one on the other on a plane, \
-            with rapier's 4 solver iterations and with 12.",
-    rule: "Stands for 10 s: the top box drifts ≤ r̄ sideways, and is within 10 r̄ (1 r̄ a box) of its \
-           height.",
+    about: "10 boxes of 0.2 m stand on each other on a plane. Each is a cloud of its own (r̄ = 2 \
+            cm). Rapier makes 4 solver iterations, or 12.",
+    rule: "It stands for 10 s. The top box drifts ≤ r̄ sideways, and its height is within 10 r̄ \
+           (1 r̄ for each box).",
     cases,
 };
 

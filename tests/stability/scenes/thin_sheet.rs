@@ -11,9 +11,10 @@ use tldi::glamx::{Quat, Vec2, Vec3};
 pub(crate) const SCENE: Scene = Scene {
     name: "thin-sheet",
     about: "Bodies of 0.2 m reach a sheet of one layer of points (r̄ = 2 cm) from above and from \
-            below (gravity reversed), and two sheets 1.5 r̄ apart in one cloud, from both sides.",
-    rule: "The body's middle stays on its side in every step, and after 2 s the body is within \
-           0.5 r̄ of where it rests on its sheet.",
+            below (gravity reversed). They reach two sheets 1.5 r̄ apart in one cloud from both \
+            sides.",
+    rule: "The body's middle stays on its side in every step. After 2 s, the body is within 0.5 \
+           r̄ of where it rests on its sheet.",
     cases,
 };
 

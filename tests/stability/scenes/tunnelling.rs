@@ -9,11 +9,12 @@ use drops::{Outcome, SizeClass, Target, run_drop};
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
     name: "tunnelling",
-    about: "Boxes and balls of 2 mm to 1 m, of a few hundred points each, at 0 to 200 m/s, 0 to \
-            75° off the normal, spinning up to 50 rad/s, with `ccd_enabled`, onto a sheet, a spot \
-            of a scan (scaled to the body) and a sheet that waves (new points each frame).",
-    rule: "No body's middle passes through the surface (of a scan: the mean height of its points \
-           within 2 r̄).",
+    about: "Boxes and balls of 2 mm to 1 m, with a few hundred points each and `ccd_enabled`, \
+            hit a surface at 0 to 200 m/s, 0 to 75° off the normal, spinning at up to 50 rad/s. \
+            The surface is a sheet, a spot of a scan (scaled to the body), or a sheet that waves \
+            (new points in each frame).",
+    rule: "No body's middle passes through the surface. For a scan, the surface is the mean \
+           height of its points within 2 r̄.",
     cases,
 };
 

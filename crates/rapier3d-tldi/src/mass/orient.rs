@@ -19,7 +19,7 @@ pub(super) fn orient(surfels: &mut [Surfel]) {
             (agreement, i as u32, j)
         }));
     }
-    // A stable sort: what is as sure stays in the order of the points.
+    // A stable sort: equally certain edges keep the order of the points.
     pairs.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
     let mut forest = SignedForest::new(surfels.len());
     for (agreement, i, j) in pairs {

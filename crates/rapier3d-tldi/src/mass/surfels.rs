@@ -16,8 +16,8 @@ const NEIGHBORS: usize = 16;
 /// Points, with the point itself, that a normal is fitted to.
 const FITTED_POINTS: usize = 13;
 
-/// Cosine of the angle between normals from which on there is an edge of the surface between two
-/// points: 37°.
+/// Cosine of the angle between two normals at which the surface has an edge between their points:
+/// 37°.
 const CREASE: f64 = 0.8;
 
 /// Radii within which a patch lies: balls of one radius leave about 5 % of a randomly sampled
@@ -159,7 +159,7 @@ impl Cell {
             .extend((0..CORNERS).map(|k| corner_radius * DVec2::from_angle(step * k as f64)));
     }
 
-    /// Keeps what is nearer to the point than to the neighbour at `offset` from it.
+    /// Keeps the part that is nearer to the point than to the neighbour at `offset` from it.
     fn keep_nearer_than(&mut self, offset: DVec3) {
         let half = 0.5 * offset.length_squared();
         if half > 0.0 {

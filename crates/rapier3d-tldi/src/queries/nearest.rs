@@ -32,7 +32,7 @@ pub(super) struct Nearest {
     pub(super) on_target: Vec3,
     /// Unit normal of the target at its point; of a cloud without oriented normals, either way.
     pub(super) normal: Vec3,
-    /// Whether each point lies inside of the other surface as far as normals tell. Of the nearest
+    /// Whether each point lies inside the other surface, as far as the normals tell. Of the nearest
     /// points of all this says that the surfaces have passed through each other as a whole.
     overlap: bool,
 }

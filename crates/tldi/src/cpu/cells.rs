@@ -1,10 +1,10 @@
 //! Stage `cells`: layers of large pixels from the sums of the points in them.
 //!
-//! A *cell* is what lies in one pixel at one depth: points that follow each other in depth within
-//! [`MERGED`] of a pixel. It keeps their number, the sums of their coordinates and of their products.
-//! Sums of neighbouring cells add up, and the plane that fits them best gives the layer: no search for
-//! neighbours, no normals of points, no splats. Sums are integers: they do not depend on the order of
-//! the points.
+//! A *cell* holds the points of one pixel at one depth: they follow each other in depth within
+//! [`MERGED`] of a pixel. It keeps their number, the sums of their coordinates and of their
+//! products. Sums of neighbouring cells add up, and the plane that fits them best gives the layer:
+//! no search for neighbours, no normals of points, no splats. Sums are integers: they do not depend
+//! on the order of the points.
 
 use super::columns::Columns;
 use super::rect::Rect;
@@ -12,9 +12,9 @@ use crate::{Facing, Layer, Tldi, VirtualCamera};
 use glamx::Vec3;
 use std::ops::Range;
 
-/// Points of a pixel whose depths follow each other by no more than this are in one cell, in pixels. Half
-/// as much tears surfaces apart that are seen at 45°; twice as much merges the two sides of what is
-/// thinner than a pixel.
+/// Points of a pixel whose depths follow each other by no more than this are in one cell, in
+/// pixels. Half of it tears surfaces apart that are seen at 45°. Twice as much merges the two sides
+/// of bodies thinner than a pixel.
 const MERGED: f32 = 0.6;
 
 /// Steps of a coordinate in a pixel: the error of a depth is far below that of its plane.
@@ -103,7 +103,7 @@ struct Plane {
     slope: [f32; 2],
     /// Depth at the middle of the pixel, from the cell's mean depth.
     above: f32,
-    /// Mean square of what the points of the cell and its neighbours are beside it; infinite where they
+    /// Mean squared distance of the points of the cell and its neighbours from it; infinite if they
     /// are too few.
     variance: f32,
 }

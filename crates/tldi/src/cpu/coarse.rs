@@ -1,9 +1,9 @@
-//! The first look at two clouds: with large pixels and a part of the points, which settles what is deep.
+//! The first look at two clouds: large pixels and a part of the points settle deep contacts.
 //!
-//! What is deep by several large pixels needs no small ones to tell how deep it is. That surfaces cross
-//! large pixels do not prove: the two sides of a limb merge in them. So fine images are taken, too, but only
-//! in a few small windows, where the large pixels show a crossing most plainly. What is shallow, or what no window
-//! proves, is left to the fine look at all of the contact zone.
+//! A contact that is several large pixels deep needs no small ones to measure its depth. But large
+//! pixels do not prove a crossing, because the two sides of a limb merge in them. So a few small
+//! windows are drawn with small pixels, where the large ones show a crossing most plainly. Contacts
+//! that are shallow, or that no window proves, go to the full look with small pixels.
 
 use super::cells::CellImaging;
 use super::compare::{self, Crossings, Seen};
@@ -17,12 +17,13 @@ use crate::{
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
 
-/// Edges of a large pixel, in pixels or, where that is more, in mean radii. Smaller ones cost as much as the look with
-/// small pixels; larger ones merge limbs.
+/// Edges of a large pixel, in pixels or in mean radii, whichever is larger. Smaller ones cost as
+/// much as the look with small pixels. Larger ones merge limbs.
 const LARGE: [f32; 4] = [16.0, 8.0, 4.0, 2.0];
 
-/// Least depth of contacts that a first look settles, in large pixels. With half as much, shallow contacts of spheres came
-/// out up to 7 r too deep; twice as much leaves contacts of 4 to 8 r to small pixels.
+/// Least depth of contacts that a first look settles, in large pixels. With half of it, shallow
+/// contacts of spheres were up to 7 r too deep. Twice as much leaves contacts of 4 to 8 r to small
+/// pixels.
 const DEEP: f32 = 2.0;
 
 /// Least overlap of the bounds, in large pixels. With 8, pixels are smaller and frames take up to twice the time, with
@@ -36,8 +37,8 @@ const POINTS_PER_PIXEL: f32 = 4.0;
 /// Edge of a window, in pixels. Windows of 32 take twice the time and prove the same.
 const WINDOW: f32 = 16.0;
 
-/// Most windows that are looked at. In all frames that were measured the first one proves a crossing that is there; the
-/// others are for large pixels that seem to cross where limbs are close.
+/// Most windows that are drawn. In all measured frames, the first window proves a real crossing.
+/// The others are for large pixels that only seem to cross, where limbs are close.
 const MOST_WINDOWS: usize = 3;
 
 /// A cube of a view's frame in which surfaces swap their order.
@@ -93,7 +94,7 @@ pub(super) enum FirstLook {
     Settled,
 }
 
-/// Where a first look is worth while: by how much the bounds overlap, metres.
+/// The overlap of the bounds, metres, if a first look is possible.
 fn overlap(query: &PairQuery) -> Option<f32> {
     let (Surface::Cloud(a), Surface::Cloud(b)) = (query.a, query.b) else {
         return None;

@@ -1,9 +1,9 @@
 //! Stage `columns`: the culled points in the view, and the columns of pixels in which the surfaces
 //! can meet.
 //!
-//! Where all of `a` is out of reach behind all of `b`, nothing of either needs to be modelled: the
-//! early rejection of the paper (section 5), by tiles of a few pixels in place of the whole image.
-//! In the columns that remain every layer of both is built, as deep contacts need.
+//! If all of `a` is out of reach behind all of `b`, neither needs to be drawn. This is the early
+//! rejection of the paper (section 5), for tiles of a few pixels instead of the whole image. In the
+//! remaining columns, all layers of both are built, because deep contacts need them.
 
 use super::cull::Survivors;
 use super::fold::{FARTHEST_PIXEL, ViewFold};
@@ -30,9 +30,9 @@ pub(crate) struct Columns {
     pub(crate) x: Vec<f32>,
     pub(crate) y: Vec<f32>,
     pub(crate) depth: Vec<f32>,
-    /// Index of the tile of each point; one beyond the last for what is out of view.
+    /// Index of the tile of each point. Points out of view have one beyond the last tile.
     pub(crate) tile: Vec<u32>,
-    /// For each tile the least depth (of `a`) or the greatest (of `b`) of what may be seen in it.
+    /// For each tile, the least depth (of `a`) or the greatest (of `b`) that may be seen in it.
     depths: Vec<f32>,
     /// The negative of the greatest ones, where both are of interest.
     greatest: Vec<f32>,
@@ -196,8 +196,8 @@ impl Columns {
         self.depths[tile] + b.depths[tile] <= reach
     }
 
-    /// By how much at most a point of `b` lies behind one of this side in a tile, metres. After
-    /// [`reduce`](Self::reduce) as for [`meet`](Self::meet).
+    /// Largest distance by which a point of `b` lies behind one of this side in a tile, metres.
+    /// After [`reduce`](Self::reduce) as for [`meet`](Self::meet).
     pub(crate) fn greatest_overlap(&self, b: &Self) -> f32 {
         let behind = self.depths.iter().zip(&b.depths).map(|(a, b)| -(a + b));
         behind.fold(f32::NEG_INFINITY, f32::max)
@@ -343,7 +343,7 @@ impl Touching {
     }
 }
 
-/// The pixels between two corners in pixel coordinates, as far as there are any.
+/// The pixels between two corners in pixel coordinates, if there are any.
 pub(super) fn rect_of(first: [f32; 2], last: [f32; 2]) -> Option<Rect> {
     let corner = |c: [f32; 2]| c.map(|c| c.floor().clamp(-FARTHEST_PIXEL, FARTHEST_PIXEL) as i32);
     Rect::from_corners(corner(first), corner(last))

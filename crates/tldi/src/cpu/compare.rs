@@ -14,9 +14,9 @@ use glamx::{Pose3, Vec2, Vec3};
 
 /// Depths of the middles of both bodies, where a body's size says that it is one.
 ///
-/// Without oriented normals a layer does not tell which side is inside. The smaller surface of a
-/// pair is then taken for a body that reaches at least to the middle of its bounds; the larger one
-/// for a sheet, in which no volume is invented.
+/// Without oriented normals a layer does not tell which side is inside. Then the smaller surface of
+/// a pair counts as a body that reaches at least to the middle of its bounds. The larger one counts
+/// as a sheet, without a volume.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Middles {
     pub(crate) a: Option<f32>,
@@ -29,9 +29,9 @@ const SWAPPED: u32 = 2;
 /// A pixel in which a layer pierces a wall, in [`Crossings`]: where a wall is, edge-on, is less sure.
 const PIERCED: u32 = 1;
 
-/// What all views together see of a crossing from which on surfaces cross, two for a swap of layers between
-/// pixels, one for a pixel in which a wall is pierced. A single swap may be the overhang of a splat beside
-/// an edge.
+/// How many signs of a crossing all views must see together before surfaces cross. A swap of layers
+/// between pixels counts two, a pixel in which a wall is pierced counts one. A single swap may be
+/// the overhang of a splat beside an edge.
 pub const CROSSED: u32 = 4;
 
 /// How much of a crossing all views of a pair have seen, in the units of [`CROSSED`]. Those that are
@@ -164,9 +164,9 @@ pub(super) fn swap_depth(
     seen.find(swaps).map(|layer| layer.depth)
 }
 
-/// Whether a layer of one lies well within a thick layer of the other, a wall seen edge-on to which it is
-/// not parallel, and goes on on both sides of it: of a surface that ends beside a wall, the last splats
-/// are in the wall's pixels.
+/// Whether a layer of one surface pierces a wall of the other: it lies well within a thick layer,
+/// which is a wall seen edge-on, is not parallel to the wall, and continues on both sides of it. A
+/// surface that ends beside a wall also has its last splats in the wall's pixels.
 fn pierces(a: &Tldi, b: &Tldi, pixel: [u32; 2], params: &Params) -> bool {
     let rim = 0.5 * params.thickness;
     let through = |walls: &Tldi, other: &Tldi| {

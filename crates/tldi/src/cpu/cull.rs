@@ -5,8 +5,9 @@
 //! floor of the whole pipeline is this stage's reading of the coordinates. Of a cloud much finer
 //! than the pixels only every n-th point is taken ([`stride`](crate::plan::stride)): more would not be seen.
 //!
-//! Coarser points reach farther ([`reach`](crate::reach)). Where a cloud has such, the boxes of a block are as wide as
-//! its coarsest point needs, and what is inside is asked again, each point by its own radius.
+//! Coarser points reach farther ([`reach`](crate::reach)). In such a cloud, the box of a block is
+//! as wide as its coarsest point needs. Points inside are then tested again, each by its own
+//! radius.
 
 use super::fold::SpaceFold;
 use super::lanes::multiversioned;

@@ -1,10 +1,11 @@
-//! Empty space takes no room: coordinates in which wide gaps between points are shortened.
+//! Coordinates in which wide gaps between points are shortened, so that empty space takes no
+//! memory.
 //!
-//! Grids and images are dense over the bounds of points, and a single point far from all others makes
-//! these as large as it likes. Where that would cost more than the points do, each axis is folded: a gap
-//! of more than a few quanta between the points is cut down to these, by a whole number of quanta. Points
-//! within a quantum of each other stay as they are to each other, those that are not stay apart by two at
-//! least. So neighbourhoods, splats and the pixels of one contact are what they were, and a place on
+//! Grids and images are dense over the bounds of the points, and one point far from all others can
+//! make them arbitrarily large. If that would cost more than the points do, each axis is folded: a
+//! gap of more than a few quanta between points is cut down to these few, by a whole number of
+//! quanta. Points within a quantum of each other keep their distance. Others stay at least two
+//! quanta apart. So neighbourhoods, splats and the pixels of one contact do not change. A place on
 //! a folded axis is found again by adding what was cut.
 
 use super::rect::Rect;

@@ -1,8 +1,8 @@
 //! Stage `impact`: where a surface in straight motion first meets another.
 //!
-//! A camera along the motion sees in each pixel how far what is there can move: from where its ray
-//! leaves the moving surface to where it enters the other one. The least of these distances is the
-//! impact's. No surface is too thin for that, and none too fast: the images hold all that the
+//! A camera along the motion sees in each pixel how far the surface there can move: from where the
+//! ray leaves the moving surface to where it enters the other one. The least of these distances is
+//! the impact's. No surface is too thin for that, and none too fast: the images hold all that the
 //! motion passes.
 
 use super::columns::{Columns, dilate};
@@ -20,12 +20,13 @@ use crate::{
 use glamx::{Pose3, Vec3};
 
 /// Width in pixels of the rim that [`ImpactQuery::core_only`] spares: splats stand out by one on
-/// either side, and one is for roughness. What is missed there penetrates by no more than that one,
-/// which contacts push out again.
+/// either side, and one is for roughness. A surface that is missed there penetrates by no more than
+/// that pixel, and contacts push it out again.
 const RIM: i32 = 3;
 
-/// Width in pixels of what of the rim passes anything: a splat of either side stands out by so much.
-/// The rest passes what the motion does not go on towards by more than all of the rim.
+/// Width in pixels of the part of the rim that is always left out: a splat of either side stands
+/// out by that much. The rest passes what the motion does not go on towards by more than all of the
+/// rim.
 const OUTER_RIM: u8 = 2;
 
 /// Pixels around an image that tell its rim from its edge: the rim, and one for the closing.
@@ -387,7 +388,7 @@ impl CoreScratch {
                 *depth += *inner;
             }
         }
-        // What is as far inside as it gets there is no rim, however thin.
+        // The innermost pixels of a part are no rim, however thin the part is.
         let deepest_around = inner;
         deepest_around.clone_from(depth);
         // Twice: around a round border it grows by one in two pixels here and there.
@@ -459,7 +460,7 @@ fn back(layer: &Layer, params: &Params) -> f32 {
     }
 }
 
-/// By how much splats that are seen edge-on stand out in depth beyond their points, metres.
+/// How far splats that are seen edge-on stand out in depth beyond their points, metres.
 fn rise(params: &Params) -> f32 {
     0.5 * params.thickness * params.slope_damping
 }

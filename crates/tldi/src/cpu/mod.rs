@@ -76,14 +76,14 @@ pub struct CpuBackend {
 }
 
 impl CpuBackend {
-    /// A backend with no memory taken yet.
+    /// A backend that has allocated nothing yet.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A backend that looks at all of every contact zone with small pixels, also where a first look with large ones
-    /// would settle what is deep: the reference for backends that do nothing else, as those on a GPU. Cost: in deep
-    /// contact 3 to 70 times that of [`new`](Self::new).
+    /// A backend without the first look: it draws the whole contact zone with small pixels, even
+    /// for deep contacts. It is the reference for backends that have no large pixels, such as the
+    /// GPU's. In deep contact it takes 3 to 70 times as long as [`new`](Self::new).
     ///
     /// ```
     /// use tldi::{Backend, CpuBackend};
@@ -98,10 +98,11 @@ impl CpuBackend {
 
     /// Where a surface in straight motion first meets another, or `None` where it does not.
     ///
-    /// The distance is within a depth error of the images where the surfaces meet face on (0.1 r̄ of
-    /// the coarser cloud), and within a pixel over the cosine between normal and motion where they
-    /// do not. Surfaces are met from behind as well, but for solids with oriented normals, which
-    /// what is inside may leave. Cost: reading both clouds and the layers in the way of the motion.
+    /// The distance is within a depth error of the images where the surfaces meet face on (0.1 r̄
+    /// of the coarser cloud), and within a pixel over the cosine between normal and motion where
+    /// they do not. Surfaces are met from behind, too. Solids with oriented normals are not, so
+    /// that a body inside may leave. Cost: reading both clouds and the layers in the way of the
+    /// motion.
     ///
     /// # Errors
     /// [`BackendError::Unsupported`] with pair 0: no side is a cloud, or bad parameters.

@@ -1,9 +1,10 @@
 //! Stage `zone` for a cloud and an exact surface: which of the culled points are near it.
 //!
-//! Asking a surface for its distance is dear, and few points are near. So it is asked once for each
-//! cell of a coarse grid that holds points: nothing in the cell is nearer than its middle by more than half its
-//! diagonal. Of the points in cells that can be near, an even selection aims the camera; all of them
-//! are asked where it finds few, so that no contact is too small to be found.
+//! A surface's distance is expensive to compute, and few points are near. So it is computed once
+//! for each cell of a coarse grid that holds points: no point in a cell is nearer than the cell's
+//! middle by more than half of its diagonal. An even selection of the points in cells that can be
+//! near aims the camera. If it finds few near points, all are asked, so that no contact is too
+//! small to be found.
 
 use super::columns::rect_of;
 use super::fold::{SpaceFold, is_coarse};

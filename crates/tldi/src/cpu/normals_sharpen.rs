@@ -1,9 +1,10 @@
 //! Stage `normals`, last part: beside an edge or a corner, a normal is that of the face.
 //!
-//! A neighbourhood that reaches over an edge has a plane between the faces, and pixels there would be
-//! on neither. A point whose neighbours are not on a plane adopts the planes of those of them that are flat, and that
-//! it is on; at a corner, where none is near enough, in a second pass what its neighbours have adopted. Where a
-//! surface bends or is noisy nothing is flat, and normals stay.
+//! A neighbourhood that reaches over an edge has a plane between the faces, and pixels there would
+//! be on neither. So a point whose neighbours are not on a plane takes the plane of a flat
+//! neighbour, if the point lies on it. At a corner no flat neighbour is near enough; there, a
+//! second pass takes what the neighbours have taken. Where a surface bends or is noisy, nothing is
+//! flat, and normals stay as they are.
 
 use super::lanes::multiversioned;
 use super::normals::{LANES, MAX_CANDIDATES, NormalScratch, SUPPORT, Sorted};
@@ -18,10 +19,10 @@ const ON_PLANE: f32 = 0.1;
 /// Variance that noise explains, in its own: that of 20 points scatters by a third.
 const OF_NOISE: f32 = 2.0;
 
-/// Variance from which on neighbours are plainly not on a plane, in that up to which they are.
+/// Variance at which neighbours are plainly not on a plane, in units of that up to which they are.
 const OFF_PLANE: f32 = 4.0;
 
-/// Misfit of a plane, as a deviation in mean radii, from which on it is not flat, or a point not on it.
+/// Deviation from a plane, in mean radii, at which it is not flat, or a point is not on it.
 const FLAT: f32 = 0.05;
 
 /// For [`stage_constants`](crate::plan::stage_constants).

@@ -279,7 +279,8 @@ impl Scratch {
         }
     }
 
-    /// What is known of where the second surface lies, of bare clouds by their near points as well.
+    /// What is known about where the second surface lies. For bare clouds, the near points tell as
+    /// well.
     pub(super) fn approach(&self, query: &PairQuery, plan: &PairPlan) -> Approach {
         let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| {
             let is_cloud = matches!(surface, Surface::Cloud(_));
@@ -288,7 +289,7 @@ impl Scratch {
         plan.approach.at_sheet(near)
     }
 
-    /// What is known of a view beside its images and how these are folded.
+    /// What is known about a view besides its images and their folding.
     pub(super) fn seen<'a>(
         &self,
         query: &PairQuery,
@@ -349,7 +350,8 @@ impl Scratch {
             merge_gap,
             sharpens: true,
         };
-        // An unbounded surface as far as the cloud is deep in it, twice for what was not sampled.
+        // Of an unbounded surface, the part that the cloud is deep in, doubled for places without
+        // samples.
         let exact_view = |surface, frame_from_surface, deepest: f32| ExactView {
             exact: Placed {
                 surface,

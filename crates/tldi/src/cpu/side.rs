@@ -173,8 +173,9 @@ impl Side {
         self.image(view, &imaging, None);
     }
 
-    /// The image of the points that were projected in the columns in which they are within `reach` metres of an
-    /// exact surface, as far as that covers them. Returns its pixels; `None` where it is nowhere.
+    /// The image of the projected points, in the columns in which they are within `reach` metres of
+    /// an exact surface and the surface covers them. Returns its pixels; `None` where it is
+    /// nowhere.
     #[expect(clippy::too_many_arguments, reason = "a stage's parts of one look")]
     fn image_near(
         &mut self,
@@ -361,7 +362,7 @@ impl Side {
             surface,
             frame_from_surface,
         } = look.exact;
-        // Rays must pass through all of the surface, or what is deepest would be missed.
+        // Rays must pass through all of the surface, or they would miss the deepest part.
         let extent = surface.bounds().extents().length();
         let through = if extent.is_finite() { extent } else { 0.0 };
         let margin = view.params.prediction + (seen.far - seen.near) + through + look.reach;

@@ -1,10 +1,10 @@
 //! Stage `sweep`: the fragments of each pixel become layers.
 //!
-//! Within a pixel the fragments are sorted by class (entry, exit, edge-on) and depth; a run whose
-//! depths follow each other within the merge gap (of what is steep, within a thickness) is one
-//! layer: the mean of its fragments or, at an edge, of those on one face, since tangent planes do not hold
-//! beyond it (normals that are means of both faces have planes that do). Sums are integers: a layer does not
-//! depend on the order of the points.
+//! Within a pixel, fragments are sorted by class (entry, exit, edge-on) and depth. A run whose
+//! depths follow each other within the merge gap (within a thickness on steep surfaces) is one
+//! layer. The layer is the mean of its fragments. At an edge it is the mean of those on one face,
+//! because tangent planes do not hold beyond the edge. (Planes of normals that are means of both
+//! faces do.) Sums are integers: a layer does not depend on the order of the points.
 
 use super::splat::{
     DEPTH_STEPS, DepthScale, EDGE_ON, Fragment, Fragments, Imaging, NORMAL_STEPS, Splat,
@@ -177,8 +177,9 @@ pub(crate) fn is_edge_on(layer: &Layer) -> bool {
     layer.normal.z.abs() < EDGE_ON
 }
 
-/// How much the normal of a layer counts for a body whose outside is where the camera is (`side` −1) or beyond it (1):
-/// of an edge as far as its faces agree; in a groove both touch, each with its own normal.
+/// Weight of a layer's normal for a body whose outside is on the camera's side (`side` −1) or
+/// beyond the layer (1). At an edge it is how far the faces agree. In a groove both faces touch,
+/// each with its own normal, and it is 1.
 pub(crate) fn share_of(layer: &Layer, side: f32) -> f32 {
     let is_edge = layer.agreement * side * layer.normal.z > 0.0;
     if is_edge { layer.agreement.abs() } else { 1.0 }
