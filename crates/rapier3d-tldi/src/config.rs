@@ -1,6 +1,6 @@
 //! The settings of a pipeline.
 
-use crate::parts::cloud_of;
+use crate::narrow_phase::parts::cloud_of;
 use crate::{Resolution, TldiError};
 use rapier3d::parry::shape::Shape;
 use tldi::plan::largest_pixel;

@@ -1,13 +1,13 @@
 //! Pictures of what the pipeline sees, through rapier's debug renderer.
 
-use crate::candidates::{contact_reach, pose_of};
-use crate::exact::ExactShape;
-use crate::manifolds;
-use crate::parts::{
+use crate::narrow_phase::manifolds;
+use crate::narrow_phase::parts::{
     Hint, PartPair, ShapePair, append_part_pairs, append_queries, cloud_of, has_cloud, part,
     part_count, within_reach,
 };
-use crate::report::cloud_pairs;
+use crate::shape::exact::ExactShape;
+use crate::step::candidates::{contact_reach, pose_of};
+use crate::step::report::cloud_pairs;
 use crate::{PointCloudShape, TldiError, TldiPipeline};
 use rapier3d::dynamics::{IntegrationParameters, RigidBodySet};
 use rapier3d::geometry::{Collider, ColliderSet, ContactPair, NarrowPhase};

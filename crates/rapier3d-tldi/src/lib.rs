@@ -49,46 +49,27 @@
 //! - A body wholly inside a cloud's volume, surfaces apart, is not in contact.
 //! - Rapier cannot serialise custom shapes, nor the state of pairs with clouds.
 
-mod batching;
-mod candidates;
-mod collider;
 mod config;
+mod corrections;
 mod debug_render;
-mod dispatcher;
 #[cfg(doctest)]
 mod doc_examples;
 mod error;
-mod exact;
-mod impulses;
-mod manifolds;
-mod mass;
-mod measured;
-mod parts;
-mod pipeline;
-mod planes;
+mod narrow_phase;
 pub mod prelude;
-mod prepared;
-mod queries;
-mod report;
-mod resolution;
-mod rolling;
-mod sampled_motion;
 mod shape;
-mod shape_casts;
-mod surface_motion;
-mod surface_push;
-mod sweeps;
+mod step;
 
-pub use collider::cloud_collider;
 pub use config::TldiConfig;
+pub use corrections::surface_motion::TldiHooks;
 pub use debug_render::{DEBUG_POINT_LIMIT, TldiDebugRenderMode};
-pub use dispatcher::TldiDispatcher;
 pub use error::TldiError;
-pub use exact::ExactShape;
-pub use mass::{MassModel, unit_mass_properties};
-pub use pipeline::TldiPipeline;
-pub use report::{Contact, StepReport};
-pub use resolution::Resolution;
-pub use shape::PointCloudShape;
-pub use surface_motion::TldiHooks;
+pub use narrow_phase::dispatcher::TldiDispatcher;
+pub use shape::cloud_shape::PointCloudShape;
+pub use shape::collider::cloud_collider;
+pub use shape::exact::ExactShape;
+pub use shape::mass::{MassModel, unit_mass_properties};
+pub use step::pipeline::TldiPipeline;
+pub use step::report::{Contact, StepReport};
+pub use step::resolution::Resolution;
 pub use tldi::{self, CameraPolicy, CloudError, NonFinite, PointCloud, RayHit, RaySurface};

@@ -5,61 +5,33 @@
 //! to rapier.
 
 mod aabb;
-mod approach;
-mod backend;
-mod bowl;
-mod builder;
-mod camera;
-mod camera_policy;
 mod cloud;
-mod contacts;
+mod contact;
 mod cpu;
-mod crease;
-mod error;
-mod gap_fit;
-mod gather;
-mod impact;
-mod knn;
-mod links;
-mod lone_points;
-mod main_plane;
-mod morton;
-mod noise;
-mod normals;
+mod pair;
 pub mod paper;
-mod params;
-mod part_shape;
-mod patches;
-pub mod plan;
-mod radii;
-mod reach;
-mod supported;
-mod supports;
-mod surface;
-#[allow(clippy::module_inception, reason = "the image is the crate's namesake")]
-mod tldi;
-mod way_out;
-mod work;
+mod view;
 
-pub use crate::tldi::{Facing, Layer, Tldi};
 pub use aabb::Aabb;
-pub use backend::{Backend, BackendError, PairQuery, PairResult, View};
-pub use bowl::Lowest;
-pub use builder::{CloudBuilder, NonFinite, Positions};
-pub use camera::{Projection, VirtualCamera};
-pub use camera_policy::CameraPolicy;
-pub use cloud::{BLOCK, PointCloud, Radii};
-pub use contacts::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS};
+pub use cloud::builder::{CloudBuilder, NonFinite, Positions};
+pub use cloud::error::CloudError;
+pub use cloud::knn::{KdTree, Neighbor};
+pub use cloud::point_cloud::{BLOCK, PointCloud, Radii};
+pub use contact::bowl::Lowest;
+pub use contact::patch_types::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS};
+pub use contact::patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};
+pub use contact::supports::{Supports, supports};
 pub use cpu::{CpuBackend, build};
-pub use error::CloudError;
 pub use glamx;
-pub use impact::{Impact, ImpactQuery, Penetration};
-pub use knn::{KdTree, Neighbor};
-pub use params::{Params, Variant};
-pub use patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};
-pub use supports::{Supports, supports};
-pub use surface::{DeviceCloud, RayHit, RaySurface, Surface};
-pub use work::{Looked, Work};
+pub use pair::backend::{Backend, BackendError, PairQuery, PairResult, View};
+pub use pair::impact_query::{Impact, ImpactQuery, Penetration};
+pub use pair::params::{Params, Variant};
+pub use pair::plan;
+pub use pair::surface::{DeviceCloud, RayHit, RaySurface, Surface};
+pub use pair::work::{Looked, Work};
+pub use view::camera::{Projection, VirtualCamera};
+pub use view::camera_policy::CameraPolicy;
+pub use view::tldi::{Facing, Layer, Tldi};
 
 /// A view axis is kept from frame to frame while the normals of the contact zone agree with it
 /// within this angle, in radians (10°).

@@ -10,7 +10,7 @@ use super::fold::{FARTHEST_PIXEL, ViewFold};
 use super::lanes::{multiversioned, truncated};
 use super::rect::{Footprint, Rect};
 use super::splat::splat_radius;
-use crate::plan::AIM_SAMPLES;
+use crate::pair::plan::AIM_SAMPLES;
 use crate::{Projection, VirtualCamera};
 use glamx::{Mat3, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
@@ -18,7 +18,7 @@ use std::f32::consts::FRAC_1_SQRT_2;
 /// Least edge of a tile in pixels: smaller ones cost more than they leave out.
 const LEAST_TILE: i32 = 2;
 
-/// For [`stage_constants`](crate::plan::stage_constants).
+/// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 1] = [("LEAST_TILE", LEAST_TILE as f64)];
 
 /// Lanes of the bounds' reduction.

@@ -7,7 +7,7 @@
 
 use super::fold::ViewFold;
 use super::sweep::{SAME_FACE, is_edge_on, share_of};
-use crate::camera_policy::MAX_VIEWS;
+use crate::view::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec2, Vec3};
@@ -308,7 +308,7 @@ const FACING: f32 = 0.5;
 /// How far in pixels the middle of a neighbouring pixel is from a wall, at least, that it is beside.
 const BESIDE: f32 = 0.5;
 
-/// For [`stage_constants`](crate::plan::stage_constants).
+/// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 5] = [
     ("FACING", FACING as f64),
     ("BESIDE", BESIDE as f64),

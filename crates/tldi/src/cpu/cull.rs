@@ -3,7 +3,7 @@
 //!
 //! One pass over the cloud, skipping blocks of [`BLOCK`] points whose bounds miss the overlap: the
 //! floor of the whole pipeline is this stage's reading of the coordinates. Of a cloud much finer
-//! than the pixels only every n-th point is taken ([`stride`](crate::plan::stride)): more would not be seen.
+//! than the pixels only every n-th point is taken ([`stride`](crate::pair::plan::stride)): more would not be seen.
 //!
 //! Coarser points reach farther ([`reach`](crate::reach)). In such a cloud, the box of a block is
 //! as wide as its coarsest point needs. Points inside are then tested again, each by its own
@@ -11,8 +11,8 @@
 
 use super::fold::SpaceFold;
 use super::lanes::multiversioned;
-use crate::plan::first_taken;
-use crate::reach::{Ring, Uneven};
+use crate::cloud::reach::{Ring, Uneven};
+use crate::pair::plan::first_taken;
 use crate::{Aabb, BLOCK, PointCloud, Radii};
 use glamx::{Mat3, Pose3, Vec3};
 use rayon::prelude::*;

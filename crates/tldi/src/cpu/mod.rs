@@ -25,8 +25,8 @@ pub(crate) mod splat;
 pub(crate) mod sweep;
 pub(crate) mod zone;
 
-use crate::reach::Ring;
-use crate::supported::supported_surfaces;
+use crate::cloud::reach::Ring;
+use crate::pair::supported::supported_surfaces;
 use crate::{
     Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,
     Tldi, Variant, VirtualCamera, Work, paper,

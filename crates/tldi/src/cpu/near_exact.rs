@@ -12,7 +12,7 @@ use super::normals;
 use super::rect::Rect;
 use super::side::Side;
 use super::zone::ZoneGrid;
-use crate::plan::{AIM_SAMPLES, is_aim_sample};
+use crate::pair::plan::{AIM_SAMPLES, is_aim_sample};
 use crate::{Aabb, PointCloud, RaySurface, VirtualCamera};
 use glamx::{Pose3, Vec3};
 
@@ -202,8 +202,8 @@ impl Side {
 mod tests {
     use super::*;
     use crate::RayHit;
+    use crate::cloud::reach::Ring;
     use crate::cpu::cull::{self, Region};
-    use crate::reach::Ring;
     use fastrand::Rng;
 
     /// A ball of one metre.

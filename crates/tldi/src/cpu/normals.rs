@@ -27,7 +27,7 @@ pub(super) const MAX_CANDIDATES: usize = 512;
 /// Candidates that are summed side by side.
 pub(super) const LANES: usize = 8;
 
-/// For [`stage_constants`](crate::plan::stage_constants).
+/// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 2] = [
     ("SUPPORT", SUPPORT as f64),
     ("MAX_CANDIDATES", MAX_CANDIDATES as f64),
@@ -319,7 +319,7 @@ fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::normals::{covariance, least_variance_axis};
+    use crate::cloud::point_normals::{covariance, least_variance_axis};
     use glamx::DVec3;
 
     /// Normals equal those of all neighbours by brute force in f64, and only those that are wanted

@@ -9,7 +9,7 @@
 use super::lanes::multiversioned;
 use super::normals::{LANES, MAX_CANDIDATES, NormalScratch, SUPPORT, Sorted};
 use super::planes::Plane;
-use crate::supports::ramp;
+use crate::contact::supports::ramp;
 use glamx::Vec3;
 
 /// Standard deviation of neighbours from their plane, in mean radii, up to which they are on it: a tenth of
@@ -25,7 +25,7 @@ const OFF_PLANE: f32 = 4.0;
 /// Deviation from a plane, in mean radii, at which it is not flat, or a point is not on it.
 const FLAT: f32 = 0.05;
 
-/// For [`stage_constants`](crate::plan::stage_constants).
+/// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 4] = [
     ("ON_PLANE", ON_PLANE as f64),
     ("OF_NOISE", OF_NOISE as f64),

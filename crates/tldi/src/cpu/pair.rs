@@ -11,10 +11,10 @@ use super::rect::Rect;
 use super::side::{CloudView, ExactView, Scope, Side};
 use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneScratch, ZoneSide};
-use crate::camera_policy::{MAX_VIEWS, ZoneNormals, aim, further_axes, seen_from_behind};
-use crate::patches::PatchScratch;
-use crate::plan::{Approach, PairPlan, SidePlan, column_reach, stride};
-use crate::reach::Place;
+use crate::cloud::reach::Place;
+use crate::contact::patches::PatchScratch;
+use crate::pair::plan::{Approach, PairPlan, SidePlan, column_reach, stride};
+use crate::view::camera_policy::{MAX_VIEWS, ZoneNormals, aim, further_axes, seen_from_behind};
 use crate::{
     CameraPolicy, Looked, PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera,
     Work, paper,

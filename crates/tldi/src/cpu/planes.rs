@@ -1,7 +1,7 @@
 //! Planes of neighbourhoods of points: their normals are solved for side by side.
 
 use super::lanes::multiversioned;
-use crate::normals::least_variance_axis;
+use crate::cloud::point_normals::least_variance_axis;
 use glamx::{DMat3, DVec3, FloatExt, Vec3};
 
 /// Planes that are solved for side by side.
@@ -11,7 +11,7 @@ const BATCH: usize = 64;
 /// normal in single precision: below it the points are on a line or coincide.
 const LEAST_PLANAR: f32 = 1e-4;
 
-/// For [`stage_constants`](crate::plan::stage_constants).
+/// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 1] = [("LEAST_PLANAR", LEAST_PLANAR as f64)];
 
 /// Sums over the points around a point, of 1, x, y, z, xx, xy, xz, yy, yz and zz; metres from the point.

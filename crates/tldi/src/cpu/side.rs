@@ -12,8 +12,8 @@ use super::normals_sharpen::sharpen;
 use super::rect::{Footprint, Rect};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
 use super::sweep;
-use crate::lone_points::Culled;
-use crate::plan::{AIM_SAMPLES, SidePlan, is_aim_sample};
+use crate::contact::lone_points::Culled;
+use crate::pair::plan::{AIM_SAMPLES, SidePlan, is_aim_sample};
 use crate::{Params, PointCloud, RayHit, Tldi, VirtualCamera};
 use glamx::{DVec3, Mat3, Pose3, Vec3};
 

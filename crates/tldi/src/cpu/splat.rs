@@ -49,7 +49,7 @@ const DEPTH_BITS: u32 = 30;
 /// Largest depth in steps: 2 to that power less what an `f32` is precise to there.
 const MAX_DEPTH: f32 = ((1 << DEPTH_BITS) - 64) as f32;
 
-/// For [`stage_constants`](crate::plan::stage_constants).
+/// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 8] = [
     ("STEEP", STEEP as f64),
     ("DEPTH_STEPS", DEPTH_STEPS as f64),

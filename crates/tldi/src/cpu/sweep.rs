@@ -24,7 +24,7 @@ const BEND_STEPS: f32 = 16.0;
 const MOST_ASIDE: f32 = 4.0;
 const BEND_SHIFT: u32 = 6;
 
-/// For [`stage_constants`](crate::plan::stage_constants).
+/// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 5] = [
     ("CREASED", CREASED as f64),
     ("SAME_FACE", SAME_FACE as f64),

@@ -11,7 +11,7 @@ use super::cull::Survivors;
 use super::fold::{SpaceFold, is_coarse};
 use super::lanes::{multiversioned, truncated};
 use crate::Aabb;
-use crate::reach::{Class, classes};
+use crate::cloud::reach::{Class, classes};
 use glamx::Vec3;
 
 /// Most cells of the grid: 4 Mi bits are 512 KiB, which stays in a core's cache. Larger overlaps

@@ -1,0 +1,292 @@
+//! The velocity of deforming surfaces, and how it reaches rapier's contacts.
+//!
+//! Rapier knows velocities of bodies, not of a cloud's points. The solver gets these as the
+//! `tangent_velocity` of its contacts. It treats that as a motion of the first body's surface,
+//! along the normal too. Rapier resolves a penetration at a rate. An approaching surface would have
+//! to penetrate until that rate keeps up, so contacts are reported deeper by that amount. Surfaces
+//! that approach faster than rapier corrects push bodies before the step (`surface_push.rs`). The
+//! speed of new samples is measured (`sampled_motion.rs`).
+
+use crate::PointCloudShape;
+use crate::corrections::sampled_motion::{Snapshot, way_along};
+use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodyHandle};
+use rapier3d::geometry::{ColliderHandle, ColliderSet, SolverFlags};
+use rapier3d::math::Vector;
+use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
+use tldi::PointCloud;
+
+/// The known motion of clouds that got other points since the last step.
+#[derive(Default)]
+pub(crate) struct SurfaceMotions {
+    motions: Vec<SurfaceMotion>,
+    sampled: Vec<SampledMotion>,
+    /// Seconds in which the solver undoes a penetration: between moving bodies, and with one that
+    /// does not move.
+    undoing: [f32; 2],
+    dt: f32,
+    /// Least closing speed at which bodies are pushed, or were pushed in this step, m/s.
+    least_push: f32,
+    pushed: bool,
+    /// Memory of those that were forgotten.
+    spare: Vec<Vec<Vector>>,
+    spare_snapshots: Vec<Snapshot>,
+}
+
+/// Of a cloud that deformed.
+struct SurfaceMotion {
+    collider: ColliderHandle,
+    /// Of each point, in the collider's frame, m/s.
+    velocities: Vec<Vector>,
+}
+
+/// Of a cloud that was sampled anew.
+struct SampledMotion {
+    collider: ColliderHandle,
+    /// Its points before that, and, if it was sampled anew in the step before as well, those that it
+    /// had before that.
+    before: Snapshot,
+    earlier: Option<Snapshot>,
+    /// Since the last step, or in it.
+    is_new: bool,
+}
+
+/// Share of rapier's fastest correction up to which that is left to do it: its contacts rub.
+const LEFT_TO_CORRECTION: f32 = 0.5;
+
+impl SurfaceMotions {
+    /// The points that `cloud` has now, in memory to be handed to [`record`](Self::record).
+    pub(crate) fn before(&mut self, cloud: &PointCloud<'_>) -> Vec<Vector> {
+        let mut points = self.spare.pop().unwrap_or_default();
+        points.clear();
+        points.extend(cloud.points());
+        points
+    }
+
+    /// The points that `cloud` has now, to be handed to
+    /// [`record_sampled`](Self::record_sampled).
+    pub(crate) fn snapshot(&mut self, cloud: &PointCloud<'_>) -> Snapshot {
+        let mut snapshot = self.spare_snapshots.pop().unwrap_or_default();
+        snapshot.take(cloud);
+        snapshot
+    }
+
+    /// Records that the points `before` moved to those of `cloud` within `dt` seconds.
+    pub(crate) fn record(
+        &mut self,
+        collider: ColliderHandle,
+        mut before: Vec<Vector>,
+        cloud: &PointCloud<'_>,
+        dt: f32,
+    ) {
+        for (old, new) in before.iter_mut().zip(cloud.points()) {
+            *old = (new - *old) / dt;
+        }
+        self.forget(collider);
+        self.motions.push(SurfaceMotion {
+            collider,
+            velocities: before,
+        });
+    }
+
+    /// Records that this collider's surface, sampled by `before`, is sampled anew.
+    pub(crate) fn record_sampled(&mut self, collider: ColliderHandle, before: Snapshot) {
+        self.forget_velocities(collider);
+        match self.sampled.iter_mut().find(|m| m.collider == collider) {
+            // Twice since the last step: what lay before the first time counts.
+            Some(motion) if motion.is_new => self.spare_snapshots.push(before),
+            Some(motion) => {
+                let earlier = std::mem::replace(&mut motion.before, before);
+                self.spare_snapshots.extend(motion.earlier.replace(earlier));
+                motion.is_new = true;
+            }
+            None => self.sampled.push(SampledMotion {
+                collider,
+                before,
+                earlier: None,
+                is_new: true,
+            }),
+        }
+    }
+
+    /// Nothing is known of the motion of this collider's points.
+    pub(crate) fn forget(&mut self, collider: ColliderHandle) {
+        self.forget_velocities(collider);
+        if let Some(at) = self.sampled.iter().position(|m| m.collider == collider) {
+            let motion = self.sampled.swap_remove(at);
+            self.spare_snapshots.push(motion.before);
+            self.spare_snapshots.extend(motion.earlier);
+        }
+    }
+
+    fn forget_velocities(&mut self, collider: ColliderHandle) {
+        if let Some(at) = self.motions.iter().position(|m| m.collider == collider) {
+            self.spare.push(self.motions.swap_remove(at).velocities);
+        }
+    }
+
+    /// Takes over what concerns contacts from the parameters of the step to come.
+    pub(crate) fn prepare(&mut self, integration: &IntegrationParameters) {
+        let substep = integration.dt / integration.num_solver_iterations as f32;
+        let softness = [
+            integration.contact_softness,
+            integration.static_contact_softness,
+        ];
+        self.undoing = softness.map(|softness| 1.0 / softness.erp_inv_dt(substep));
+        self.dt = integration.dt;
+        self.least_push = LEFT_TO_CORRECTION * integration.max_corrective_velocity();
+        self.pushed = false;
+    }
+
+    /// Least closing speed at which bodies are pushed, m/s. Records that they were.
+    pub(crate) fn begin_push(&mut self) -> f32 {
+        self.pushed = true;
+        self.least_push
+    }
+
+    /// After a step, surfaces stand still until they are moved again.
+    pub(crate) fn clear(&mut self) {
+        self.spare
+            .extend(self.motions.drain(..).map(|motion| motion.velocities));
+        let stopped = self.sampled.extract_if(.., |motion| !motion.is_new);
+        for motion in stopped {
+            self.spare_snapshots.push(motion.before);
+            self.spare_snapshots.extend(motion.earlier);
+        }
+        for motion in &mut self.sampled {
+            motion.is_new = false;
+        }
+    }
+
+    /// Whether one of these colliders has a motion.
+    pub(crate) fn have(&self, colliders: [ColliderHandle; 2]) -> bool {
+        let deformed = self.motions.iter().map(|motion| motion.collider);
+        let sampled = self.sampled.iter().filter(|motion| motion.is_new);
+        deformed
+            .chain(sampled.map(|motion| motion.collider))
+            .any(|collider| colliders.contains(&collider))
+    }
+
+    /// Velocity in world space, m/s, of the collider's surface at a point in world space, beside
+    /// that of its body; of one that was sampled anew along `normal`, of unit length.
+    pub(crate) fn at(
+        &self,
+        collider: ColliderHandle,
+        colliders: &ColliderSet,
+        point: Vector,
+        normal: Vector,
+    ) -> Vector {
+        let Some(found) = colliders.get(collider) else {
+            return Vector::ZERO;
+        };
+        let Some(shape) = found.shape().as_shape::<PointCloudShape>() else {
+            return Vector::ZERO;
+        };
+        let pose = found.position();
+        let local = pose.inverse_transform_point(point);
+        if let Some(motion) = self.motions.iter().find(|m| m.collider == collider) {
+            return pose.rotation * mean_near(shape.cloud(), &motion.velocities, local);
+        }
+        let sampled = self.sampled.iter().find(|m| m.collider == collider);
+        match sampled.and_then(|m| Some([m.earlier.as_ref()?, &m.before])) {
+            Some(old) if self.dt > 0.0 => {
+                let normal_in_cloud = pose.rotation.inverse() * normal;
+                let way = way_along(shape.cloud(), old, local, normal_in_cloud);
+                way / self.dt * normal
+            }
+            _ => Vector::ZERO,
+        }
+    }
+}
+
+/// Mean of the values of the points near `point`, weighted by nearness; of the nearest where none
+/// is within two radii.
+fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector {
+    let reach = 2.0 * cloud.mean_radius();
+    let [x, y, z] = cloud.coordinates();
+    let (mut sum, mut total) = (Vector::ZERO, 0.0);
+    let mut nearest = (f32::INFINITY, Vector::ZERO);
+    for (block, bounds) in cloud.blocks().iter().enumerate() {
+        let distance = point.clamp(bounds.min, bounds.max).distance_squared(point);
+        if distance > nearest.0.max(reach * reach) {
+            continue;
+        }
+        let first = block * tldi::BLOCK;
+        for i in first..(first + tldi::BLOCK).min(values.len()) {
+            let squared = Vector::new(x[i], y[i], z[i]).distance_squared(point);
+            if squared < nearest.0 {
+                nearest = (squared, values[i]);
+            }
+            let weight = (1.0 - squared / (reach * reach)).max(0.0);
+            sum += weight * values[i];
+            total += weight;
+        }
+    }
+    if total > 0.0 { sum / total } else { nearest.1 }
+}
+
+/// Hooks around the user's own, which give the velocities of deforming clouds to rapier's solver.
+/// Get them from [`TldiPipeline::hooks`](crate::TldiPipeline::hooks).
+///
+/// ```
+/// use rapier3d::prelude::*;
+/// use rapier3d_tldi::prelude::*;
+/// let mut world = PhysicsWorld::default();
+/// let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// tldi.attach(&mut world);
+/// // What `TldiPipeline::step` does; `()` stands for hooks and event handler of your own.
+/// tldi.prepare(
+///     world.gravity,
+///     &world.integration_parameters,
+///     &world.bodies,
+///     &world.colliders,
+/// )?;
+/// world.step_with_events(&tldi.hooks(&()), &());
+/// tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
+/// # Ok::<(), TldiError>(())
+/// ```
+pub struct TldiHooks<'a> {
+    pub(crate) motions: &'a SurfaceMotions,
+    pub(crate) inner: &'a dyn PhysicsHooks,
+}
+
+impl PhysicsHooks for TldiHooks<'_> {
+    fn filter_contact_pair(&self, context: &PairFilterContext<'_>) -> Option<SolverFlags> {
+        self.inner.filter_contact_pair(context)
+    }
+
+    fn filter_intersection_pair(&self, context: &PairFilterContext<'_>) -> bool {
+        self.inner.filter_intersection_pair(context)
+    }
+
+    fn modify_solver_contacts(&self, context: &mut ContactModificationContext<'_>) {
+        let (collider1, collider2) = (context.collider1, context.collider2);
+        let colliders = context.colliders;
+        let moves = |handle: Option<RigidBodyHandle>| {
+            let body = handle.and_then(|handle| context.bodies.get(handle));
+            body.is_some_and(RigidBody::is_dynamic)
+        };
+        let [undoing_of_both, undoing_of_one] = self.motions.undoing;
+        let undoing = match moves(context.rigid_body1) && moves(context.rigid_body2) {
+            true => undoing_of_both,
+            false => undoing_of_one,
+        };
+        let deforms =
+            |motion: &SurfaceMotion| motion.collider == collider1 || motion.collider == collider2;
+        if self.motions.motions.iter().any(deforms)
+            && let Some(rigid) = context.rigid_mut()
+        {
+            for contact in rigid.solver_contacts.iter_mut() {
+                // Inside a hook the anchors are in world space.
+                let of =
+                    |collider, anchor| self.motions.at(collider, colliders, anchor, *rigid.normal);
+                let velocity = of(collider1, contact.anchor1) - of(collider2, contact.anchor2);
+                let closing = velocity.dot(*rigid.normal).max(0.0);
+                contact.tangent_velocity += velocity;
+                if !(self.motions.pushed && closing > self.motions.least_push) {
+                    contact.dist -= undoing * closing;
+                }
+            }
+        }
+        self.inner.modify_solver_contacts(context);
+    }
+}

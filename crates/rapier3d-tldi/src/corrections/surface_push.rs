@@ -1,0 +1,90 @@
+//! A body in the way of a fast surface takes its velocity.
+//!
+//! Rapier resolves a penetration at `max_corrective_velocity` at most (3 m/s in a world of human
+//! size), and gives the body no velocity for it. So a faster surface passes through bodies. In
+//! rapier's solver a body has a velocity, but a deforming surface has none. Therefore, before the
+//! step, a body that such a surface is about to penetrate gets the surface's velocity along the
+//! normal, as in an inelastic impact.
+
+use crate::corrections::impulses::{PushedPoint, separate, velocity_at};
+use crate::corrections::surface_motion::SurfaceMotions;
+use crate::narrow_phase::parts::PartPair;
+use crate::step::candidates::pose_of;
+use crate::step::prepared::Batch;
+use rapier3d::dynamics::{IntegrationParameters, RigidBodySet};
+use rapier3d::geometry::{Collider, ColliderSet};
+use rapier3d::math::{Pose, Vector};
+use tldi::PairResult;
+
+/// Steps in which a penetration is resolved. A body that moves exactly as fast as the surface would
+/// stay as deep as it is, so it ends up a little faster than the surface.
+const UNDONE_IN: f32 = 6.0;
+
+/// Gives the bodies in the way of surfaces that close faster than `least_speed` m/s their velocity.
+pub(crate) fn push(
+    motions: &SurfaceMotions,
+    least_speed: f32,
+    batch: &Batch,
+    bodies: &mut RigidBodySet,
+    colliders: &ColliderSet,
+    integration: &IntegrationParameters,
+) {
+    let mut points = Vec::new();
+    for pair in batch.pairs.iter().filter(|pair| !pair.is_kept) {
+        if !motions.have(pair.colliders) {
+            continue;
+        }
+        let found = pair.colliders.map(|handle| colliders.get(handle));
+        let [Some(collider1), Some(collider2)] = found else {
+            continue;
+        };
+        if collider1.is_sensor() || collider2.is_sensor() {
+            continue;
+        }
+        let of = [collider1, collider2].map(Collider::parent);
+        let pose1 = pose_of(collider1, bodies);
+        let parts = &batch.parts[pair.parts.clone()];
+        for (on_surface, normal, gap) in contacts(parts, &batch.results, &pose1) {
+            let velocity =
+                |k: usize| motions.at(pair.colliders[k], colliders, on_surface[k], normal);
+            let point = on_surface[0].midpoint(on_surface[1]);
+            let speed = (velocity(0) - velocity(1)).dot(normal);
+            let closing =
+                (velocity_at(bodies, of[0], point) - velocity_at(bodies, of[1], point)).dot(normal);
+            if speed > least_speed && gap < (speed + closing) * integration.dt {
+                points.push(PushedPoint {
+                    bodies: of,
+                    point,
+                    normal,
+                    speed: speed + (-gap).max(0.0) / (UNDONE_IN * integration.dt),
+                    impulse: 0.0,
+                });
+            }
+        }
+    }
+    separate(&mut points, bodies);
+}
+
+/// Points on both surfaces, normals and gaps of the contacts of `parts`, in world space; `pose1` is
+/// that of the first collider.
+fn contacts<'a>(
+    parts: &'a [PartPair],
+    results: &'a [PairResult],
+    pose1: &'a Pose,
+) -> impl Iterator<Item = ([Vector; 2], Vector, f32)> + 'a {
+    parts.iter().flat_map(move |part| {
+        let world_from_a = part.poses[0].map_or(*pose1, |pose| *pose1 * pose);
+        let patches = part
+            .comparison
+            .as_ref()
+            .map(|comparison| &results[comparison.query].patches);
+        patches.into_iter().flatten().flat_map(move |patch| {
+            let normal = world_from_a.rotation * patch.normal;
+            let points = patch.points.iter();
+            points.map(move |point| {
+                let on_surface = [point.point_a, point.point_b].map(|p| world_from_a * p);
+                (on_surface, normal, point.gap)
+            })
+        })
+    })
+}

@@ -1,0 +1,241 @@
+//! From contact patches to rapier's manifolds.
+//!
+//! Rapier's solver keeps references into a pair's manifolds. A pair whose manifolds are rebuilt
+//! must own a workspace, which tells rapier to rebuild those references
+//! (`OUTCOME_FULL_COMPOSITE` in rapier3d's `narrow_phase/pair_update.rs`); without one, replacing
+//! or removing manifolds corrupts the solver. So every call here leaves a [`ManifoldWorkspace`].
+
+use crate::narrow_phase::parts::{PartPair, ShapePair, part};
+use crate::narrow_phase::planes::share_planes;
+use crate::step::measured::Measured;
+use rapier3d::geometry::{ContactManifold, ContactManifoldData};
+use rapier3d::parry::query::details::{
+    ContactManifoldsWorkspace, TypedWorkspaceData, WorkspaceData,
+};
+use rapier3d::parry::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
+use rapier3d::parry::shape::PackedFeatureId;
+use tldi::{ContactPatch, PairResult};
+
+/// A contact inherits the impulses of a near one of the step before if their normals agree within
+/// this angle's cosine (26°): what matters is that the impulse pushes the same way.
+const COS_SAME_NORMAL: f32 = 0.9;
+
+/// Most roughness of a contact that counts as scatter of its measurement, in scatters: rougher ones
+/// are not noisy but uneven.
+const MOST_SCATTERS: f32 = 2.0;
+
+/// Manifolds of the step before and memory for the next, kept by rapier for each pair.
+#[derive(Clone, Default)]
+struct ManifoldWorkspace {
+    previous: Vec<ContactManifold>,
+    measured: Option<Measured>,
+}
+
+impl WorkspaceData for ManifoldWorkspace {
+    fn as_typed_workspace_data(&self) -> TypedWorkspaceData<'_> {
+        TypedWorkspaceData::Custom
+    }
+
+    fn clone_dyn(&self) -> Box<dyn WorkspaceData> {
+        Box::new(self.clone())
+    }
+}
+
+/// Carries a pair's manifolds over to the relative pose of `pair` if they still hold there, and
+/// returns whether they do.
+pub(crate) fn keep(
+    pair: &ShapePair<'_>,
+    manifolds: &mut [ContactManifold],
+    workspace: &mut Option<ContactManifoldsWorkspace>,
+) -> bool {
+    let measured = workspace_of(workspace).measured;
+    let holds = measured.is_some_and(|measured| measured.holds(&pair.pos12, pair.prediction));
+    if !holds {
+        return false;
+    }
+    for manifold in manifolds {
+        manifold.local_n2 = pair.pos12.rotation.inverse() * -manifold.local_n1;
+        manifold.update_separations(&pair.pos12);
+    }
+    true
+}
+
+/// Replaces a pair's manifolds by those of `parts`, whose comparisons have the results `results`,
+/// and carries the impulses of the step before over to the contacts nearest by. `measured` tells
+/// for how long they hold.
+pub(crate) fn fill(
+    pair: &ShapePair<'_>,
+    measured: Option<Measured>,
+    parts: &[PartPair],
+    results: &[PairResult],
+    manifolds: &mut Vec<ContactManifold>,
+    workspace: &mut Option<ContactManifoldsWorkspace>,
+) {
+    let workspace = workspace_of(workspace);
+    workspace.measured = measured;
+    let previous = &mut workspace.previous;
+    std::mem::swap(manifolds, previous);
+    // `manifolds` now holds those of two steps ago, of use for their memory only.
+    let mut filled = 0;
+    let (mut match_distance, mut scatter) = (pair.prediction, 0.0);
+    for part_pair in parts {
+        let first = filled;
+        match &part_pair.comparison {
+            Some(comparison) => {
+                for patch in &results[comparison.query].patches {
+                    if !patch.points.is_empty() {
+                        let manifold = emptied(manifolds, filled);
+                        write_patch(patch, part_pair, comparison.scatter, manifold);
+                        filled += 1;
+                    }
+                }
+                match_distance = f32::max(match_distance, comparison.match_distance());
+                scatter = f32::max(scatter, comparison.scatter);
+            }
+            None => {
+                manifolds.truncate(filled);
+                append_exact(pair, part_pair, manifolds);
+                filled = manifolds.len();
+            }
+        }
+        for manifold in &mut manifolds[first..filled] {
+            place(manifold, part_pair);
+        }
+    }
+    manifolds.truncate(filled);
+    if parts.len() > 1 {
+        share_planes(pair, scatter, manifolds);
+    }
+    for manifold in manifolds {
+        inherit_impulses(manifold, previous, match_distance);
+    }
+}
+
+/// Moves a manifold from the frames of the parts to those of the colliders.
+fn place(manifold: &mut ContactManifold, parts: &PartPair) {
+    [manifold.subshape1, manifold.subshape2] = parts.parts;
+    if let Some(pose1) = parts.poses[0] {
+        manifold.local_n1 = pose1.rotation * manifold.local_n1;
+        for point in &mut manifold.points {
+            point.local_p1 = pose1 * point.local_p1;
+        }
+    }
+    if let Some(pose2) = parts.poses[1] {
+        manifold.local_n2 = pose2.rotation * manifold.local_n2;
+        for point in &mut manifold.points {
+            point.local_p2 = pose2 * point.local_p2;
+        }
+    }
+}
+
+/// The pair's workspace; a new one where it has none of ours.
+fn workspace_of(workspace: &mut Option<ContactManifoldsWorkspace>) -> &mut ManifoldWorkspace {
+    let ours = workspace
+        .as_ref()
+        .is_some_and(|workspace| workspace.0.is::<ManifoldWorkspace>());
+    if !ours {
+        *workspace = None;
+    }
+    workspace
+        .get_or_insert_with(|| ManifoldWorkspace::default().into())
+        .0
+        .downcast_mut()
+        .expect("replaced above unless it is one")
+}
+
+/// The manifold with this index, appended if there are just so many, without points and with data
+/// that refers to nothing; its memory is kept.
+fn emptied(manifolds: &mut Vec<ContactManifold>, index: usize) -> &mut ContactManifold {
+    if index == manifolds.len() {
+        manifolds.push(ContactManifold::new());
+    }
+    let manifold = &mut manifolds[index];
+    manifold.points.clear();
+    let mut solver_contacts = std::mem::take(&mut manifold.data.solver_contacts);
+    solver_contacts.clear();
+    manifold.data = ContactManifoldData::default();
+    manifold.data.solver_contacts = solver_contacts;
+    manifold
+}
+
+/// Writes the points of `patch`. A gap within the patch's roughness, and within `scatter` metres,
+/// counts as touching.
+fn write_patch(
+    patch: &ContactPatch,
+    pair: &PartPair,
+    scatter: f32,
+    manifold: &mut ContactManifold,
+) {
+    let b_from_a = pair.a_from_b.inverse();
+    let scatter = (MOST_SCATTERS * scatter).min(patch.roughness);
+    manifold.local_n1 = patch.normal;
+    manifold.local_n2 = b_from_a.rotation * -patch.normal;
+    manifold.points.extend(patch.points.iter().map(|point| {
+        let gap = (point.gap - scatter).max(0.0) + (point.gap + scatter).min(0.0);
+        let apart = 0.5 * (gap - point.gap) * patch.normal;
+        TrackedContact::new(
+            point.point_a - apart,
+            b_from_a * (point.point_b + apart),
+            PackedFeatureId::UNKNOWN, // points of a cloud are no features
+            PackedFeatureId::UNKNOWN,
+            gap,
+        )
+    }));
+}
+
+/// Appends rapier's own manifolds for two parts of which none is a cloud. Its dispatcher knows all
+/// such pairs of single shapes, and says so for those it does not, in which case there is none.
+fn append_exact(pair: &ShapePair<'_>, parts: &PartPair, manifolds: &mut Vec<ContactManifold>) {
+    let mut found: Vec<ContactManifold> = Vec::new();
+    let answer = DefaultQueryDispatcher.contact_manifolds(
+        &parts.a_from_b,
+        part(pair.shape1, parts.parts[0]).1,
+        part(pair.shape2, parts.parts[1]).1,
+        pair.prediction,
+        &mut found,
+        &mut None,
+    );
+    if answer.is_ok() {
+        manifolds.extend(found.into_iter().filter(|m| !m.points.is_empty()));
+    }
+}
+
+/// Hands the impulses of the old contacts to the new ones nearest to them, each at most once.
+///
+/// A contact stays put on at least one of the two shapes (both at rest, one when sliding), so the
+/// nearer of the two distances counts. Manifolds the solver did not see (rapier solved clusters in
+/// their place, and matches those itself) have nothing to inherit.
+fn inherit_impulses(
+    manifold: &mut ContactManifold,
+    previous: &mut [ContactManifold],
+    match_distance: f32,
+) {
+    let normal = manifold.local_n1;
+    let mut inherits_user_data = true;
+    for point in &mut manifold.points {
+        let mut nearest = None;
+        let mut nearest_squared = match_distance * match_distance;
+        for (m, old) in previous.iter().enumerate() {
+            if old.data.solver_contacts.is_empty() || old.local_n1.dot(normal) < COS_SAME_NORMAL {
+                continue;
+            }
+            for (p, old_point) in old.points.iter().enumerate() {
+                let squared = old_point
+                    .local_p1
+                    .distance_squared(point.local_p1)
+                    .min(old_point.local_p2.distance_squared(point.local_p2));
+                if squared < nearest_squared {
+                    nearest = Some((m, p));
+                    nearest_squared = squared;
+                }
+            }
+        }
+        if let Some((m, p)) = nearest {
+            let old = &mut previous[m];
+            point.data = old.points.swap_remove(p).data;
+            if std::mem::take(&mut inherits_user_data) {
+                manifold.data.user_data = old.data.user_data;
+            }
+        }
+    }
+}

@@ -1,0 +1,8 @@
+//! What rapier's narrow phase and queries ask about clouds, and the answers.
+
+pub(crate) mod dispatcher;
+pub(crate) mod manifolds;
+pub(crate) mod parts;
+pub(crate) mod planes;
+pub(crate) mod queries;
+pub(crate) mod shape_casts;

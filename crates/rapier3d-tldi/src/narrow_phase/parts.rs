@@ -1,0 +1,203 @@
+//! From a pair of shapes to the comparisons it needs: one for each pair of parts.
+
+use crate::shape::exact::ExactShape;
+use crate::{PointCloudShape, TldiConfig};
+use rapier3d::math::{Pose, Vector};
+use rapier3d::parry::bounding_volume::{Aabb, BoundingVolume};
+use rapier3d::parry::shape::Shape;
+use tldi::{PairQuery, Params, PointCloud, Surface, View};
+
+/// The cloud of a shape that is one.
+pub(crate) fn cloud_of(shape: &dyn Shape) -> Option<&PointCloudShape> {
+    shape.as_shape::<PointCloudShape>()
+}
+
+/// The clouds that a shape consists of: itself, or parts of a compound.
+pub(crate) fn clouds_of(shape: &dyn Shape) -> impl Iterator<Item = &PointCloud<'static>> {
+    (0..part_count(shape))
+        .filter_map(move |i| cloud_of(part(shape, i).1))
+        .map(PointCloudShape::cloud)
+}
+
+/// Whether the shape is a cloud or a compound that holds one.
+pub(crate) fn has_cloud(shape: &dyn Shape) -> bool {
+    clouds_of(shape).next().is_some()
+}
+
+/// Number of parts: those of a compound, or one.
+pub(crate) fn part_count(shape: &dyn Shape) -> u32 {
+    shape
+        .as_compound()
+        .map_or(1, |compound| compound.shapes().len() as u32)
+}
+
+/// A part's pose in the frame of the whole (none: the same frame) and its shape.
+pub(crate) fn part(shape: &dyn Shape, index: u32) -> (Option<&Pose>, &dyn Shape) {
+    match shape.as_compound() {
+        Some(compound) => {
+            let (pose, part) = &compound.shapes()[index as usize];
+            (Some(pose), &**part)
+        }
+        None => (None, shape),
+    }
+}
+
+/// Whether contacts up to a gap of `prediction` metres are possible: the bounds meet in the frames
+/// of both shapes. `pos12` maps from the frame of shape 2 into that of shape 1.
+pub(crate) fn within_reach(
+    shape1: &dyn Shape,
+    shape2: &dyn Shape,
+    pos12: &Pose,
+    prediction: f32,
+) -> bool {
+    let local1 = shape1.compute_local_aabb().loosened(prediction);
+    let local2 = shape2.compute_local_aabb().loosened(prediction);
+    local1.intersects(&shape2.compute_aabb(pos12))
+        && local2.intersects(&shape1.compute_aabb(&pos12.inverse()))
+}
+
+/// Two shapes as rapier's narrow phase sees them.
+#[derive(Clone, Copy)]
+pub(crate) struct ShapePair<'a> {
+    pub(crate) shape1: &'a dyn Shape,
+    pub(crate) shape2: &'a dyn Shape,
+    /// From the frame of shape 2 into that of shape 1.
+    pub(crate) pos12: Pose,
+    /// Contacts up to this gap are wanted, metres.
+    pub(crate) prediction: f32,
+}
+
+/// What the caller knows about a pair of parts beyond their shapes.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Hint {
+    /// Motion of the second part relative to the first over the step, in the frame of the first
+    /// part, metres.
+    pub(crate) motion: Vector,
+    /// Main view axis of the frame before, in the frame of the first part.
+    pub(crate) last_axis: Option<Vector>,
+}
+
+/// A pair of parts within reach of each other.
+pub(crate) struct PartPair {
+    /// Indices of the parts in their compounds; 0 where the shape is not one.
+    pub(crate) parts: [u32; 2],
+    /// Poses of the parts in the frames of their colliders; none where they are the same.
+    pub(crate) poses: [Option<Pose>; 2],
+    /// From the frame of the second part into that of the first.
+    pub(crate) a_from_b: Pose,
+    /// The comparison; none where no side is a cloud, which rapier's own dispatcher answers.
+    pub(crate) comparison: Option<Comparison>,
+}
+
+/// What a backend is asked about a pair of parts.
+pub(crate) struct Comparison {
+    view: View,
+    params: Params,
+    /// Penetration in metres up to which surfaces just touch: what its measurement scatters by.
+    pub(crate) scatter: f32,
+    /// Place in the batch.
+    pub(crate) query: usize,
+}
+
+impl Comparison {
+    /// The side on which the parts are by earlier steps, as an axis from the second to the first.
+    pub(crate) fn last_axis(&self) -> Option<Vector> {
+        match self.view {
+            View::Aim { last_axis, .. } => last_axis,
+            View::Fixed(_) => None,
+        }
+    }
+
+    /// Distance in metres up to which a contact point counts as the one of the step before.
+    pub(crate) fn match_distance(&self) -> f32 {
+        self.params.prediction.max(2.0 * self.params.pixel_size)
+    }
+}
+
+/// Appends the part pairs of `pair` that are within reach, and for each comparison its two sides;
+/// the place of a comparison in `sides` is its place in the batch.
+///
+/// `hint` gets the part indices, the pose of the first part in the frame of shape 1, and the middle
+/// of the region where the bounds meet, in the frame of the first part.
+pub(crate) fn append_part_pairs<'a>(
+    pair: ShapePair<'a>,
+    config: &TldiConfig,
+    parts: &mut Vec<PartPair>,
+    sides: &mut Vec<[ExactShape<'a>; 2]>,
+    mut hint: impl FnMut([u32; 2], Option<&Pose>, Vector) -> Hint,
+) {
+    let prediction = pair.prediction;
+    for i in 0..part_count(pair.shape1) {
+        let (pose1, part1) = part(pair.shape1, i);
+        for j in 0..part_count(pair.shape2) {
+            let (pose2, part2) = part(pair.shape2, j);
+            let mut a_from_b = pair.pos12;
+            if let Some(pose2) = pose2 {
+                a_from_b *= *pose2;
+            }
+            if let Some(pose1) = pose1 {
+                a_from_b = pose1.inv_mul(&a_from_b);
+            }
+            if !within_reach(part1, part2, &a_from_b, prediction) {
+                continue;
+            }
+            let comparison = config.params([part1, part2], prediction).map(|params| {
+                let a = part1.compute_local_aabb().loosened(prediction);
+                let b = part2.compute_aabb(&a_from_b);
+                let Hint { motion, last_axis } = hint([i, j], pose1, middle_of_meeting(&a, &b));
+                let query = sides.len();
+                sides.push([ExactShape(part1), ExactShape(part2)]);
+                Comparison {
+                    view: View::Aim {
+                        policy: config.camera_policy,
+                        motion,
+                        last_axis,
+                    },
+                    params,
+                    scatter: config.scatter * 0.5 * params.thickness,
+                    query,
+                }
+            });
+            parts.push(PartPair {
+                parts: [i, j],
+                poses: [pose1.copied(), pose2.copied()],
+                a_from_b,
+                comparison,
+            });
+        }
+    }
+}
+
+/// Appends the queries of `parts` to the batch, in the order of `sides`.
+pub(crate) fn append_queries<'s>(
+    parts: &[PartPair],
+    sides: &'s [[ExactShape<'_>; 2]],
+    batch: &mut Vec<PairQuery<'s>>,
+) {
+    for part in parts {
+        if let Some(comparison) = &part.comparison {
+            debug_assert_eq!(batch.len(), comparison.query);
+            let [a, b] = &sides[comparison.query];
+            batch.push(PairQuery {
+                a: surface(a),
+                b: surface(b),
+                a_from_b: part.a_from_b,
+                view: comparison.view,
+                params: comparison.params,
+            });
+        }
+    }
+}
+
+pub(crate) fn surface<'s>(side: &'s ExactShape<'_>) -> Surface<'s> {
+    match cloud_of(side.0) {
+        Some(shape) => Surface::Cloud(shape.cloud()),
+        None => Surface::Exact(side),
+    }
+}
+
+/// Middle of the region where the bounds meet or, if they do not quite, of that between them.
+fn middle_of_meeting(a: &Aabb, b: &Aabb) -> Vector {
+    let (low, high) = (a.mins.max(b.mins), a.maxs.min(b.maxs));
+    low.midpoint(high)
+}

@@ -1,0 +1,392 @@
+//! A point cloud as a rapier shape.
+
+use crate::shape::mass::{MassModel, unit_mass_properties};
+use rapier3d::glamx::Vec3;
+use rapier3d::parry::bounding_volume::{Aabb, BoundingSphere};
+use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
+use rapier3d::parry::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
+use rapier3d::parry::shape::{FeatureId, Shape, ShapeType, TypedShape};
+use rapier3d::prelude::MassProperties;
+use std::f32::consts::FRAC_PI_4;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
+use tldi::{CloudError, NonFinite, PointCloud, Radii};
+
+/// Neighbours for normals that are not given or that scaling made wrong.
+const PCA_NEIGHBORS: usize = 12;
+
+/// Source of [`PointCloudShape::revision`].
+static NEXT_REVISION: AtomicU64 = AtomicU64::new(1);
+
+fn next_revision() -> u64 {
+    NEXT_REVISION.fetch_add(1, Ordering::Relaxed)
+}
+
+/// A [`PointCloud`] as a collider's shape.
+///
+/// Contacts, distances and shape casts need the dispatcher of this crate
+/// ([`TldiDispatcher`](crate::TldiDispatcher)); rapier's default one knows custom shapes only through
+/// rays and point projections. Clones share the points; replacing the points
+/// of one clone leaves the others as they are.
+///
+/// # The surface that rays and projections see
+/// One disc a point, of the point's radius, across its normal; for a cloud without normals a disc
+/// that faces the ray, and the bare points for projections. On a surface with radius of curvature
+/// R a disc of radius r is off by up to r²/2R; that bounds the error of a projection, and divided
+/// by the cosine of the angle between ray and normal that of a ray hit. Without normals the error
+/// reaches r · tan of that angle for a ray; a projection is then within r of the true one along
+/// the surface. Where the radii leave a gap in the cover (3 % of a random sample with
+/// radii of 0.65 × the distance to the 7th neighbour), a ray goes through it.
+///
+/// # Cost
+/// Bounds, bounding sphere and CCD thickness are O(1). Mass properties are computed when first
+/// asked for ([`unit_mass_properties`]) and kept, also when the points change; a collider that is
+/// given its mass properties
+/// ([`ColliderBuilder::mass_properties`](rapier3d::prelude::ColliderBuilder::mass_properties)), or
+/// the density 0, never asks. The tree for rays and projections is built on first use after the
+/// points changed, O(points · log points).
+///
+/// ```
+/// use rapier3d::prelude::*;
+/// use rapier3d_tldi::{PointCloud, PointCloudShape};
+/// let points: Vec<Vector> = (0..100)
+///     .map(|i| Vector::new((i % 10) as f32, 0.0, (i / 10) as f32))
+///     .collect();
+/// let cloud = PointCloud::builder(points).radius(0.8).build()?;
+/// let floor = ColliderBuilder::new(SharedShape::new(PointCloudShape::new(cloud))).build();
+/// let ray = Ray::new(Vector::new(4.2, 3.0, 5.1), -Vector::Y);
+/// assert_eq!(floor.shape().cast_local_ray(&ray, 10.0, true), Some(3.0));
+/// # Ok::<(), rapier3d_tldi::CloudError>(())
+/// ```
+#[derive(Clone)]
+pub struct PointCloudShape {
+    content: Arc<Content>,
+}
+
+/// What clones share.
+struct Content {
+    cloud: PointCloud<'static>,
+    mass_model: MassModel,
+    revision: u64,
+    unit_mass: OnceLock<MassProperties>,
+    bvh: OnceLock<Bvh>,
+    fitted_normals: OnceLock<Vec<Vec3>>,
+    least_radius: OnceLock<f32>,
+}
+
+impl Content {
+    fn new(cloud: PointCloud<'static>, mass_model: MassModel) -> Self {
+        Self {
+            cloud,
+            mass_model,
+            revision: next_revision(),
+            unit_mass: OnceLock::new(),
+            bvh: OnceLock::new(),
+            fitted_normals: OnceLock::new(),
+            least_radius: OnceLock::new(),
+        }
+    }
+}
+
+impl std::fmt::Debug for PointCloudShape {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PointCloudShape")
+            .field("points", &self.cloud().len())
+            .field("bounds", &self.cloud().bounds())
+            .field("mean_radius", &self.cloud().mean_radius())
+            .field("mass_model", &self.mass_model())
+            .field("revision", &self.revision())
+            .finish_non_exhaustive()
+    }
+}
+
+impl PointCloudShape {
+    /// A shape over `cloud`, with the mass of the solid that it encloses.
+    pub fn new(cloud: PointCloud<'static>) -> Self {
+        Self::with_mass_model(cloud, MassModel::default())
+    }
+
+    /// A shape over `cloud` with the mass that `mass_model` says.
+    pub fn with_mass_model(cloud: PointCloud<'static>, mass_model: MassModel) -> Self {
+        Self {
+            content: Arc::new(Content::new(cloud, mass_model)),
+        }
+    }
+
+    /// The points, in the shape's own frame.
+    pub fn cloud(&self) -> &PointCloud<'static> {
+        &self.content.cloud
+    }
+
+    /// What of the cloud has mass.
+    pub fn mass_model(&self) -> MassModel {
+        self.content.mass_model
+    }
+
+    /// A number that no other content of any shape in this process has: shapes of equal revision
+    /// hold the same points, and new points bring a new revision.
+    pub fn revision(&self) -> u64 {
+        self.content.revision
+    }
+
+    /// Replaces the points, and the normals by those given (without any the cloud has none any
+    /// more), see [`PointCloud::set_points`]. On an error the shape is as it was.
+    ///
+    /// The mass properties stay those of the former points, once they were asked for: a body that
+    /// deforms keeps its mass, and noise does not shake its centre. Call
+    /// [`refresh_mass`](Self::refresh_mass) where they should follow.
+    ///
+    /// Memory is reused unless clones share it. A collider's shape is reached through
+    /// [`Collider::shape_mut`](rapier3d::prelude::Collider::shape_mut), which also tells rapier of
+    /// the change.
+    pub fn set_points(
+        &mut self,
+        points: &[Vec3],
+        normals: Option<&[Vec3]>,
+    ) -> Result<(), CloudError> {
+        if let Some(content) = Arc::get_mut(&mut self.content) {
+            content.cloud.set_points(points, normals)?;
+            content.bvh.take();
+            content.fitted_normals.take();
+            content.least_radius.take();
+            content.revision = next_revision();
+        } else {
+            let mut cloud = self.cloud().clone();
+            cloud.set_points(points, normals)?;
+            let mut content = Content::new(cloud, self.mass_model());
+            content.unit_mass = self.content.unit_mass.clone();
+            self.content = Arc::new(content);
+        }
+        Ok(())
+    }
+
+    /// Replaces the cloud as a whole: points, radii, normals and colours. The mass properties stay, as
+    /// with [`set_points`](Self::set_points).
+    pub fn set_cloud(&mut self, cloud: PointCloud<'static>) {
+        let mut content = Content::new(cloud, self.mass_model());
+        content.unit_mass = self.content.unit_mass.clone();
+        self.content = Arc::new(content);
+    }
+
+    /// Lets the mass properties follow the present points when they are asked for next.
+    pub fn refresh_mass(&mut self) {
+        if let Some(content) = Arc::get_mut(&mut self.content) {
+            content.unit_mass.take();
+        } else {
+            self.content = Arc::new(Content::new(self.cloud().clone(), self.mass_model()));
+        }
+    }
+
+    /// The tree over the points, one leaf box of the point's radius around each.
+    pub(crate) fn bvh(&self) -> &Bvh {
+        self.content.bvh.get_or_init(|| {
+            let cloud = self.cloud();
+            let leaves: Vec<Aabb> = cloud
+                .points()
+                .enumerate()
+                .map(|(i, p)| Aabb::from_half_extents(p, Vec3::splat(cloud.radius(i))))
+                .collect();
+            Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves)
+        })
+    }
+
+    /// The smallest point radius, metres; computed once.
+    pub(crate) fn least_radius(&self) -> f32 {
+        *self
+            .content
+            .least_radius
+            .get_or_init(|| match self.cloud().radii() {
+                Radii::Global(radius) => *radius,
+                Radii::PerPoint(radii) => radii.iter().copied().fold(f32::MAX, f32::min),
+            })
+    }
+
+    /// The cloud's normals or, where it has none, those of planes through neighbours, which are not
+    /// oriented; computed once.
+    pub(crate) fn surface_normals(&self) -> &[Vec3] {
+        let cloud = self.cloud();
+        cloud.normals().unwrap_or_else(|| {
+            self.content.fitted_normals.get_or_init(|| {
+                let points: Vec<Vec3> = cloud.points().collect();
+                let with_normals = PointCloud::builder(points)
+                    .radius(cloud.max_radius())
+                    .pca_normals(PCA_NEIGHBORS)
+                    .build()
+                    .expect("the points of a valid cloud are valid");
+                let normals = with_normals.normals();
+                normals.expect("they were asked for").to_vec()
+            })
+        })
+    }
+
+    /// Index of the point nearest to `point`; `None` if that is not finite.
+    fn nearest(&self, point: Vec3) -> Option<usize> {
+        self.bvh()
+            .find_best(
+                f32::MAX,
+                |node: &BvhNode, _| node.aabb().distance_to_local_point(point, true),
+                |leaf, _| Some(self.cloud().point(leaf as usize).distance(point)),
+            )
+            .map(|(leaf, _)| leaf as usize)
+    }
+
+    /// Where the line of `ray` passes through the disc of a point, in units of the direction.
+    fn disc_hit(&self, index: usize, ray: &Ray) -> Option<f32> {
+        let cloud = self.cloud();
+        let to_point = cloud.point(index) - ray.origin;
+        let normal = cloud.normals().map_or(ray.dir, |normals| normals[index]);
+        let t = normal.dot(to_point) / normal.dot(ray.dir);
+        let in_disc = (t * ray.dir - to_point).length() <= cloud.radius(index);
+        (t >= 0.0 && in_disc).then_some(t)
+    }
+}
+
+impl Shape for PointCloudShape {
+    /// Bounds of the points, grown by the mean radius: the surface passes through the points, and
+    /// between them it bulges by a fraction of the radius.
+    fn compute_local_aabb(&self) -> Aabb {
+        let bounds = self.cloud().bounds().loosened(self.cloud().mean_radius());
+        Aabb::new(bounds.min, bounds.max)
+    }
+
+    /// The sphere around [`compute_local_aabb`](Self::compute_local_aabb).
+    fn compute_local_bounding_sphere(&self) -> BoundingSphere {
+        self.compute_local_aabb().bounding_sphere()
+    }
+
+    fn clone_dyn(&self) -> Box<dyn Shape> {
+        Box::new(self.clone())
+    }
+
+    /// Radii grow by the largest of the three factors, so that the balls still cover the surface;
+    /// a given shell thickness does as well. Normals that are not oriented are computed anew. Fails
+    /// if a factor is zero or not finite, or the scaled points are not valid any more.
+    fn scale_dyn(&self, scale: Vec3, _num_subdivisions: u32) -> Option<Box<dyn Shape>> {
+        if scale.cmpeq(Vec3::ZERO).any() || !scale.is_finite() {
+            return None;
+        }
+        let cloud = self.cloud();
+        let largest = scale.abs().max_element();
+        let points: Vec<Vec3> = cloud.points().map(|p| p * scale).collect();
+        let mut builder = PointCloud::builder(points)
+            .noise(cloud.noise() * largest)
+            .non_finite(NonFinite::Refuse);
+        builder = match cloud.radii() {
+            Radii::Global(radius) => builder.radius(radius * largest),
+            Radii::PerPoint(radii) => {
+                builder.radii(radii.iter().map(|r| r * largest).collect::<Vec<_>>())
+            }
+        };
+        if let Some(normals) = cloud.normals() {
+            builder = if cloud.normals_oriented() {
+                builder.normals(normals.iter().map(|n| n / scale).collect::<Vec<_>>())
+            } else {
+                builder.pca_normals(PCA_NEIGHBORS)
+            };
+        }
+        if let Some(colors) = cloud.colors() {
+            builder = builder.colors(colors.to_vec());
+        }
+        let mass_model = match self.mass_model() {
+            MassModel::Solid => MassModel::Solid,
+            MassModel::Shell { thickness } => MassModel::Shell {
+                thickness: thickness * largest,
+            },
+        };
+        let scaled = Self::with_mass_model(builder.build().ok()?, mass_model);
+        Some(Box::new(scaled))
+    }
+
+    fn mass_properties(&self, density: f32) -> MassProperties {
+        let unit = self
+            .content
+            .unit_mass
+            .get_or_init(|| unit_mass_properties(self.cloud(), self.mass_model()));
+        MassProperties::with_principal_inertia_frame(
+            unit.local_com,
+            unit.mass() * density,
+            unit.principal_inertia() * density,
+            unit.principal_inertia_local_frame,
+        )
+    }
+
+    fn shape_type(&self) -> ShapeType {
+        ShapeType::Custom
+    }
+
+    fn as_typed_shape(&self) -> TypedShape<'_> {
+        TypedShape::Custom(self)
+    }
+
+    /// Half the smallest extent of the points, but not below the mean radius (a flat scan): rapier
+    /// takes a body for fast when it moves by half of this in a step.
+    fn ccd_thickness(&self) -> f32 {
+        let half_extent = 0.5 * self.cloud().bounds().extents().min_element();
+        half_extent.max(self.cloud().mean_radius())
+    }
+
+    /// As for a triangle mesh, 45°.
+    fn ccd_angular_thickness(&self) -> f32 {
+        FRAC_PI_4
+    }
+}
+
+impl RayCast for PointCloudShape {
+    /// The first disc that the ray passes, see [`PointCloudShape`]; the feature is the point's
+    /// index and the normal is turned towards the ray, as with meshes. A cloud is a surface:
+    /// `solid` has no effect.
+    fn cast_local_ray_and_get_normal(
+        &self,
+        ray: &Ray,
+        max_time_of_impact: f32,
+        _solid: bool,
+    ) -> Option<RayIntersection> {
+        let (leaf, t) = self.bvh().find_best(
+            max_time_of_impact,
+            |node: &BvhNode, best| node.cast_ray(ray, best),
+            |leaf, _| self.disc_hit(leaf as usize, ray),
+        )?;
+        let normal = self.cloud().normals().map_or(-ray.dir, |normals| {
+            let normal = normals[leaf as usize];
+            if normal.dot(ray.dir) > 0.0 {
+                -normal
+            } else {
+                normal
+            }
+        });
+        let feature = FeatureId::Vertex(leaf);
+        Some(RayIntersection::new(t, normal.normalize_or_zero(), feature))
+    }
+}
+
+impl PointQuery for PointCloudShape {
+    /// As [`project_local_point_and_get_feature`](Self::project_local_point_and_get_feature), but
+    /// with `solid` a point inside is its own projection.
+    fn project_local_point(&self, point: Vec3, solid: bool) -> PointProjection {
+        let (projection, _) = self.project_local_point_and_get_feature(point);
+        if solid && projection.is_inside {
+            return PointProjection::new(true, point);
+        }
+        projection
+    }
+
+    /// The point of the nearest sample's disc that is nearest to `point`, and the index of that
+    /// sample. Where normals are oriented, a point behind the disc is inside; for an open scan
+    /// that is all that lies behind it. A point that is not finite is its own projection.
+    fn project_local_point_and_get_feature(&self, point: Vec3) -> (PointProjection, FeatureId) {
+        let Some(index) = self.nearest(point) else {
+            return (PointProjection::new(false, point), FeatureId::Unknown);
+        };
+        let cloud = self.cloud();
+        let sample = cloud.point(index);
+        let feature = FeatureId::Vertex(index as u32);
+        let Some(normals) = cloud.normals() else {
+            return (PointProjection::new(false, sample), feature);
+        };
+        let height = normals[index].dot(point - sample);
+        let along = point - sample - height * normals[index];
+        let foot = sample + along.clamp_length_max(cloud.radius(index));
+        let is_inside = cloud.normals_oriented() && height < 0.0;
+        (PointProjection::new(is_inside, foot), feature)
+    }
+}

@@ -1,0 +1,318 @@
+//! From candidate pairs to the entries of a batch.
+
+use crate::TldiConfig;
+use crate::narrow_phase::parts::{Hint, ShapePair, append_part_pairs, within_reach};
+use crate::shape::exact::ExactShape;
+use crate::step::candidates::{Candidate, contact_reach, effective_prediction, parent_of, pose_of};
+use crate::step::measured::Measured;
+use crate::step::prepared::{Batch, PairKey, PreparedPair};
+use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet};
+use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
+use rapier3d::math::{Pose, Vector};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// All that a batch is made from.
+pub(crate) struct Frame<'a> {
+    pub(crate) gravity: Vector,
+    pub(crate) integration: &'a IntegrationParameters,
+    pub(crate) bodies: &'a RigidBodySet,
+    pub(crate) colliders: &'a ColliderSet,
+    pub(crate) config: &'a TldiConfig,
+    pub(crate) memory: &'a PairMemory,
+    /// Colliders whose shape was changed since the last step.
+    pub(crate) changed: &'a [ColliderHandle],
+}
+
+impl<'a> Frame<'a> {
+    /// Appends a candidate to the batch if its colliders are within reach of each other.
+    pub(crate) fn push_pair(
+        &self,
+        candidate: &Candidate,
+        batch: &mut Batch,
+        sides: &mut Vec<[ExactShape<'a>; 2]>,
+    ) {
+        let colliders = [candidate.collider1, candidate.collider2];
+        let [collider1, collider2] = colliders.map(|handle| &self.colliders[handle]);
+        let pose1 = pose_of(collider1, self.bodies);
+        let pose2 = pose_of(collider2, self.bodies);
+        let pos12 = pose1.inv_mul(&pose2);
+        let prediction = effective_prediction(collider1, collider2, self.bodies, self.integration);
+        let (shape1, shape2) = (collider1.shape(), collider2.shape());
+        let reach = contact_reach(collider1, collider2, self.bodies, self.integration);
+        if !within_reach(shape1, shape2, &pos12, reach) {
+            return;
+        }
+        let pair = ShapePair {
+            shape1,
+            shape2,
+            pos12,
+            prediction,
+        };
+        let is_measured_anew = collider1.is_sensor()
+            || collider2.is_sensor()
+            || colliders.iter().any(|handle| self.changed.contains(handle));
+        let kept = self
+            .memory
+            .measured(colliders)
+            .filter(|measured| !is_measured_anew && measured.holds(&pos12, prediction));
+        let first_part = batch.parts.len();
+        if kept.is_none() {
+            let looked_for = ShapePair {
+                prediction: reach,
+                ..pair
+            };
+            self.push_parts(looked_for, candidate, &pose1, batch, sides);
+        }
+        batch.push(
+            PairKey::new(shape1, shape2, &pos12),
+            PreparedPair {
+                colliders,
+                poses: [pose1, pose2],
+                prediction,
+                parts: first_part..batch.parts.len(),
+                used: AtomicBool::new(false),
+                blocked: Mutex::default(),
+                is_kept: kept.is_some(),
+                measured: kept.or_else(|| Measured::new(&pair, self.config)),
+                shapes: [collider1, collider2].map(|c| c.shared_shape().clone()),
+            },
+        );
+    }
+
+    fn push_parts(
+        &self,
+        pair: ShapePair<'a>,
+        candidate: &Candidate,
+        pose1: &Pose,
+        batch: &mut Batch,
+        sides: &mut Vec<[ExactShape<'a>; 2]>,
+    ) {
+        let colliders = [candidate.collider1, candidate.collider2];
+        let [collider1, collider2] = colliders.map(|handle| &self.colliders[handle]);
+        let config = match collider1.is_sensor() || collider2.is_sensor() {
+            true => self.config.for_intersection(),
+            false => *self.config,
+        };
+        append_part_pairs(
+            pair,
+            &config,
+            &mut batch.parts,
+            sides,
+            |parts, part1, middle| {
+                let world_from_a = part1.map_or(*pose1, |part1| *pose1 * *part1);
+                let a_from_world = world_from_a.rotation.inverse();
+                let middle = world_from_a * middle;
+                let motion = self.motion(collider2, middle) - self.motion(collider1, middle);
+                let last_axis = self.memory.axis(colliders, parts);
+                Hint {
+                    motion: a_from_world * motion,
+                    last_axis: last_axis.map(|axis| a_from_world * axis),
+                }
+            },
+        );
+    }
+
+    /// How far the collider's material at `point` (world space) moves over the step, gravity
+    /// included, in metres.
+    fn motion(&self, collider: &Collider, point: Vector) -> Vector {
+        let dt = self.integration.dt;
+        let velocity = |body: &RigidBody| {
+            let fall = if body.is_dynamic() {
+                self.gravity * body.gravity_scale() * dt
+            } else {
+                Vector::ZERO
+            };
+            body.velocity_at_point(point) + fall
+        };
+        parent_of(collider, self.bodies).map_or(Vector::ZERO, |body| velocity(body) * dt)
+    }
+}
+
+/// Index and generation of both colliders.
+type PairId = [(u32, u32); 2];
+
+fn pair_id(colliders: [ColliderHandle; 2]) -> PairId {
+    colliders.map(|handle| handle.into_raw_parts())
+}
+
+/// Colliders and parts of a comparison.
+type PartsId = (PairId, [u32; 2]);
+
+/// Steps without contact for which the axis of the last one is remembered: a body that hops, or of
+/// which noise hides the contact, is on the side where it was. Longer, and it may be elsewhere.
+const MOST_LOST: u32 = 6;
+
+/// Main view axis of the last contact of two parts.
+#[derive(Clone, Copy)]
+struct LastAxis {
+    /// Unit vector in world space: bodies that roll turn under their contacts.
+    axis: Vector,
+    /// Steps without contact since.
+    lost_for: u32,
+}
+
+impl LastAxis {
+    fn lost(self) -> Option<Self> {
+        let lost_for = self.lost_for + 1;
+        (lost_for <= MOST_LOST).then_some(Self { lost_for, ..self })
+    }
+}
+
+fn axis_of(axes: &[(PartsId, LastAxis)], key: PartsId) -> Option<LastAxis> {
+    let at = axes.binary_search_by_key(&key, |(key, _)| *key).ok()?;
+    Some(axes[at].1)
+}
+
+/// What is remembered about pairs from step to step, until they separate. All in ascending order.
+#[derive(Default)]
+pub(crate) struct PairMemory {
+    /// Of each comparison, by colliders and parts.
+    axes: Vec<(PartsId, LastAxis)>,
+    /// The measurements that rapier's manifolds are from.
+    measured: Vec<(PairId, Measured)>,
+    older_axes: Vec<(PartsId, LastAxis)>,
+    older_measured: Vec<(PairId, Measured)>,
+}
+
+impl PairMemory {
+    fn axis(&self, colliders: [ColliderHandle; 2], parts: [u32; 2]) -> Option<Vector> {
+        axis_of(&self.axes, (pair_id(colliders), parts)).map(|last| last.axis)
+    }
+
+    fn measured(&self, colliders: [ColliderHandle; 2]) -> Option<Measured> {
+        let key = pair_id(colliders);
+        let found = self.measured.binary_search_by_key(&key, |(key, _)| *key);
+        found.ok().map(|at| self.measured[at].1)
+    }
+
+    /// After a step: what its batch measured, if rapier took it. What sleeps stays as it is.
+    pub(crate) fn update(&mut self, candidates: &[Candidate], batch: &Batch) {
+        std::mem::swap(&mut self.axes, &mut self.older_axes);
+        std::mem::swap(&mut self.measured, &mut self.older_measured);
+        self.axes.clear();
+        self.measured.clear();
+        for candidate in candidates.iter().filter(|candidate| candidate.asleep) {
+            let id = pair_id([candidate.collider1, candidate.collider2]);
+            self.retain_axes(id);
+            let found = self.older_measured.binary_search_by_key(&id, |(id, _)| *id);
+            self.measured
+                .extend(found.ok().map(|at| self.older_measured[at]));
+        }
+        for pair in &batch.pairs {
+            let id = pair_id(pair.colliders);
+            let was_used = pair.used.load(Ordering::Relaxed);
+            self.measured.extend(
+                pair.measured
+                    .filter(|_| was_used)
+                    .map(|measured| (id, measured)),
+            );
+            if pair.is_kept {
+                self.retain_axes(id);
+                continue;
+            }
+            for part in &batch.parts[pair.parts.clone()] {
+                let Some(comparison) = &part.comparison else {
+                    continue;
+                };
+                let result = &batch.results[comparison.query];
+                let key = (id, part.parts);
+                // An axis without contact may be that of the few points that came near first.
+                let axis = match result.contacts.is_empty() {
+                    false => result.axes.first().map(|&axis| {
+                        let in_collider = part.poses[0].map_or(axis, |pose| pose.rotation * axis);
+                        LastAxis {
+                            axis: pair.poses[0].rotation * in_collider,
+                            lost_for: 0,
+                        }
+                    }),
+                    true => axis_of(&self.older_axes, key).and_then(LastAxis::lost),
+                };
+                self.axes.extend(axis.map(|axis| (key, axis)));
+            }
+        }
+        self.axes.sort_unstable_by_key(|(key, _)| *key);
+        self.measured.sort_unstable_by_key(|(key, _)| *key);
+    }
+
+    fn retain_axes(&mut self, id: PairId) {
+        let start = self.older_axes.partition_point(|((key, _), _)| *key < id);
+        let kept = self.older_axes[start..]
+            .iter()
+            .take_while(|((key, _), _)| *key == id);
+        self.axes.extend(kept);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PointCloudShape;
+    use tldi::{ContactPixel, PairResult, PointCloud};
+
+    /// The axis of points that came near without touching says nothing of the side of a body.
+    #[test]
+    fn axes_are_remembered_of_contacts() {
+        let points: Vec<Vector> = (0..64)
+            .map(|k| 0.1 * Vector::new((k % 8) as f32, 0.0, (k / 8) as f32))
+            .collect();
+        let cloud = PointCloud::builder(points).radius(0.1).build().unwrap();
+        let shape: rapier3d::geometry::SharedShape =
+            rapier3d::geometry::SharedShape::new(PointCloudShape::new(cloud));
+        let colliders = [1, 2].map(|index| ColliderHandle::from_raw_parts(index, 0));
+        // A quarter turn about z: from x in the collider to y in the world.
+        let turned = Pose::rotation(0.5 * std::f32::consts::PI * Vector::Z);
+        let mut memory = PairMemory::default();
+        let mut remembered = |axis: Vector, contacts: Vec<ContactPixel>| {
+            let pair = ShapePair {
+                shape1: &*shape.0,
+                shape2: &*shape.0,
+                pos12: Pose::IDENTITY,
+                prediction: 0.1,
+            };
+            let mut batch = Batch::default();
+            let hint = |_, _: Option<&Pose>, _| Hint::default();
+            let mut sides = Vec::new();
+            let config = TldiConfig::default();
+            append_part_pairs(pair, &config, &mut batch.parts, &mut sides, hint);
+            batch.results.push(PairResult {
+                axes: vec![axis],
+                contacts,
+                ..PairResult::default()
+            });
+            let prepared = PreparedPair {
+                colliders,
+                poses: [turned; 2],
+                prediction: pair.prediction,
+                parts: 0..1,
+                used: AtomicBool::new(true),
+                blocked: Mutex::default(),
+                is_kept: false,
+                measured: None,
+                shapes: [shape.clone(), shape.clone()],
+            };
+            batch.push(
+                PairKey::new(pair.shape1, pair.shape2, &pair.pos12),
+                prepared,
+            );
+            memory.update(&[], &batch);
+            memory.axis(colliders, [0, 0])
+        };
+        assert_eq!(remembered(Vector::Z, vec![]), None);
+        let touching = ContactPixel {
+            pixel: [0, 0],
+            view: 0,
+            point_a: Vector::ZERO,
+            point_b: Vector::ZERO,
+            normal_a: Vector::Y,
+            normal_b: -Vector::Y,
+            gap: 0.0,
+        };
+        let axis = remembered(Vector::X, vec![touching]);
+        assert!(axis.is_some_and(|axis| axis.distance(Vector::Y) < 1e-6));
+        for _ in 0..MOST_LOST {
+            assert_eq!(remembered(Vector::Z, vec![]), axis);
+        }
+        assert_eq!(remembered(Vector::Z, vec![]), None);
+    }
+}

@@ -1,0 +1,90 @@
+//! How long measured contacts stay valid.
+//!
+//! Every comparison samples the surfaces anew, and its depths vary by up to a tenth of the coarser
+//! cloud's point radius. In every step, this noise would keep bodies from coming to rest. So
+//! contacts are measured again only after the pair has moved by that distance. Until then they stay
+//! fixed to their bodies. Rapier does the same for its own shapes (`contact_recycling`), with a
+//! distance that does not depend on the cloud.
+
+use crate::TldiConfig;
+use crate::narrow_phase::parts::{PartPair, ShapePair, clouds_of};
+use rapier3d::math::Pose;
+use rapier3d::parry::bounding_volume::Aabb;
+use rapier3d::parry::shape::Shape;
+use tldi::plan::largest_pixel;
+use tldi::{ContactPatch, PairResult};
+
+/// Whether a pair touches in one or two round spots or lines. Such a pair rolls, and a point that
+/// is fixed to the bodies would soon be late. A point that is late by a tenth of a radius drives a
+/// ball like a slope.
+pub(crate) fn rolls(parts: &[PartPair], results: &[PairResult]) -> bool {
+    let patches = (parts.iter())
+        .filter_map(|part| part.comparison.as_ref())
+        .flat_map(|comparison| &results[comparison.query].patches);
+    parts.iter().all(|part| part.comparison.is_some())
+        && (1..=2).contains(&patches.clone().count())
+        && patches.clone().all(ContactPatch::is_round)
+}
+
+/// Where a pair's contacts were measured, and for how long they hold.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct Measured {
+    pos12: Pose,
+    prediction: f32,
+    /// Bounds of the smaller shape, in its own frame: only where it is can there be contacts.
+    bounds: Aabb,
+    shape1_is_smaller: bool,
+    /// How far the smaller shape may move relative to the other, in metres.
+    max_drift: f32,
+}
+
+impl Measured {
+    /// The measurement of `pair`, or `None` where it does not outlive the step: shapes that deform
+    /// in place, or a configuration that says so.
+    pub(crate) fn new(pair: &ShapePair<'_>, config: &TldiConfig) -> Option<Self> {
+        let deforms = |shape: &dyn Shape| {
+            shape
+                .as_composite_shape()
+                .is_some_and(|shape| shape.is_deformable())
+        };
+        if deforms(pair.shape1) || deforms(pair.shape2) {
+            return None;
+        }
+        let coarsest = clouds_of(pair.shape1)
+            .chain(clouds_of(pair.shape2))
+            .map(|cloud| cloud.mean_radius())
+            .reduce(f32::max)?;
+        let bounds = [pair.shape1, pair.shape2].map(|shape| shape.compute_local_aabb());
+        let size = bounds.map(|bounds| bounds.extents().length_squared());
+        let shape1_is_smaller = size[0] < size[1];
+        let smaller = bounds[usize::from(!shape1_is_smaller)].extents();
+        // Otherwise a body smaller than the spacing of the points would be through them before they
+        // are compared again.
+        let max_drift = config.scatter * coarsest.min(largest_pixel(smaller, 0.0));
+        (max_drift > 0.0).then_some(Self {
+            pos12: pair.pos12,
+            prediction: pair.prediction,
+            bounds: bounds[usize::from(!shape1_is_smaller)],
+            shape1_is_smaller,
+            max_drift,
+        })
+    }
+
+    /// Whether the contacts still hold at this relative pose.
+    pub(crate) fn holds(&self, pos12: &Pose, prediction: f32) -> bool {
+        if prediction != self.prediction {
+            return false;
+        }
+        let (before, now) = if self.shape1_is_smaller {
+            (self.pos12.inverse(), pos12.inverse())
+        } else {
+            (self.pos12, *pos12)
+        };
+        // A rigid motion moves no point of a box farther than the farthest of its corners.
+        let corners = self.bounds.vertices();
+        let limit = self.max_drift * self.max_drift;
+        corners
+            .into_iter()
+            .all(|corner| (now * corner).distance_squared(before * corner) <= limit)
+    }
+}

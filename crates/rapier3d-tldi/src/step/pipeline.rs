@@ -1,0 +1,329 @@
+//! The pipeline: a batch of comparisons, then rapier's step.
+
+mod surfaces;
+
+use crate::corrections::rolling::move_to_mid_step;
+use crate::corrections::surface_motion::{SurfaceMotions, TldiHooks};
+use crate::corrections::surface_push;
+use crate::narrow_phase::parts::append_queries;
+use crate::shape::exact::ExactShape;
+use crate::step::batching::{Frame, PairMemory};
+use crate::step::candidates::CandidateSearch;
+use crate::step::prepared::{PROBE_ANSWER, Shared};
+use crate::step::report::{ComparedBy, cloud_pairs, contacts_of};
+use crate::{
+    Contact, PointCloudShape, StepReport, TldiConfig, TldiDispatcher, TldiError, cloud_collider,
+};
+use rapier3d::dynamics::{IntegrationParameters, RigidBodySet};
+use rapier3d::geometry::{ColliderBuilder, ColliderHandle, ColliderSet, NarrowPhase};
+use rapier3d::math::{Pose, Vector};
+use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher};
+use rapier3d::pipeline::{EventHandler, PhysicsHooks, PhysicsWorld};
+use std::sync::Arc;
+use std::time::Instant;
+use tldi::{Backend, PairQuery, PointCloud};
+
+/// Finds the contacts of point clouds for one physics world.
+///
+/// Before each of rapier's steps the pairs of colliders that may touch and of which one is a cloud
+/// are compared in one batch ([`prepare`](Self::prepare)); rapier then finds the results through
+/// the dispatcher that [`attach`](Self::attach) installs. [`step`](Self::step) does both.
+///
+/// Several worlds may be attached to one pipeline if each is prepared, stepped and finished before
+/// the next is prepared; a pipeline for each remembers more (the view axes of its pairs).
+pub struct TldiPipeline {
+    backend: Box<dyn Backend>,
+    compared_by: ComparedBy,
+    shared: Arc<Shared>,
+    search: CandidateSearch,
+    memory: PairMemory,
+    changed: Vec<ColliderHandle>,
+    motions: SurfaceMotions,
+    sides: Vec<[ExactShape<'static>; 2]>,
+    queries: Vec<PairQuery<'static>>,
+    prepare_seconds: f64,
+}
+
+impl TldiPipeline {
+    /// A pipeline on the CPU; with the feature `gpu`, on a hardware GPU where there is one and a
+    /// batch is large enough to gain from it (or what the variable `TLDI_BACKEND` asks for: `auto`,
+    /// `cpu` or `gpu`).
+    ///
+    /// # Errors
+    /// [`TldiError::BadConfig`], [`TldiError::NoBackend`] where `TLDI_BACKEND` asks for what is not
+    /// there.
+    pub fn new(config: TldiConfig) -> Result<Self, TldiError> {
+        #[cfg(feature = "gpu")]
+        let backend = tldi_wgpu::BackendChoice::Auto
+            .open()
+            .map_err(|source| TldiError::NoBackend(source.into()))?;
+        #[cfg(not(feature = "gpu"))]
+        let backend = Box::new(tldi::CpuBackend::new());
+        Self::with_backend(config, backend)
+    }
+
+    /// A pipeline whose batches `backend` compares. Pairs that are not in the batch are always
+    /// compared on the CPU.
+    ///
+    /// # Errors
+    /// [`TldiError::BadConfig`].
+    pub fn with_backend(config: TldiConfig, backend: Box<dyn Backend>) -> Result<Self, TldiError> {
+        Ok(Self {
+            compared_by: ComparedBy::default(),
+            backend,
+            shared: Arc::new(Shared::new(config.validated()?)),
+            search: CandidateSearch::default(),
+            memory: PairMemory::default(),
+            changed: Vec::new(),
+            motions: SurfaceMotions::default(),
+            sides: Vec::new(),
+            queries: Vec::new(),
+            prepare_seconds: 0.0,
+        })
+    }
+
+    /// Makes the world's narrow phase ask this pipeline, and rapier's own dispatcher about pairs
+    /// without a cloud. Needed once, and again after the world was deserialised.
+    pub fn attach(&self, world: &mut PhysicsWorld) {
+        self.attach_narrow_phase(&mut world.narrow_phase);
+    }
+
+    /// [`attach`](Self::attach) for split sets.
+    pub fn attach_narrow_phase(&self, narrow_phase: &mut NarrowPhase) {
+        narrow_phase.set_query_dispatcher(self.dispatcher().chain(DefaultQueryDispatcher));
+    }
+
+    /// The dispatcher that [`attach`](Self::attach) installs, for a chain of your own; it must come
+    /// before rapier's default one.
+    pub fn dispatcher(&self) -> TldiDispatcher {
+        TldiDispatcher::new(Arc::clone(&self.shared))
+    }
+
+    /// A collider for a cloud; see [`cloud_collider`]. For several bodies of one cloud, make one
+    /// [`PointCloudShape`] and give each a clone.
+    pub fn collider(&self, cloud: PointCloud<'static>) -> ColliderBuilder {
+        cloud_collider(PointCloudShape::new(cloud))
+    }
+
+    /// `inner` and what tells rapier the velocities of [deforming](Self::deform) clouds: the hooks
+    /// for a step with split sets.
+    pub fn hooks<'a>(&'a self, inner: &'a dyn PhysicsHooks) -> TldiHooks<'a> {
+        TldiHooks {
+            motions: &self.motions,
+            inner,
+        }
+    }
+
+    /// Compares the pairs that rapier is going to ask about in its next step, in one batch.
+    ///
+    /// The arguments are those of the [`PhysicsPipeline::step`](rapier3d::pipeline::PhysicsPipeline)
+    /// that follows. What is changed in between is compared on the spot. After the step, call
+    /// [`finish`](Self::finish).
+    ///
+    /// # Errors
+    /// [`TldiError::Pair`] or [`TldiError::Batch`] where the backend fails; the step should not be
+    /// taken then.
+    pub fn prepare(
+        &mut self,
+        gravity: Vector,
+        integration: &IntegrationParameters,
+        bodies: &RigidBodySet,
+        colliders: &ColliderSet,
+    ) -> Result<(), TldiError> {
+        let start = Instant::now();
+        let shared = Arc::clone(&self.shared);
+        shared.take_spot_counts();
+        self.motions.prepare(integration);
+        // Taken out and put back: no lock is held during the comparison.
+        let mut batch = std::mem::take(&mut *shared.batch_mut());
+        batch.clear();
+        let candidates = self
+            .search
+            .find(bodies, colliders, integration, &self.changed);
+        let config = shared.config();
+        let frame = Frame {
+            gravity,
+            integration,
+            bodies,
+            colliders,
+            config: &config,
+            memory: &self.memory,
+            changed: &self.changed,
+        };
+        let mut sides = emptied(std::mem::take(&mut self.sides));
+        for candidate in candidates.iter().filter(|candidate| !candidate.asleep) {
+            frame.push_pair(candidate, &mut batch, &mut sides);
+        }
+
+        let mut queries = emptied(std::mem::take(&mut self.queries));
+        append_queries(&batch.parts, &sides, &mut queries);
+        let outcome = self.backend.compare(&queries, &mut batch.results);
+        self.compared_by.update(&*self.backend);
+        let error = outcome.err().map(|source| batch.error(source));
+        self.queries = emptied(queries);
+        self.sides = emptied(sides);
+        if error.is_some() {
+            batch.clear();
+        } else {
+            batch.expire();
+            move_to_mid_step(&mut batch, bodies, colliders, integration.dt);
+            self.changed.clear();
+        }
+        *shared.batch_mut() = batch;
+        self.prepare_seconds = start.elapsed().as_secs_f64();
+        shared.took(self.prepare_seconds);
+        error.map_or(Ok(()), Err)
+    }
+
+    /// Between [`prepare`](Self::prepare) and the step: gives bodies in the way of surfaces that
+    /// close faster than rapier undoes penetrations (half of
+    /// [`IntegrationParameters::max_corrective_velocity`], 1.5 m/s in a world of human size) the
+    /// velocity of the surface, as an inelastic impact would. [`step`](Self::step) does so.
+    ///
+    /// The velocity of clouds that [`deform`](Self::deform) is known. That of clouds with
+    /// [new points](Self::set_points) is measured along the normal of the contact, from the points of
+    /// the last two steps; noise, and a surface that jumps once, have none. Cost: for each contact of
+    /// such a cloud a pass over the points in the blocks around it.
+    pub fn push(
+        &mut self,
+        bodies: &mut RigidBodySet,
+        colliders: &ColliderSet,
+        integration: &IntegrationParameters,
+    ) {
+        let least_speed = self.motions.begin_push();
+        surface_push::push(
+            &self.motions,
+            least_speed,
+            &self.shared.batch(),
+            bodies,
+            colliders,
+            integration,
+        );
+    }
+
+    /// Closes a step: what it did, and what failed inside it. Give it the sets of the step. Fast bodies
+    /// that are deep in contact, and that a sweep (CCD) held at a surface which no contact faces, lose the
+    /// velocity into it.
+    ///
+    /// # Errors
+    /// [`TldiError::NotAttached`], and [`TldiError::OnTheSpot`] where comparisons inside the step
+    /// failed.
+    pub fn finish(
+        &mut self,
+        bodies: &mut RigidBodySet,
+        narrow_phase: &NarrowPhase,
+        colliders: &ColliderSet,
+    ) -> Result<StepReport, TldiError> {
+        let on_the_spot = self.shared.take_spot_counts();
+        let mut report = StepReport {
+            pairs_batched: 0,
+            pairs_kept: 0,
+            pairs_missed: on_the_spot.pairs,
+            pairs_in_contact: 0,
+            contact_pixels: on_the_spot.contact_pixels,
+            coarser_pixels: on_the_spot.coarser_pixels,
+            max_penetration: 0.0,
+            prepare_seconds: self.prepare_seconds,
+            backend: Arc::clone(&self.compared_by.backend),
+            adapter: self.compared_by.adapter.clone(),
+            fallback: self.compared_by.fallback.clone(),
+        };
+        {
+            let mut batch = self.shared.batch_mut();
+            batch.stop_blocked(bodies, colliders);
+            (report.pairs_batched, report.pairs_kept) = batch.counts();
+            report.contact_pixels += batch.contact_pixels();
+            let coarser = report
+                .coarser_pixels
+                .into_iter()
+                .chain(batch.coarser_pixels());
+            report.coarser_pixels = coarser.reduce(f32::max);
+            self.memory.update(self.search.candidates(), &batch);
+            batch.clear();
+        }
+        self.motions.clear();
+        if let Some((count, first)) = self.shared.take_failures() {
+            return Err(TldiError::OnTheSpot { count, first });
+        }
+        if !self.is_attached(narrow_phase) {
+            return Err(TldiError::NotAttached);
+        }
+        for pair in cloud_pairs(narrow_phase, colliders) {
+            report.pairs_in_contact += usize::from(pair.has_any_active_contact());
+            for contact in contacts_of(pair, colliders) {
+                report.max_penetration = report.max_penetration.max(contact.depth);
+            }
+        }
+        Ok(report)
+    }
+
+    /// Steps the world: [`prepare`](Self::prepare), rapier's step, [`finish`](Self::finish).
+    ///
+    /// # Errors
+    /// Those of `prepare`, and [`TldiError::NotAttached`]: the world was not stepped. Those of
+    /// `finish`: it was.
+    pub fn step(&mut self, world: &mut PhysicsWorld) -> Result<StepReport, TldiError> {
+        self.step_with_events(world, &(), &())
+    }
+
+    /// [`step`](Self::step) with physics hooks and an event handler.
+    ///
+    /// # Errors
+    /// Those of [`step`](Self::step).
+    pub fn step_with_events(
+        &mut self,
+        world: &mut PhysicsWorld,
+        hooks: &dyn PhysicsHooks,
+        events: &dyn EventHandler,
+    ) -> Result<StepReport, TldiError> {
+        if !self.is_attached(&world.narrow_phase) {
+            return Err(TldiError::NotAttached);
+        }
+        self.prepare(
+            world.gravity,
+            &world.integration_parameters,
+            &world.bodies,
+            &world.colliders,
+        )?;
+        self.push(
+            &mut world.bodies,
+            &world.colliders,
+            &world.integration_parameters,
+        );
+        world.step_with_events(&self.hooks(hooks), events);
+        self.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)
+    }
+
+    /// The contact points of all pairs with a cloud, as of the last step in which each pair was
+    /// awake, at the colliders' present poses.
+    pub fn contacts<'a>(
+        &self,
+        narrow_phase: &'a NarrowPhase,
+        colliders: &'a ColliderSet,
+    ) -> impl Iterator<Item = Contact> + use<'a> {
+        cloud_pairs(narrow_phase, colliders).flat_map(|pair| contacts_of(pair, colliders))
+    }
+
+    /// The settings.
+    pub(crate) fn config(&self) -> TldiConfig {
+        self.shared.config()
+    }
+
+    /// Whether the narrow phase asks this pipeline.
+    pub fn is_attached(&self, narrow_phase: &NarrowPhase) -> bool {
+        let probe = &self.shared.probe;
+        narrow_phase
+            .query_dispatcher()
+            .distance(&Pose::IDENTITY, probe, probe)
+            .is_ok_and(|answer| answer.distance == PROBE_ANSWER)
+    }
+}
+
+/// The same vector without elements, for elements that borrow from something else: the memory is
+/// kept, since the layouts are equal (collecting a vector's own iterator is done in place).
+fn emptied<T, U>(mut vec: Vec<T>) -> Vec<U> {
+    vec.clear();
+    vec.into_iter()
+        .map(|_| unreachable!("the vector was cleared"))
+        .collect()
+}

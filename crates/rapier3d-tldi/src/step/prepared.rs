@@ -1,0 +1,341 @@
+//! What the pipeline and the dispatchers it handed to rapier share: the results of the batch, the
+//! workspaces for pairs that are not in it, and the errors that rapier would drop.
+
+use crate::corrections::sweeps::Blocked;
+use crate::narrow_phase::parts::{
+    Hint, PartPair, ShapePair, append_part_pairs, append_queries, within_reach,
+};
+use crate::step::measured::{Measured, rolls};
+use crate::{TldiConfig, TldiError};
+use rapier3d::geometry::{ColliderHandle, SharedShape};
+use rapier3d::math::Pose;
+use rapier3d::parry::shape::{Ball, Shape};
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
+use tldi::{Backend, BackendError, ContactPatch, CpuBackend, Impact, ImpactQuery, PairResult};
+
+/// A distance that no other dispatcher gives.
+pub(crate) const PROBE_ANSWER: f32 = -1.0;
+
+/// What the dispatcher sees of a pair: the addresses of both shapes, and the relative pose, bit by
+/// bit.
+#[derive(PartialEq, Eq, Hash)]
+pub(crate) struct PairKey {
+    shapes: [usize; 2],
+    pos12: [u32; 7],
+}
+
+/// What a shape is known by.
+pub(crate) fn address(shape: &dyn Shape) -> usize {
+    std::ptr::from_ref(shape).cast::<()>() as usize
+}
+
+impl PairKey {
+    pub(crate) fn new(shape1: &dyn Shape, shape2: &dyn Shape, pos12: &Pose) -> Self {
+        let [x, y, z] = pos12.translation.to_array();
+        let [i, j, k, w] = pos12.rotation.to_array();
+        Self {
+            shapes: [address(shape1), address(shape2)],
+            pos12: [x, y, z, i, j, k, w].map(f32::to_bits),
+        }
+    }
+}
+
+/// A pair of the batch.
+pub(crate) struct PreparedPair {
+    pub(crate) colliders: [ColliderHandle; 2],
+    /// Of the colliders in world space.
+    pub(crate) poses: [Pose; 2],
+    /// Contacts up to this gap were sought, metres.
+    pub(crate) prediction: f32,
+    /// Its parts, in [`Batch::parts`].
+    pub(crate) parts: Range<usize>,
+    /// Whether rapier asked for it and took this answer.
+    pub(crate) used: AtomicBool,
+    /// Where a sweep held it in this step, though its contacts let it go on.
+    pub(crate) blocked: Mutex<Option<Blocked>>,
+    /// It is not compared: the manifolds that rapier has are expected to hold.
+    pub(crate) is_kept: bool,
+    /// The measurement that this is, or the earlier one that holds.
+    pub(crate) measured: Option<Measured>,
+    /// Keeps the shapes alive, so that no other can come to lie at their addresses, and shared, so
+    /// that a change of theirs in place moves them to other ones.
+    pub(crate) shapes: [SharedShape; 2],
+}
+
+/// The pairs of a step and their results.
+#[derive(Default)]
+pub(crate) struct Batch {
+    index: HashMap<PairKey, usize>,
+    pub(crate) pairs: Vec<PreparedPair>,
+    pub(crate) parts: Vec<PartPair>,
+    /// The result of query `k` is `results[k]`; there may be left-over ones behind.
+    pub(crate) results: Vec<PairResult>,
+}
+
+impl Batch {
+    /// Forgets the pairs, keeping the memory.
+    pub(crate) fn clear(&mut self) {
+        self.index.clear();
+        self.pairs.clear();
+        self.parts.clear();
+    }
+
+    /// Appends a pair. Where two have the same key (bodies that share a shape and lie alike), the
+    /// first answers for both.
+    pub(crate) fn push(&mut self, key: PairKey, pair: PreparedPair) {
+        self.index.entry(key).or_insert(self.pairs.len());
+        self.pairs.push(pair);
+    }
+
+    /// The error of the backend, with the colliders it is about.
+    pub(crate) fn error(&self, source: BackendError) -> TldiError {
+        let query_of_error = match &source {
+            BackendError::Unsupported { pair, .. } => Some(*pair),
+            _ => None,
+        };
+        let is_culprit = |part: &PartPair| {
+            let query = part.comparison.as_ref().map(|c| c.query);
+            query.is_some() && query == query_of_error
+        };
+        let culprit = self
+            .pairs
+            .iter()
+            .find(|pair| self.parts[pair.parts.clone()].iter().any(is_culprit));
+        match culprit {
+            Some(pair) => TldiError::Pair {
+                collider1: pair.colliders[0],
+                collider2: pair.colliders[1],
+                source,
+            },
+            None => TldiError::Batch {
+                pairs: self.pairs.len(),
+                source,
+            },
+        }
+    }
+
+    /// Forgets the measurements that do not outlive the step, once the results are there.
+    pub(crate) fn expire(&mut self) {
+        let (parts, results) = (&self.parts, &self.results);
+        for pair in self.pairs.iter_mut().filter(|pair| !pair.is_kept) {
+            pair.measured
+                .take_if(|_| rolls(&parts[pair.parts.clone()], results));
+        }
+    }
+
+    /// The pair with this key.
+    pub(crate) fn get(&self, key: &PairKey) -> Option<&PreparedPair> {
+        self.index.get(key).map(|&i| &self.pairs[i])
+    }
+
+    /// Pairs that are compared, and those whose earlier contacts hold.
+    pub(crate) fn counts(&self) -> (usize, usize) {
+        let kept = self.pairs.iter().filter(|pair| pair.is_kept).count();
+        (self.pairs.len() - kept, kept)
+    }
+
+    /// Contact pixels of the pairs that rapier asked for.
+    pub(crate) fn contact_pixels(&self) -> usize {
+        let parts = self.used_parts();
+        parts.map(|parts| count_pixels(parts, &self.results)).sum()
+    }
+
+    /// By how much pixels were made larger, the most of the pairs that rapier asked for.
+    pub(crate) fn coarser_pixels(&self) -> Option<f32> {
+        self.used_parts()
+            .filter_map(|parts| coarser_pixels(parts, &self.results))
+            .reduce(f32::max)
+    }
+
+    /// Parts of the pairs that rapier asked for.
+    fn used_parts(&self) -> impl Iterator<Item = &[PartPair]> {
+        let pairs = self.pairs.iter();
+        let used = pairs.filter(|pair| pair.used.load(Ordering::Relaxed));
+        used.map(|pair| &self.parts[pair.parts.clone()])
+    }
+}
+
+pub(crate) fn count_pixels(parts: &[PartPair], results: &[PairResult]) -> usize {
+    let comparisons = parts.iter().filter_map(|part| part.comparison.as_ref());
+    comparisons.map(|c| results[c.query].contacts.len()).sum()
+}
+
+fn coarser_pixels(parts: &[PartPair], results: &[PairResult]) -> Option<f32> {
+    let comparisons = parts.iter().filter_map(|part| part.comparison.as_ref());
+    let coarser = comparisons.filter_map(|c| results[c.query].coarser);
+    coarser.reduce(f32::max)
+}
+
+/// A CPU backend and its memory, for one pair at a time.
+#[derive(Default)]
+pub(crate) struct Spot {
+    backend: CpuBackend,
+    pub(crate) parts: Vec<PartPair>,
+    pub(crate) results: Vec<PairResult>,
+}
+
+/// Comparisons on the spot since the batch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct SpotCounts {
+    pub(crate) pairs: usize,
+    pub(crate) contact_pixels: usize,
+    /// By how much pixels were made larger, the most of them.
+    pub(crate) coarser_pixels: Option<f32>,
+}
+
+/// State shared by a pipeline and its dispatchers.
+pub(crate) struct Shared {
+    config: TldiConfig,
+    /// Mean radii of a pixel where a time budget decides, as bits of an `f32`.
+    coarsening: AtomicU32,
+    /// A shape that only this pipeline's dispatchers know, by its address: its distance to itself
+    /// is [`PROBE_ANSWER`].
+    pub(crate) probe: Ball,
+    batch: RwLock<Batch>,
+    /// Taken out while in use: no lock is held during a comparison.
+    spots: Mutex<Vec<Spot>>,
+    spot_pairs: AtomicUsize,
+    spot_pixels: AtomicUsize,
+    /// Bits of an `f32`, which are in the order of positive numbers; 0 where no pixels were made larger.
+    spot_coarser: AtomicU32,
+    failed: Mutex<Option<(usize, BackendError)>>,
+}
+
+impl Shared {
+    pub(crate) fn new(config: TldiConfig) -> Self {
+        Self {
+            config,
+            coarsening: AtomicU32::new(1.0f32.to_bits()),
+            probe: Ball::new(1.0),
+            batch: RwLock::default(),
+            spots: Mutex::default(),
+            spot_pairs: AtomicUsize::new(0),
+            spot_pixels: AtomicUsize::new(0),
+            spot_coarser: AtomicU32::new(0),
+            failed: Mutex::default(),
+        }
+    }
+
+    /// The settings for the pairs of this step.
+    pub(crate) fn config(&self) -> TldiConfig {
+        self.config.settled(self.coarsening())
+    }
+
+    fn coarsening(&self) -> f32 {
+        f32::from_bits(self.coarsening.load(Ordering::Relaxed))
+    }
+
+    /// Lets the time that a batch took decide the pixels of the next one.
+    pub(crate) fn took(&self, seconds: f64) {
+        let next = self.config.resolution.coarsened(self.coarsening(), seconds);
+        self.coarsening.store(next.to_bits(), Ordering::Relaxed);
+    }
+
+    pub(crate) fn batch(&self) -> std::sync::RwLockReadGuard<'_, Batch> {
+        self.batch.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn batch_mut(&self) -> std::sync::RwLockWriteGuard<'_, Batch> {
+        self.batch.write().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Compares a pair that is not in the batch and hands its parts and their results to `read`
+    /// (none where it is out of reach). `None` if the comparison failed, which is kept for
+    /// [`take_failures`](Self::take_failures).
+    pub(crate) fn compare_on_the_spot<R>(
+        &self,
+        pair: ShapePair<'_>,
+        config: &TldiConfig,
+        read: impl FnOnce(&[PartPair], &[PairResult]) -> R,
+    ) -> Option<R> {
+        if !within_reach(pair.shape1, pair.shape2, &pair.pos12, pair.prediction) {
+            return Some(read(&[], &[]));
+        }
+        self.spot_pairs.fetch_add(1, Ordering::Relaxed);
+        self.on_the_spot(|spot| {
+            spot.compare(pair, config)?;
+            let pixels = count_pixels(&spot.parts, &spot.results);
+            self.spot_pixels.fetch_add(pixels, Ordering::Relaxed);
+            if let Some(coarser) = coarser_pixels(&spot.parts, &spot.results) {
+                self.spot_coarser
+                    .fetch_max(coarser.to_bits(), Ordering::Relaxed);
+            }
+            Ok(read(&spot.parts, &spot.results))
+        })
+    }
+
+    /// Hands the contacts of a pair of parts on its way to `read`, which no batch could hold.
+    pub(crate) fn contacts_on_the_way<R>(
+        &self,
+        pair: ShapePair<'_>,
+        config: &TldiConfig,
+        read: impl FnOnce(&[ContactPatch]) -> Option<R>,
+    ) -> Option<R> {
+        if !within_reach(pair.shape1, pair.shape2, &pair.pos12, pair.prediction) {
+            return None;
+        }
+        self.on_the_spot(|spot| {
+            spot.compare(pair, config)?;
+            Ok(spot
+                .results
+                .first()
+                .and_then(|result| read(&result.patches)))
+        })
+        .flatten()
+    }
+
+    /// The impact of a motion; `None` also if the comparison failed, which is kept for
+    /// [`take_failures`](Self::take_failures).
+    pub(crate) fn impact_on_the_spot(&self, query: &ImpactQuery) -> Option<Impact> {
+        self.on_the_spot(|spot| spot.backend.impact(query))
+            .flatten()
+    }
+
+    fn on_the_spot<R>(&self, run: impl FnOnce(&mut Spot) -> Result<R, BackendError>) -> Option<R> {
+        let mut spot = locked(&self.spots).pop().unwrap_or_default();
+        let answer = run(&mut spot);
+        locked(&self.spots).push(spot);
+        answer
+            .map_err(|error| match &mut *locked(&self.failed) {
+                Some((count, _)) => *count += 1,
+                failed @ None => *failed = Some((1, error)),
+            })
+            .ok()
+    }
+
+    /// Comparisons on the spot since the last call.
+    pub(crate) fn take_spot_counts(&self) -> SpotCounts {
+        SpotCounts {
+            pairs: self.spot_pairs.swap(0, Ordering::Relaxed),
+            contact_pixels: self.spot_pixels.swap(0, Ordering::Relaxed),
+            coarser_pixels: Some(self.spot_coarser.swap(0, Ordering::Relaxed))
+                .filter(|&bits| bits > 0)
+                .map(f32::from_bits),
+        }
+    }
+
+    /// How many comparisons on the spot failed since the last call, and the first error.
+    pub(crate) fn take_failures(&self) -> Option<(usize, BackendError)> {
+        locked(&self.failed).take()
+    }
+}
+
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Spot {
+    fn compare(&mut self, pair: ShapePair<'_>, config: &TldiConfig) -> Result<(), BackendError> {
+        let mut sides = Vec::new();
+        self.parts.clear();
+        append_part_pairs(pair, config, &mut self.parts, &mut sides, |_, _, _| {
+            Hint::default()
+        });
+        let mut queries = Vec::with_capacity(sides.len());
+        append_queries(&self.parts, &sides, &mut queries);
+        self.backend.compare(&queries, &mut self.results)
+    }
+}

@@ -1,0 +1,486 @@
+//! Builds and validates clouds.
+
+use crate::cloud::gather::{Gathered, block_bounds, non_finite_indices, without};
+use crate::cloud::morton::{morton_order, permuted};
+use crate::cloud::point_cloud::{Spare, next_content_id};
+use crate::cloud::point_normals::{fill_from_nearest, normalize, pca_normals};
+use crate::cloud::radii::{check_coordinates, check_radii, knn_radii, mean_and_max};
+use crate::{Aabb, CloudError, KdTree, PointCloud, Radii};
+use glamx::Vec3;
+use std::borrow::Cow;
+use std::cell::LazyCell;
+
+/// Most points of a cloud: indices, and counts of up to 64 pixels for each point, fit 32 bits.
+const MAX_POINTS: usize = (u32::MAX / 64) as usize;
+
+/// The paper's spherical cover: 0.65 × the distance to the 7th nearest neighbour.
+const DEFAULT_NEIGHBORS: usize = 7;
+const DEFAULT_SCALE: f32 = 0.65;
+
+/// Where the positions of a cloud come from.
+///
+/// ```
+/// use tldi::{PointCloud, Positions};
+/// let (x, y, z) = (vec![0.0, 1.0, 2.0], vec![0.0; 3], vec![0.0; 3]);
+/// let cloud = PointCloud::builder([&x[..], &y[..], &z[..]]).radius(1.0).build()?;
+/// assert_eq!(cloud.coordinates()[0].as_ptr(), x.as_ptr(), "no copy");
+/// # Ok::<(), tldi::CloudError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub enum Positions<'a> {
+    /// Vectors, borrowed or owned; transposed into the cloud in the pass that validates them.
+    Vectors(Cow<'a, [Vec3]>),
+    /// One slice per coordinate: borrowed by the cloud without a copy where every point is finite.
+    Soa {
+        /// x coordinates in metres.
+        x: Cow<'a, [f32]>,
+        /// y coordinates in metres.
+        y: Cow<'a, [f32]>,
+        /// z coordinates in metres.
+        z: Cow<'a, [f32]>,
+    },
+}
+
+impl<'a> From<&'a [Vec3]> for Positions<'a> {
+    fn from(points: &'a [Vec3]) -> Self {
+        Self::Vectors(Cow::Borrowed(points))
+    }
+}
+impl<'a> From<&'a Vec<Vec3>> for Positions<'a> {
+    fn from(points: &'a Vec<Vec3>) -> Self {
+        Self::Vectors(Cow::Borrowed(points))
+    }
+}
+impl From<Vec<Vec3>> for Positions<'_> {
+    fn from(points: Vec<Vec3>) -> Self {
+        Self::Vectors(Cow::Owned(points))
+    }
+}
+impl<'a> From<[&'a [f32]; 3]> for Positions<'a> {
+    fn from([x, y, z]: [&'a [f32]; 3]) -> Self {
+        Self::Soa {
+            x: x.into(),
+            y: y.into(),
+            z: z.into(),
+        }
+    }
+}
+impl From<[Vec<f32>; 3]> for Positions<'_> {
+    fn from([x, y, z]: [Vec<f32>; 3]) -> Self {
+        Self::Soa {
+            x: x.into(),
+            y: y.into(),
+            z: z.into(),
+        }
+    }
+}
+
+/// What to do with points that have a NaN or infinite coordinate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum NonFinite {
+    /// Leave them out, together with their attributes, and count them
+    /// ([`PointCloud::dropped`]): depth cameras emit NaN where they saw nothing.
+    #[default]
+    Drop,
+    /// Fail with [`CloudError::NonFinite`].
+    Refuse,
+}
+
+/// How the radii are found.
+#[derive(Clone, Debug)]
+enum RadiusSource<'a> {
+    Given(Radii<'a>),
+    NearestNeighbors { k: usize, scale: f32 },
+}
+
+/// Builds a [`PointCloud`]: validates everything once, reading the positions once.
+///
+/// Unless told otherwise, radii are made from nearest neighbours
+/// ([`knn_radii(7, 0.65)`](Self::knn_radii)), normals and colours are absent, non-finite points
+/// are dropped, and the points keep their order. The result does not depend on the number of
+/// threads.
+///
+/// ```
+/// use tldi::{PointCloud, glamx::Vec3};
+/// let points: Vec<Vec3> = (0..400)
+///     .map(|i| 0.1 * Vec3::new((i % 20) as f32, 0.0, (i / 20) as f32))
+///     .collect();
+/// let cloud = PointCloud::builder(&points)
+///     .knn_radii(7, 0.65)
+///     .pca_normals(12)
+///     .viewpoint(Vec3::new(1.0, 5.0, 1.0))
+///     .build()?;
+/// assert!(cloud.normals().is_some_and(|n| n.iter().all(|n| n.y > 0.999)));
+/// // Away from the border, the 7th nearest neighbour on a square grid is √2 × the spacing away.
+/// assert!((cloud.radius(210) - 0.65 * 0.1 * 2f32.sqrt()).abs() < 1e-6);
+/// # Ok::<(), tldi::CloudError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct CloudBuilder<'a> {
+    positions: Positions<'a>,
+    radii: RadiusSource<'a>,
+    noise: f32,
+    normals: Option<Cow<'a, [Vec3]>>,
+    pca_neighbors: Option<usize>,
+    viewpoint: Option<Vec3>,
+    colors: Option<Cow<'a, [[u8; 4]]>>,
+    non_finite: NonFinite,
+    spatial_order: bool,
+}
+
+impl<'a> CloudBuilder<'a> {
+    pub(crate) fn new(positions: Positions<'a>) -> Self {
+        Self {
+            positions,
+            radii: RadiusSource::NearestNeighbors {
+                k: DEFAULT_NEIGHBORS,
+                scale: DEFAULT_SCALE,
+            },
+            noise: 0.0,
+            normals: None,
+            pca_neighbors: None,
+            viewpoint: None,
+            colors: None,
+            non_finite: NonFinite::default(),
+            spatial_order: false,
+        }
+    }
+
+    /// One radius in metres for all points, 10⁻¹² to 10¹². The cheapest, and right for evenly
+    /// sampled surfaces: at least 0.71 × the spacing of a square grid covers it. Of this,
+    /// [`radii`](Self::radii) and [`knn_radii`](Self::knn_radii) the last call counts.
+    pub fn radius(mut self, radius: f32) -> Self {
+        self.radii = RadiusSource::Given(Radii::Global(radius));
+        self
+    }
+
+    /// One radius in metres for each point given, as from a sensor's range model. Borrowed, unless
+    /// points are dropped or reordered.
+    pub fn radii(mut self, radii: impl Into<Cow<'a, [f32]>>) -> Self {
+        self.radii = RadiusSource::Given(Radii::PerPoint(radii.into()));
+        self
+    }
+
+    /// Radii of `scale` × the distance to the `k`-th nearest neighbour, in parallel: the spherical
+    /// cover of Radwan, Ohrhallinger and Wimmer (Graphics Interface 2014) with `k` = 7 and
+    /// `scale` = 0.65, which is the default.
+    ///
+    /// - Neighbours are counted at distinct positions other than the point's own, so that repeated
+    ///   points neither give radius 0 nor shrink the radii around them. Positions within 2⁻²⁰ of the largest
+    ///   coordinate of each other, a few steps of `f32`, are one: a scan that was moved and merged with itself has
+    ///   the radii of the scan. Where there are fewer than `k`, the farthest counts.
+    /// - No radius exceeds 10 × the median (over distinct positions): an isolated outlier, such as
+    ///   a depth camera's flying pixel, does not become a huge ball. A surface may still be sampled
+    ///   at densities of 100 : 1, which is 10 : 1 in spacing; beyond that, give
+    ///   [`radii`](Self::radii).
+    /// - Points that nearly coincide do not get radii too small for their coordinates
+    ///   ([`CloudError::CoordinateTooLarge`]), unless the median itself is too small.
+    ///
+    /// Fails with [`CloudError::BadParameter`] for `k` = 0 or a scale that is not positive and
+    /// finite, with [`CloudError::NoSpacing`] if all points coincide.
+    pub fn knn_radii(mut self, k: usize, scale: f32) -> Self {
+        self.radii = RadiusSource::NearestNeighbors { k, scale };
+        self
+    }
+
+    /// Standard deviation of the points along the surface's normal in metres, from the sensor's
+    /// range model; 0 unless told. Of clouds with noise, the least gap is less than that of their surfaces:
+    /// where noise alone explains a collision, there is none. Contacts stay where they are.
+    ///
+    /// With σ = r̄ (of both clouds, pixels of r̄) it takes the wrong answers from 2.6 to 0.9 % (see
+    /// `docs/benchmarks.md`). Fails with [`CloudError::BadParameter`] for a value that is negative or not
+    /// finite.
+    pub fn noise(mut self, sigma: f32) -> Self {
+        self.noise = sigma;
+        self
+    }
+
+    /// One outward normal for each point given; any that are not of unit length are normalised.
+    /// Borrowed, unless something must be changed.
+    ///
+    /// A normal that is zero or not finite (a vertex without a face, say) is replaced by that of
+    /// the nearest point with a usable one; if none is, the build fails with
+    /// [`CloudError::NoUsableNormal`].
+    pub fn normals(mut self, normals: impl Into<Cow<'a, [Vec3]>>) -> Self {
+        self.normals = Some(normals.into());
+        self
+    }
+
+    /// Normals of the planes that best fit each point and its `k` nearest neighbours at distinct
+    /// positions, as [`knn_radii`](Self::knn_radii) tells them (principal component analysis), in parallel. Not oriented, unless a
+    /// [`viewpoint`](Self::viewpoint) is known; [`normals`](Self::normals), if given, win. 8 to 24
+    /// neighbours are usual, more against noise.
+    ///
+    /// Where no plane fits best, the normal is one of those that fit: across a line of points, or
+    /// along z if all points coincide. Fails with [`CloudError::BadParameter`] for `k` < 2.
+    pub fn pca_normals(mut self, k: usize) -> Self {
+        self.pca_neighbors = Some(k);
+        self
+    }
+
+    /// Where the surface was seen from, in the cloud's frame: normals made by
+    /// [`pca_normals`](Self::pca_normals) point to its side, and count as oriented. Without effect
+    /// on given normals.
+    pub fn viewpoint(mut self, point: Vec3) -> Self {
+        self.viewpoint = Some(point);
+        self
+    }
+
+    /// One colour (red, green, blue, alpha) for each point given. Borrowed, unless points are
+    /// dropped or reordered.
+    pub fn colors(mut self, colors: impl Into<Cow<'a, [[u8; 4]]>>) -> Self {
+        self.colors = Some(colors.into());
+        self
+    }
+
+    /// What to do with points that have a NaN or infinite coordinate; they are dropped by default.
+    /// Also applies to [`PointCloud::set_points`].
+    pub fn non_finite(mut self, policy: NonFinite) -> Self {
+        self.non_finite = policy;
+        self
+    }
+
+    /// Reorders the points, with their attributes, along a Morton curve, so that the bounds of
+    /// [`PointCloud::blocks`] are tight and most blocks can be skipped. Worth its cost (a sort)
+    /// for static scans. [`PointCloud::order`] tells where each point came from.
+    pub fn spatial_order(mut self) -> Self {
+        self.spatial_order = true;
+        self
+    }
+
+    /// Validates and builds. See [`CloudError`] for what can be wrong.
+    pub fn build(self) -> Result<PointCloud<'a>, CloudError> {
+        self.check_parameters()?;
+        let count = self.check_lengths()?;
+        let (mut coordinates, mut blocks, dropped) = gather(self.positions);
+        check_dropped(self.non_finite, count, &dropped)?;
+        let mut radii = self.radii;
+        let mut normals = self.normals;
+        let mut colors = self.colors;
+        if !dropped.is_empty() {
+            if let RadiusSource::Given(Radii::PerPoint(r)) = &mut radii {
+                *r = Cow::Owned(without(r, &dropped));
+            }
+            normals = normals.map(|n| Cow::Owned(without(&n, &dropped)));
+            colors = colors.map(|c| Cow::Owned(without(&c, &dropped)));
+        }
+
+        let mut order = None;
+        if self.spatial_order {
+            let curve = morton_order(coordinates.each_ref().map(|c| &**c), merged(&blocks));
+            coordinates = coordinates.map(|c| Cow::Owned(permuted(&c, &curve)));
+            if let RadiusSource::Given(Radii::PerPoint(r)) = &mut radii {
+                *r = Cow::Owned(permuted(r, &curve));
+            }
+            normals = normals.map(|n| Cow::Owned(permuted(&n, &curve)));
+            colors = colors.map(|c| Cow::Owned(permuted(&c, &curve)));
+            blocks = block_bounds(coordinates.each_ref().map(|c| &**c));
+            order = Some(curve);
+        }
+
+        let bounds = merged(&blocks);
+        let axes = coordinates.each_ref().map(|c| &**c);
+        let given_index = |i: usize| {
+            let kept = order
+                .as_ref()
+                .map_or(i, |order: &Vec<u32>| order[i] as usize);
+            index_before_drop(kept, &dropped)
+        };
+        let tree = LazyCell::new(|| KdTree::from_coordinates(axes));
+        let radii = match radii {
+            RadiusSource::Given(radii) => radii,
+            RadiusSource::NearestNeighbors { k, scale } => {
+                Radii::PerPoint(Cow::Owned(knn_radii(&tree, k, scale)?))
+            }
+        };
+        check_radii(&radii, given_index)?;
+        check_coordinates(axes, bounds, &radii, given_index)?;
+
+        let normals_oriented = normals.is_some() || self.viewpoint.is_some();
+        let normals = match (normals, self.pca_neighbors) {
+            (Some(given), _) => Some(usable_normals(given, axes)?),
+            (None, Some(k)) => Some(Cow::Owned(pca_normals(&tree, k, self.viewpoint))),
+            (None, None) => None,
+        };
+        drop(tree);
+
+        let (mean_radius, max_radius) = mean_and_max(&radii);
+        let [x, y, z] = coordinates;
+        Ok(PointCloud {
+            x,
+            y,
+            z,
+            radii,
+            normals_oriented: normals_oriented && normals.is_some(),
+            normals,
+            colors,
+            bounds,
+            blocks,
+            mean_radius,
+            max_radius,
+            noise: self.noise,
+            dropped: dropped.len(),
+            non_finite: self.non_finite,
+            order,
+            content: next_content_id(),
+            spare: Spare::default(),
+        })
+    }
+
+    /// Checks what does not depend on the points.
+    fn check_parameters(&self) -> Result<(), CloudError> {
+        let bad = |parameter, value, expected| {
+            Err(CloudError::BadParameter {
+                parameter,
+                value,
+                expected,
+            })
+        };
+        if let RadiusSource::NearestNeighbors { k, scale } = self.radii {
+            if k == 0 {
+                return bad("knn_radii: k", 0.0, "at least one neighbour is needed");
+            }
+            if !(scale.is_finite() && scale > 0.0) {
+                return bad(
+                    "knn_radii: scale",
+                    scale,
+                    "it must be finite and greater than zero",
+                );
+            }
+        }
+        if !(self.noise.is_finite() && self.noise >= 0.0) {
+            let expected = "it is a standard deviation in metres: finite and not negative";
+            return bad("noise", self.noise, expected);
+        }
+        if let Some(k) = self.pca_neighbors.filter(|k| *k < 2) {
+            let expected = "a plane needs at least two neighbours";
+            return bad("pca_normals: k", k as f32, expected);
+        }
+        if let Some(viewpoint) = self.viewpoint
+            && let Some(value) = viewpoint.to_array().into_iter().find(|v| !v.is_finite())
+        {
+            return bad("viewpoint", value, "its coordinates must be finite");
+        }
+        Ok(())
+    }
+
+    /// Number of points given, if it is within the limit and all attributes have as many entries.
+    fn check_lengths(&self) -> Result<usize, CloudError> {
+        let (count, [y, z]) = match &self.positions {
+            Positions::Vectors(points) => (points.len(), [points.len(); 2]),
+            Positions::Soa { x, y, z } => (x.len(), [y.len(), z.len()]),
+        };
+        check_count(count)?;
+        check_length("y", y, count)?;
+        check_length("z", z, count)?;
+        if let RadiusSource::Given(Radii::PerPoint(radii)) = &self.radii {
+            check_length("radii", radii.len(), count)?;
+        }
+        if let Some(normals) = &self.normals {
+            check_length("normals", normals.len(), count)?;
+        }
+        if let Some(colors) = &self.colors {
+            check_length("colors", colors.len(), count)?;
+        }
+        Ok(count)
+    }
+}
+
+/// Fails for more points than a cloud can have.
+pub(crate) fn check_count(count: usize) -> Result<(), CloudError> {
+    if count > MAX_POINTS {
+        return Err(CloudError::TooManyPoints {
+            count,
+            limit: MAX_POINTS,
+        });
+    }
+    Ok(())
+}
+
+/// Fails if an attribute does not have one entry for each point.
+pub(crate) fn check_length(
+    attribute: &'static str,
+    actual: usize,
+    expected: usize,
+) -> Result<(), CloudError> {
+    if actual != expected {
+        return Err(CloudError::LengthMismatch {
+            attribute,
+            expected,
+            actual,
+        });
+    }
+    Ok(())
+}
+
+/// Fails if the policy refuses the non-finite points, or no other is left of `count`.
+pub(crate) fn check_dropped(
+    policy: NonFinite,
+    count: usize,
+    dropped: &[u32],
+) -> Result<(), CloudError> {
+    match dropped.first() {
+        Some(&first) if policy == NonFinite::Refuse => Err(CloudError::NonFinite {
+            index: first as usize,
+            count: dropped.len(),
+        }),
+        _ if dropped.len() == count => Err(CloudError::Empty {
+            dropped: dropped.len(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// The union of all blocks.
+pub(crate) fn merged(blocks: &[Aabb]) -> Aabb {
+    blocks.iter().copied().fold(Aabb::EMPTY, Aabb::merged)
+}
+
+/// The finite points, the bounds of their blocks, and the indices of the others, ascending.
+fn gather(positions: Positions<'_>) -> ([Cow<'_, [f32]>; 3], Vec<Aabb>, Vec<u32>) {
+    match positions {
+        Positions::Vectors(points) => {
+            let mut gathered = Gathered::default();
+            gathered.refill(&points, None);
+            let Gathered {
+                x,
+                y,
+                z,
+                blocks,
+                dropped,
+            } = gathered;
+            ([x, y, z].map(Cow::Owned), blocks, dropped)
+        }
+        Positions::Soa { x, y, z } => {
+            let dropped = non_finite_indices([&x, &y, &z]);
+            let mut coordinates = [x, y, z];
+            if !dropped.is_empty() {
+                coordinates = coordinates.map(|c| Cow::Owned(without(&c, &dropped)));
+            }
+            let blocks = block_bounds(coordinates.each_ref().map(|c| &**c));
+            (coordinates, blocks, dropped)
+        }
+    }
+}
+
+/// The given normals, normalised and completed; borrowed if nothing had to be done.
+fn usable_normals<'a>(
+    given: Cow<'a, [Vec3]>,
+    coordinates: [&[f32]; 3],
+) -> Result<Cow<'a, [Vec3]>, CloudError> {
+    if given.iter().all(|n| n.is_normalized()) {
+        return Ok(given);
+    }
+    let mut normals = given.into_owned();
+    if !normalize(&mut normals) {
+        fill_from_nearest(&mut normals, coordinates)?;
+    }
+    Ok(Cow::Owned(normals))
+}
+
+/// The index, among the points given, of the one with index `kept` among those not dropped.
+fn index_before_drop(kept: usize, dropped: &[u32]) -> usize {
+    dropped
+        .iter()
+        .fold(kept, |index, &d| index + usize::from(d as usize <= index))
+}

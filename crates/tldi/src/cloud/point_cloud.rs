@@ -1,0 +1,381 @@
+//! The point cloud: positions, radii, optional normals and colours, bounds.
+
+use crate::cloud::builder::{check_count, check_dropped, check_length, merged};
+use crate::cloud::gather::{Gathered, extend_without};
+use crate::cloud::morton::permuted;
+use crate::cloud::point_normals::{fill_from_nearest, normalize};
+use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
+use crate::{Aabb, CloudBuilder, CloudError, NonFinite, Positions};
+use glamx::Vec3;
+use std::borrow::Cow;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Points per block: [`PointCloud::blocks`] bounds that many consecutive points each.
+pub const BLOCK: usize = 256;
+
+/// Radius of the ball around each point, in metres.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Radii<'a> {
+    /// The same for all points.
+    Global(f32),
+    /// One for each point.
+    PerPoint(Cow<'a, [f32]>),
+}
+
+/// Points of one body in its own frame, validated once, with what is derived from them.
+///
+/// Coordinates are held as structure of arrays, owned or borrowed ([`Positions`]). The balls of
+/// the radii around the points are meant to cover the surface that was sampled.
+///
+/// ```
+/// use tldi::{PointCloud, glamx::Vec3};
+/// let points: Vec<Vec3> = (0..100)
+///     .map(|i| Vec3::new((i % 10) as f32, 0.0, (i / 10) as f32))
+///     .collect();
+/// let cloud = PointCloud::builder(&points).radius(0.7).build()?;
+/// assert_eq!(cloud.len(), 100);
+/// assert_eq!(cloud.bounds().max, Vec3::new(9.0, 0.0, 9.0));
+/// # Ok::<(), tldi::CloudError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct PointCloud<'a> {
+    pub(crate) x: Cow<'a, [f32]>,
+    pub(crate) y: Cow<'a, [f32]>,
+    pub(crate) z: Cow<'a, [f32]>,
+    pub(crate) radii: Radii<'a>,
+    pub(crate) normals: Option<Cow<'a, [Vec3]>>,
+    pub(crate) normals_oriented: bool,
+    pub(crate) colors: Option<Cow<'a, [[u8; 4]]>>,
+    pub(crate) bounds: Aabb,
+    pub(crate) blocks: Vec<Aabb>,
+    pub(crate) mean_radius: f32,
+    pub(crate) max_radius: f32,
+    pub(crate) noise: f32,
+    pub(crate) dropped: usize,
+    pub(crate) non_finite: NonFinite,
+    pub(crate) order: Option<Vec<u32>>,
+    pub(crate) content: u64,
+    pub(crate) spare: Spare,
+}
+
+/// Memory for the next frame of a cloud that is given new points; a clone of the cloud starts
+/// without.
+#[derive(Debug, Default)]
+pub(crate) struct Spare {
+    gathered: Gathered,
+    normals: Vec<Vec3>,
+}
+
+impl Clone for Spare {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl<'a> PointCloud<'a> {
+    /// Starts a builder over `points`: a slice or vector of vectors (transposed in the pass that
+    /// validates), or [`Positions::Soa`] slices, which are borrowed.
+    pub fn builder(points: impl Into<Positions<'a>>) -> CloudBuilder<'a> {
+        CloudBuilder::new(points.into())
+    }
+
+    /// Number of points (at least one).
+    #[allow(
+        clippy::len_without_is_empty,
+        reason = "a cloud is never empty: the builder refuses"
+    )]
+    pub fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    /// The coordinates in metres, in the cloud's own frame.
+    pub fn coordinates(&self) -> [&[f32]; 3] {
+        [&self.x, &self.y, &self.z]
+    }
+
+    /// Position of one point in metres.
+    pub fn point(&self, index: usize) -> Vec3 {
+        Vec3::new(self.x[index], self.y[index], self.z[index])
+    }
+
+    /// All positions, in order.
+    pub fn points(&self) -> impl ExactSizeIterator<Item = Vec3> + '_ {
+        (0..self.len()).map(|i| self.point(i))
+    }
+
+    /// The radii in metres.
+    pub fn radii(&self) -> &Radii<'a> {
+        &self.radii
+    }
+
+    /// Radius of one point in metres.
+    pub fn radius(&self, index: usize) -> f32 {
+        match &self.radii {
+            Radii::Global(r) => *r,
+            Radii::PerPoint(r) => r[index],
+        }
+    }
+
+    /// Mean radius r̄ in metres.
+    pub fn mean_radius(&self) -> f32 {
+        self.mean_radius
+    }
+
+    /// Largest radius in metres.
+    pub fn max_radius(&self) -> f32 {
+        self.max_radius
+    }
+
+    /// Whether some radius is twice the mean or more: in such a cloud what is near depends on the place, as its
+    /// resolution does. Cost: O(1).
+    ///
+    /// ```
+    /// use tldi::{PointCloud, glamx::Vec3};
+    /// let points = [Vec3::ZERO, Vec3::X, 2.0 * Vec3::X];
+    /// let with = |radii: &[f32]| PointCloud::builder(&points[..]).radii(radii.to_vec()).build();
+    /// assert!(!with(&[0.5, 0.8, 0.5])?.is_uneven());
+    /// assert!(with(&[0.5, 0.5, 4.0])?.is_uneven());
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    pub fn is_uneven(&self) -> bool {
+        self.max_radius >= 2.0 * self.mean_radius
+    }
+
+    /// Standard deviation of the points along the surface's normal in metres, as
+    /// [told](CloudBuilder::noise); 0 where it was not.
+    pub fn noise(&self) -> f32 {
+        self.noise
+    }
+
+    /// Unit normals, one for each point, where given or computed.
+    pub fn normals(&self) -> Option<&[Vec3]> {
+        self.normals.as_deref()
+    }
+
+    /// Whether the normals point outward (given, or oriented towards a viewpoint), so that their
+    /// sign means something.
+    pub fn normals_oriented(&self) -> bool {
+        self.normals_oriented
+    }
+
+    /// Colours (red, green, blue, alpha), one for each point, where given.
+    pub fn colors(&self) -> Option<&[[u8; 4]]> {
+        self.colors.as_deref()
+    }
+
+    /// Bounds of the positions (radii not included).
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Bounds of each run of [`BLOCK`] consecutive points: where the order of the points is
+    /// spatially coherent, whole blocks are skipped by the culling pass.
+    pub fn blocks(&self) -> &[Aabb] {
+        &self.blocks
+    }
+
+    /// Non-finite points that were dropped from those last given.
+    pub fn dropped(&self) -> usize {
+        self.dropped
+    }
+
+    /// Number of the content: clouds of this process with the same number have the same points,
+    /// radii and normals, so that what was derived from one of them (a copy on a device) holds for
+    /// the others. New points or radii change it; clones share it.
+    pub fn content_id(&self) -> u64 {
+        self.content
+    }
+
+    /// After [`CloudBuilder::spatial_order`], the index that each point would have without it (the
+    /// index given by the caller, where nothing was dropped), so that whoever is told of a point of
+    /// the cloud finds it in their own data. Else `None`: the points are as given.
+    pub fn order(&self) -> Option<&[u32]> {
+        self.order.as_deref()
+    }
+
+    /// Whether [`set_points`](Self::set_points) with these points and normals would leave the cloud
+    /// as it is. `false` also where that is not sure: points were dropped, or normals made unit
+    /// vectors. Cost: one pass, up to the first difference.
+    ///
+    /// ```
+    /// use tldi::{PointCloud, glamx::Vec3};
+    /// let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.5).build()?;
+    /// assert!(cloud.consists_of(&[Vec3::ZERO, Vec3::X], None));
+    /// assert!(!cloud.consists_of(&[Vec3::X, Vec3::ZERO], None));
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    pub fn consists_of(&self, points: &[Vec3], normals: Option<&[Vec3]>) -> bool {
+        let given = |i: usize| self.order.as_ref().map_or(i, |order| order[i] as usize);
+        let same_normals = match (self.normals(), normals) {
+            (None, None) => true,
+            (Some(own), Some(new)) => {
+                new.len() == own.len() && (0..own.len()).all(|i| own[i] == new[given(i)])
+            }
+            _ => false,
+        };
+        points.len() == self.len()
+            && self.dropped == 0
+            && (0..self.len()).all(|i| self.point(i) == points[given(i)])
+            && same_normals
+    }
+
+    /// Replaces all points, as a deforming or streaming cloud does in every frame.
+    ///
+    /// - A global radius is kept. So are radii and colours for each point, if as many points as the
+    ///   cloud has are given, all finite: they are taken to be the same points, moved. Otherwise
+    ///   colours are removed, and radii for each point are an error
+    ///   ([`CloudError::LengthMismatch`]): [set](Self::set_radii) a global radius first, or build
+    ///   another cloud.
+    /// - Normals are replaced by those given, which must be outward (see
+    ///   [`CloudBuilder::normals`]), or removed: the former ones would be wrong.
+    /// - A cloud built with [`CloudBuilder::spatial_order`] takes the points in the order in which
+    ///   they were given to the builder and puts them into its own; if the number changes, or some
+    ///   are dropped, it keeps them as they come and [`order`](Self::order) becomes `None`.
+    ///
+    /// On an error the cloud is unchanged. Cost: one pass over the points. Memory is reused: after
+    /// two calls with as many points nothing is allocated, unless normals must be replaced.
+    ///
+    /// ```
+    /// use tldi::{PointCloud, glamx::Vec3};
+    /// let mut points = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+    /// let mut cloud = PointCloud::builder(&points).radius(0.7).build()?.into_owned();
+    /// points.push(2.0 * Vec3::Z);
+    /// cloud.set_points(&points, None)?;
+    /// assert_eq!((cloud.len(), cloud.bounds().max), (4, Vec3::new(1.0, 1.0, 2.0)));
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    pub fn set_points(
+        &mut self,
+        points: &[Vec3],
+        normals: Option<&[Vec3]>,
+    ) -> Result<(), CloudError> {
+        check_count(points.len())?;
+        if let Some(normals) = normals {
+            check_length("normals", normals.len(), points.len())?;
+        }
+        // Everything is prepared in spare memory and swapped in at the end.
+        let Spare {
+            gathered,
+            normals: new_normals,
+        } = &mut self.spare;
+        let mut order = self.order.as_ref().filter(|o| o.len() == points.len());
+        if let Some(curve) = order {
+            gathered.refill(points, Some(curve));
+            if !gathered.dropped.is_empty() {
+                order = None;
+            }
+        }
+        if order.is_none() {
+            gathered.refill(points, None);
+        }
+        check_dropped(self.non_finite, points.len(), &gathered.dropped)?;
+        let same_points = points.len() == self.x.len() && gathered.dropped.is_empty();
+        if let Radii::PerPoint(radii) = &self.radii
+            && !same_points
+        {
+            let kept = points.len() - gathered.dropped.len();
+            let same_count = points.len() == radii.len();
+            let expected = if same_count { kept } else { points.len() };
+            check_length("radii", radii.len(), expected)?;
+        }
+        let bounds = merged(&gathered.blocks);
+        let coordinates = [&*gathered.x, &*gathered.y, &*gathered.z];
+        check_coordinates(coordinates, bounds, &self.radii, |i| {
+            order.map_or(i, |order| order[i] as usize)
+        })?;
+        if let Some(normals) = normals {
+            new_normals.clear();
+            match order {
+                Some(order) => new_normals.extend(order.iter().map(|&i| normals[i as usize])),
+                None => extend_without(new_normals, normals.iter().copied(), &gathered.dropped),
+            }
+            if !normalize(new_normals) {
+                fill_from_nearest(new_normals, coordinates)?;
+            }
+        }
+
+        // Nothing fails from here on.
+        if order.is_none() {
+            self.order = None;
+        }
+        swap(&mut self.x, &mut gathered.x);
+        swap(&mut self.y, &mut gathered.y);
+        swap(&mut self.z, &mut gathered.z);
+        std::mem::swap(&mut self.blocks, &mut gathered.blocks);
+        match (&mut self.normals, normals) {
+            (Some(current), Some(_)) => swap(current, new_normals),
+            (current @ None, Some(_)) => *current = Some(Cow::Owned(std::mem::take(new_normals))),
+            (current, None) => {
+                if let Some(Cow::Owned(unused)) = current.take() {
+                    *new_normals = unused;
+                }
+            }
+        }
+        self.normals_oriented = normals.is_some();
+        self.colors.take_if(|_| !same_points);
+        self.bounds = bounds;
+        self.dropped = gathered.dropped.len();
+        self.content = next_content_id();
+        Ok(())
+    }
+
+    /// Replaces the radii; those for each point come in the order in which
+    /// [`set_points`](Self::set_points) takes the points, without dropped ones. On an error the
+    /// cloud is unchanged.
+    pub fn set_radii(&mut self, radii: Radii<'a>) -> Result<(), CloudError> {
+        let mut radii = radii;
+        if let Radii::PerPoint(radii) = &mut radii {
+            check_length("radii", radii.len(), self.len())?;
+            if let Some(order) = &self.order {
+                *radii = Cow::Owned(permuted(radii, order));
+            }
+        }
+        let given_index = |i: usize| self.order.as_ref().map_or(i, |order| order[i] as usize);
+        check_radii(&radii, given_index)?;
+        check_coordinates(self.coordinates(), self.bounds, &radii, given_index)?;
+        (self.mean_radius, self.max_radius) = mean_and_max(&radii);
+        self.radii = radii;
+        self.content = next_content_id();
+        Ok(())
+    }
+
+    /// The cloud with everything owned.
+    pub fn into_owned(self) -> PointCloud<'static> {
+        PointCloud {
+            x: Cow::Owned(self.x.into_owned()),
+            y: Cow::Owned(self.y.into_owned()),
+            z: Cow::Owned(self.z.into_owned()),
+            radii: match self.radii {
+                Radii::Global(r) => Radii::Global(r),
+                Radii::PerPoint(r) => Radii::PerPoint(Cow::Owned(r.into_owned())),
+            },
+            normals: self.normals.map(|n| Cow::Owned(n.into_owned())),
+            normals_oriented: self.normals_oriented,
+            colors: self.colors.map(|c| Cow::Owned(c.into_owned())),
+            bounds: self.bounds,
+            blocks: self.blocks,
+            mean_radius: self.mean_radius,
+            max_radius: self.max_radius,
+            noise: self.noise,
+            dropped: self.dropped,
+            non_finite: self.non_finite,
+            order: self.order,
+            content: self.content,
+            spare: self.spare,
+        }
+    }
+}
+
+/// A number that no cloud had before.
+pub(crate) fn next_content_id() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+/// Makes `new` current and keeps the memory of the former content, if it was owned.
+fn swap<T: Clone>(current: &mut Cow<'_, [T]>, new: &mut Vec<T>) {
+    let former = std::mem::replace(current, Cow::Owned(std::mem::take(new)));
+    if let Cow::Owned(former) = former {
+        *new = former;
+    }
+}

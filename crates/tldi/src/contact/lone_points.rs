@@ -1,0 +1,441 @@
+//! Points that stand alone beside a surface: flying pixels, dust.
+//!
+//! Splats around a few points are no surface. A point stands alone if its fourth nearest neighbour
+//! is much farther away than the fourth neighbour of one of these four is from that one. By this
+//! rule, the points of a wire, of a coarse part of a scan and of a body of few points do not stand
+//! alone.
+
+use crate::cloud::reach::Ring;
+use crate::contact::links::{Groups, Links};
+use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
+use crate::cpu::zone::AroundPlaces;
+use crate::{Aabb, BLOCK, ContactPixel, PairQuery, PairResult, PointCloud, Surface};
+use glamx::{Pose3, Vec3};
+
+/// Neighbours that tell how dense points are. Clouds of fewer have no lone points.
+const NEIGHBORS: usize = 4;
+
+/// Times the distance of a neighbour's fourth neighbour beyond which that of a point makes it stand
+/// alone. At the corner of a grid it is twice as far.
+const ALONE: f32 = 2.5;
+
+/// Points closer to each other than this share of the mean radius are the same point.
+const SAME_POINT: f32 = 1e-3;
+
+/// Contact pixels of one component that are looked at.
+const SAMPLES: usize = 9;
+
+/// How far neighbours are looked for, in mean radii of the cloud. What has none within that is not
+/// known to stand alone.
+const REACH: f32 = 32.0;
+
+/// Edge of a cell of [`Surroundings`] in mean radii: of points with the paper's radii (0.65 of the
+/// distance to the seventh neighbour), it reaches beyond the fourth.
+const CELL: f32 = 2.0;
+
+/// Cells from a place to its point and on to a neighbour of that, around which points must be known.
+const RIM: f32 = 2.0;
+
+/// The points nearest to a place: squares of their distances in metres, and where they are.
+type Nearest = [(f32, Vec3); NEIGHBORS];
+
+/// Keeps the nearest of what it is offered.
+fn offer(best: &mut Nearest, squared: f32, point: Vec3) {
+    if squared < best[NEIGHBORS - 1].0 {
+        let at = best.partition_point(|near| near.0 <= squared);
+        best.copy_within(at..NEIGHBORS - 1, at + 1);
+        best[at] = (squared, point);
+    }
+}
+
+/// The points of a cloud in a region, in the frame of the query.
+#[derive(Clone, Copy)]
+pub(crate) struct Culled<'a> {
+    pub(crate) points: &'a Survivors,
+    pub(crate) region: &'a Region,
+}
+
+/// The points of a cloud around some places, in a hashed grid; kept from call to call.
+#[derive(Debug, Default)]
+struct Surroundings {
+    frame_from_cloud: Pose3,
+    /// Where points are known, around the places.
+    region: Region,
+    around: AroundPlaces,
+    /// Corner of a cell, and its edge, metres.
+    min: Vec3,
+    cell: f32,
+    /// Points by bucket, and where each bucket starts, with an end. Cells may share a bucket.
+    points: Vec<Vec3>,
+    starts: Vec<u32>,
+    /// The bucket of each point, in the order of the cloud.
+    buckets: Vec<u32>,
+    /// Points that were not culled before.
+    culled: Survivors,
+    scratch: CullScratch,
+}
+
+impl Surroundings {
+    /// Finds those around `places` among the `culled` ones or, without these, in `cloud`. Cost: a pass over these, or
+    /// over the points of the blocks around; and a counting sort of what is found.
+    fn find(
+        &mut self,
+        cloud: &PointCloud,
+        frame_from_cloud: &Pose3,
+        culled: Option<&Culled>,
+        places: &[Vec3],
+    ) {
+        self.cell = CELL * cloud.mean_radius();
+        self.frame_from_cloud = *frame_from_cloud;
+        let mut own = std::mem::take(&mut self.culled);
+        let points = if let Some(culled) = culled {
+            self.region = culled.region.clone();
+            culled.points
+        } else {
+            let bounds = (places.iter().copied()).fold(Aabb::EMPTY, Aabb::including);
+            let bounds = bounds.loosened(2.0 * RIM * self.cell);
+            self.region = Region {
+                overlap: bounds,
+                other_from_frame: Pose3::IDENTITY,
+                other_bounds: bounds,
+                ring: Ring::default(),
+                included: 0.0,
+            };
+            let (region, scratch) = (&self.region, &mut self.scratch);
+            cull(cloud, frame_from_cloud, region, 1, scratch, &mut own);
+            &own
+        };
+        self.around.find(points, places, RIM * self.cell);
+        self.sort(points);
+        self.culled = own;
+    }
+
+    /// Sorts what was found into buckets, about as many as points.
+    fn sort(&mut self, culled: &Survivors) {
+        let count = self.around.found.len();
+        let point = |k: u32| culled.point(k as usize);
+        self.min = self.region.overlap.min;
+        self.starts.clear();
+        self.starts.resize(count.next_power_of_two() + 1, 0);
+        self.buckets.clear();
+        for &k in &self.around.found {
+            let bucket = self.bucket(self.cell_of(point(k)));
+            self.buckets.push(bucket as u32);
+            self.starts[bucket] += 1;
+        }
+        let mut end = 0;
+        for start in &mut self.starts {
+            end += *start;
+            *start = end;
+        }
+        // Filled from the end, so that each start ends up where it belongs.
+        self.points.clear();
+        self.points.resize(count, Vec3::ZERO);
+        for (&k, &bucket) in self.around.found.iter().zip(&self.buckets).rev() {
+            let slot = &mut self.starts[bucket as usize];
+            *slot -= 1;
+            self.points[*slot as usize] = point(k);
+        }
+    }
+
+    /// Whether all points within a cell's edge of `place` are in the grid.
+    fn knows(&self, place: Vec3) -> bool {
+        let is_inside = |place: Vec3, bounds: &Aabb| bounds.loosened(-self.cell).contains(place);
+        let in_other = self.region.other_from_frame * place;
+        !self.points.is_empty()
+            && self.around.knows(place)
+            && is_inside(place, &self.region.overlap)
+            && is_inside(in_other, &self.region.other_bounds)
+    }
+
+    fn cell_of(&self, point: Vec3) -> [i32; 3] {
+        let place = (point - self.min) / self.cell;
+        place.to_array().map(|c| c.floor() as i32)
+    }
+
+    /// By the primes of Teschner et al. 2003, "Optimized Spatial Hashing".
+    fn bucket(&self, cell: [i32; 3]) -> usize {
+        let primes = [73_856_093, 19_349_663, 83_492_791];
+        let hashed = (cell.iter().zip(primes)).fold(0, |all, (c, p)| all ^ c.wrapping_mul(p));
+        hashed as usize & (self.starts.len() - 2)
+    }
+
+    /// The points of `cloud` nearest to `place`, from `beyond` to `reach` metres away, in ascending
+    /// order. Cost: the points of 27 cells; of all blocks in reach, where these have too few.
+    fn nearest(&self, cloud: &PointCloud, place: Vec3, beyond: f32, reach: f32) -> Nearest {
+        let mut best: Nearest = [(f32::INFINITY, place); NEIGHBORS];
+        let limits = beyond * beyond..=reach * reach;
+        if self.knows(place) {
+            let middle = self.cell_of(place);
+            for k in 0..27 {
+                let offset = [k % 3, k / 3 % 3, k / 9];
+                let cell = [0, 1, 2].map(|axis| middle[axis].wrapping_add(offset[axis] - 1));
+                let bucket = self.bucket(cell);
+                let range = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
+                for &point in &self.points[range] {
+                    let squared = point.distance_squared(place);
+                    if limits.contains(&squared) && self.cell_of(point) == cell {
+                        offer(&mut best, squared, point);
+                    }
+                }
+            }
+            // What is not in these cells is farther than the edge of one.
+            if reach.min(best[NEIGHBORS - 1].0.sqrt()) <= self.cell {
+                return best;
+            }
+            best = [(f32::INFINITY, place); NEIGHBORS];
+        }
+        let frame_from_cloud = &self.frame_from_cloud;
+        let own = frame_from_cloud.inverse_transform_point(place);
+        for (block, bounds) in cloud.blocks().iter().enumerate() {
+            let least = own.clamp(bounds.min, bounds.max).distance_squared(own);
+            if least <= *limits.end() && least < best[NEIGHBORS - 1].0 {
+                for i in block * BLOCK..((block + 1) * BLOCK).min(cloud.len()) {
+                    let point = cloud.point(i);
+                    let squared = point.distance_squared(own);
+                    if limits.contains(&squared) {
+                        offer(&mut best, squared, frame_from_cloud.transform_point(point));
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// Whether the point of `cloud` nearest to `place` stands alone.
+    fn is_alone(&self, cloud: &PointCloud, place: Vec3) -> bool {
+        let [same, reach] = [SAME_POINT, REACH].map(|radii| radii * cloud.mean_radius());
+        let [(_, point), ..] = self.nearest(cloud, place, 0.0, reach);
+        let neighbors = self.nearest(cloud, point, same, reach);
+        let (apart, _) = neighbors[NEIGHBORS - 1];
+        if !apart.is_finite() {
+            return false;
+        }
+        // The nearest ones may stand alone as well.
+        let usual = apart.sqrt() / ALONE;
+        neighbors.iter().any(|&(_, neighbor)| {
+            let [.., (fourth, _)] = self.nearest(cloud, neighbor, same, usual);
+            fourth.is_finite()
+        })
+    }
+}
+
+/// Whether the point of `cloud` nearest to `place` stands alone. Cost: a pass over its blocks.
+pub(crate) fn is_alone(cloud: &PointCloud, place: Vec3) -> bool {
+    let mut around = Surroundings::default();
+    around.find(cloud, &Pose3::IDENTITY, None, &[place]);
+    around.is_alone(cloud, place)
+}
+
+/// Removes the components of linked contact pixels that points standing alone make.
+#[derive(Debug, Default)]
+pub(crate) struct LonePoints {
+    around: Surroundings,
+    roots: Vec<u32>,
+    components: Groups,
+    /// Of the small components.
+    middles: Vec<Vec3>,
+    is_dropped: Vec<bool>,
+}
+
+impl LonePoints {
+    /// Removes them from the contact pixels of `result`, which `links` joins; `false` where there are
+    /// none. `culled` are all points of each cloud where the surfaces can touch, if they are at hand.
+    pub(crate) fn drop(
+        &mut self,
+        result: &mut PairResult,
+        links: &Links,
+        query: &PairQuery,
+        culled: [Option<Culled>; 2],
+    ) -> bool {
+        let contacts = &result.contacts;
+        links.components(contacts.len(), &mut self.roots);
+        self.components.sort(&self.roots);
+        self.is_dropped.clear();
+        for side in [0, 1] {
+            let Surface::Cloud(cloud) = [query.a, query.b][side] else {
+                continue;
+            };
+            let at = |c: &ContactPixel| match side {
+                0 => c.point_a,
+                _ => c.point_b,
+            };
+            let frame_from_cloud = [&Pose3::IDENTITY, &query.a_from_b][side];
+            let most = most_pixels(cloud, query.params.pixel_size);
+            let small = || {
+                let components = self.components.iter(&self.roots);
+                components.filter(|component| component.len() <= most)
+            };
+            self.middles.clear();
+            (self.middles).extend(small().map(|component| middle(component, contacts, at)));
+            if self.middles.is_empty() {
+                continue;
+            }
+            let culled = culled[side].as_ref();
+            (self.around).find(cloud, frame_from_cloud, culled, &self.middles);
+            for (component, &middle) in small().zip(&self.middles) {
+                let places = component.iter().map(|&m| at(&contacts[m as usize]));
+                if made_by_lone_point(&self.around, cloud, middle, places) {
+                    self.is_dropped.resize(contacts.len(), false);
+                    for &m in component {
+                        self.is_dropped[m as usize] = true;
+                    }
+                }
+            }
+        }
+        let mut is_dropped = self.is_dropped.iter();
+        if !self.is_dropped.is_empty() {
+            result
+                .contacts
+                .retain(|_| is_dropped.next().is_some_and(|dropped| !dropped));
+        }
+        !self.is_dropped.is_empty()
+    }
+}
+
+/// Most contact pixels that points of `cloud` make which stand alone: the splats of as many as can do
+/// so together. A larger component is a surface.
+fn most_pixels(cloud: &PointCloud, pixel_size: f32) -> usize {
+    // Where points are finer than pixels, splats are as large as these.
+    let radius = cloud.max_radius().max(pixel_size) / pixel_size;
+    NEIGHBORS * (2.0 * radius + 1.0).powi(2) as usize
+}
+
+/// The place of a component that is nearest to the mean of all its places.
+fn middle(
+    component: &[u32],
+    contacts: &[ContactPixel],
+    at: impl Fn(&ContactPixel) -> Vec3 + Copy,
+) -> Vec3 {
+    let places = || component.iter().map(|&m| at(&contacts[m as usize]));
+    let mean = places().sum::<Vec3>() / component.len() as f32;
+    let squared = |place: &Vec3| place.distance_squared(mean);
+    let nearest = places().min_by(|p, q| squared(p).total_cmp(&squared(q)));
+    nearest.unwrap_or(mean)
+}
+
+/// Whether the middle of a component belongs to a point that stands alone, and so do most of its
+/// pixels. At the rim of a large splat, or where fine points border on coarse ones, some do not, or
+/// do.
+fn made_by_lone_point(
+    around: &Surroundings,
+    cloud: &PointCloud,
+    middle: Vec3,
+    places: impl ExactSizeIterator<Item = Vec3> + Clone,
+) -> bool {
+    if !around.is_alone(cloud, middle) {
+        return false;
+    }
+    let step = places.len().div_ceil(SAMPLES);
+    let sampled = || places.clone().step_by(step);
+    let alone = sampled()
+        .filter(|&place| around.is_alone(cloud, place))
+        .count();
+    2 * alone > sampled().count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud(points: Vec<Vec3>) -> PointCloud<'static> {
+        PointCloud::builder(points)
+            .radius(0.02)
+            .build()
+            .expect("a valid cloud")
+    }
+
+    fn grid(spacing: f32, offset: Vec3) -> Vec<Vec3> {
+        (0..400)
+            .map(|k| spacing * Vec3::new((k % 20) as f32, 0.0, (k / 20) as f32) + offset)
+            .collect()
+    }
+
+    /// Whether the grid knows the answer or all blocks must be asked; where it has so few buckets that cells
+    /// share them; and where the points at hand are those of a region.
+    #[test]
+    fn the_nearest_points_are_those_of_brute_force() {
+        let mut rng = fastrand::Rng::with_seed(3);
+        let mut random = |size: f32| size * Vec3::from_array(std::array::from_fn(|_| rng.f32()));
+        let pose = Pose3::new(Vec3::new(0.3, -0.2, 0.1), Vec3::new(0.5, 1.0, -0.7));
+        for (count, size, is_culled) in [
+            (2000, 0.4, false),
+            (2000, 0.4, true),
+            (40, 0.1, false),
+            (40, 0.1, true),
+        ] {
+            let points: Vec<Vec3> = (0..count).map(|_| random(size)).collect();
+            let own: Vec<Vec3> = (points.iter())
+                .map(|p| pose.inverse_transform_point(*p))
+                .collect();
+            let cloud = cloud(own);
+            let region = Region {
+                overlap: Aabb {
+                    min: Vec3::ZERO,
+                    max: Vec3::splat(0.22),
+                },
+                other_from_frame: Pose3::translation(-0.02, 0.0, 0.0),
+                other_bounds: Aabb {
+                    min: Vec3::ZERO,
+                    max: Vec3::ONE,
+                },
+                ring: Ring::default(),
+                included: 0.0,
+            };
+            let (mut culled, mut scratch) = (Survivors::default(), CullScratch::default());
+            cull(&cloud, &pose, &region, 1, &mut scratch, &mut culled);
+            let culled = is_culled.then_some(Culled {
+                points: &culled,
+                region: &region,
+            });
+            let mut around = Surroundings::default();
+            // Around a part of the larger cloud only.
+            let places = [0.1, 0.2].map(Vec3::splat);
+            around.find(&cloud, &pose, culled.as_ref(), &places);
+            assert!((20..1900).contains(&around.points.len()));
+            let mut known = 0;
+            for k in 0..300 {
+                let place = random(1.2 * size);
+                let beyond = [0.0, 0.01, 0.03][k % 3];
+                let reach = [0.02, 0.04, 0.06, 1.0][k / 3 % 4];
+                let squares = points.iter().map(|p| p.distance_squared(place));
+                let limits = beyond * beyond..=reach * reach;
+                let mut expected: Vec<f32> = squares.filter(|s| limits.contains(s)).collect();
+                expected.sort_by(f32::total_cmp);
+                expected.resize(NEIGHBORS.max(expected.len()), f32::INFINITY);
+                known += usize::from(around.knows(place));
+                let found = around.nearest(&cloud, place, beyond, reach);
+                for ((found, _), expected) in found.iter().zip(expected) {
+                    // Points were moved there and back.
+                    let is_alike = (found - expected).abs() <= 1e-6 || *found == expected;
+                    assert!(is_alike, "{found} {expected}: {place} {beyond} {reach}");
+                }
+            }
+            assert!(known >= 3 && (known < 290 || !is_culled), "{known}");
+        }
+    }
+
+    #[test]
+    fn a_point_over_a_sheet_is_alone_and_the_sheet_is_not() {
+        let lone = Vec3::new(0.2, 0.12, 0.2);
+        let flying = cloud([grid(0.02, Vec3::ZERO), vec![lone]].concat());
+        assert!(is_alone(&flying, lone));
+        assert!(!is_alone(&flying, Vec3::new(0.2, 0.0, 0.2)));
+        // The same point twice is one point.
+        let twice = cloud([grid(0.02, Vec3::ZERO), vec![lone, lone]].concat());
+        assert!(is_alone(&twice, lone));
+    }
+
+    /// Wires, coarse parts of a scan and bodies of few points.
+    #[test]
+    fn what_is_thin_or_coarse_is_not_alone() {
+        let wire: Vec<Vec3> = (0..30).map(|k| 0.03 * k as f32 * Vec3::X).collect();
+        assert!(!is_alone(&cloud(wire), 0.3 * Vec3::X));
+        let coarse = grid(0.02, 0.02 * Vec3::X);
+        let fine = grid(0.002, -0.04 * Vec3::X);
+        let both = cloud([fine, coarse].concat());
+        assert!(!is_alone(&both, Vec3::new(0.3, 0.0, 0.2)));
+        assert!(!is_alone(&cloud(vec![Vec3::ZERO]), Vec3::ZERO));
+        assert!(!is_alone(&cloud(vec![Vec3::ZERO, Vec3::X]), Vec3::X));
+    }
+}

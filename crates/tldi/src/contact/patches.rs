@@ -1,0 +1,288 @@
+//! Reduces contact pixels to contact patches: the last stage, on the CPU for every backend.
+//!
+//! Pixels are grouped by neighbourhood and normal. What a group yields follows its pixels
+//! continuously: normals and the deepest point are weighted means, and the support points are
+//! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
+
+use crate::contact::gap_fit::GapFit;
+use crate::contact::links::{Groups, Links, join, root};
+use crate::contact::lone_points::{Culled, LonePoints};
+use crate::contact::noise::allow_for_noise;
+use crate::contact::part_shape::{Pixels, Shape, ShapeScratch, common_normal};
+use crate::contact::way_out::WayOut;
+use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params};
+use arrayvec::ArrayVec;
+use glamx::Vec3;
+use std::ops::Range;
+
+/// Most patches of one pair. The deepest are kept; a solver gains nothing from more.
+pub const MAX_PATCHES: usize = 32;
+
+/// Linked pixels belong to one group if their smoothed normals are within 30°.
+const SAME_GROUP: f32 = 0.866;
+
+/// A part whose pixels' unit normals have a mean shorter than this (a spread of about 14°) is split.
+const FLAT: f32 = 0.97;
+
+/// Patches of fewer pixels are not split.
+const LEAST_SPLIT: usize = 12;
+
+/// Splits in a row: at most eight parts a group.
+const MAX_SPLITS: u32 = 3;
+
+/// Cosine of the angle (10°) within which normals belong to one plane: such parts share a patch,
+/// wherever they are. A solver needs the supports of one plane together to choose the few that it
+/// takes (rapier merges manifolds within 5.1° and keeps the deepest points, which need not be those
+/// that bear the load).
+pub const SAME_PLANE: f32 = 0.985;
+
+/// A contact pixel after averaging over its linked neighbours.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Smooth {
+    pub(crate) gap: f32,
+    pub(crate) normal_a: Vec3,
+    pub(crate) normal_b: Vec3,
+    /// Unit normal from the first surface towards the second.
+    pub(crate) normal: Vec3,
+}
+
+/// Memory of [`PatchScratch::reduce`], kept from call to call.
+#[derive(Debug, Default)]
+pub struct PatchScratch {
+    /// Union-find parents; after grouping, the group of each contact pixel.
+    group: Vec<u32>,
+    links: Links,
+    way_out: WayOut,
+    lone_points: LonePoints,
+    smooth: Vec<Smooth>,
+    groups: Groups,
+    stack: Vec<(usize, usize, u32)>,
+    parts: Vec<Part>,
+    /// Members of the parts of one patch, and of one of its groups.
+    patch: Vec<u32>,
+    spot: Vec<u32>,
+    shape: ShapeScratch,
+}
+
+/// Some of the members, and what decides which patch they belong to.
+#[derive(Debug)]
+struct Part {
+    members: Range<usize>,
+    normal: Vec3,
+    least_gap: f32,
+}
+
+impl PatchScratch {
+    /// Confirms the contact pixels of `result`, derives `collides` and `gap` from them as if
+    /// normals told inside from outside, and fills the patches, deepest first.
+    ///
+    /// The contact pixels may come in any order. Afterwards they are ordered by view, row, column
+    /// and gap, as the stage `compare` finds them. Cost: linear in their number, except for sorting
+    /// the groups, and the pixels if needed.
+    pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
+        self.link(result, params);
+        self.reduce_linked(result, params, true);
+    }
+
+    /// [`reduce`](Self::reduce) without the contact pixels of points that stand alone: flying pixels
+    /// of a depth camera, dust. A point stands alone if its fourth nearest neighbour is 2.5 times as
+    /// far away as that of one of these four is from it. Cost beside that of `reduce`: where there
+    /// are components of few contact pixels, a pass over the points of the blocks around them.
+    pub fn reduce_pair(&mut self, result: &mut PairResult, query: &PairQuery) {
+        self.reduce_culled(result, query, [None; 2]);
+    }
+
+    /// [`reduce_pair`](Self::reduce_pair) where all points of each cloud that can touch may be at hand.
+    pub(crate) fn reduce_culled(
+        &mut self,
+        result: &mut PairResult,
+        query: &PairQuery,
+        culled: [Option<Culled>; 2],
+    ) {
+        self.link(result, &query.params);
+        if self.lone_points.drop(result, &self.links, query, culled) {
+            self.links.find(&result.contacts, &query.params);
+        }
+        let tells_inside = query.a.is_oriented() || query.b.is_oriented();
+        self.reduce_linked(result, &query.params, tells_inside);
+        let fitted = self.smooth.iter().map(|pixel| pixel.gap);
+        allow_for_noise(result, fitted.reduce(f32::min), query);
+    }
+
+    /// [`reduce`](Self::reduce) of the contact pixels of a first look, in which nothing stands alone.
+    pub(crate) fn reduce_coarse(&mut self, result: &mut PairResult, query: &PairQuery) {
+        self.link(result, &query.params);
+        let tells_inside = query.a.is_oriented() || query.b.is_oriented();
+        self.reduce_linked(result, &query.params, tells_inside);
+        let fitted = self.smooth.iter().map(|pixel| pixel.gap);
+        allow_for_noise(result, fitted.reduce(f32::min), query);
+    }
+
+    fn link(&mut self, result: &mut PairResult, params: &Params) {
+        order(&mut result.contacts);
+        self.way_out.keep_least(result, params);
+        self.links.find(&result.contacts, params);
+    }
+
+    fn reduce_linked(&mut self, result: &mut PairResult, params: &Params, tells_inside: bool) {
+        self.links
+            .confirm(result, params, tells_inside, &mut self.group);
+        let (contacts, out) = (&result.contacts, &mut result.patches);
+        out.clear();
+        self.smooth.clear();
+        if contacts.is_empty() {
+            return;
+        }
+        self.smooth(contacts);
+        self.group();
+        self.groups.sort(&self.group);
+        self.stack.clear();
+        let mut start = 0;
+        for part in self.groups.iter(&self.group) {
+            self.stack.push((start, start + part.len(), 0));
+            start += part.len();
+        }
+        self.parts.clear();
+        while let Some((start, end, splits)) = self.stack.pop() {
+            let members = &mut self.groups.members[start..end];
+            let shape = Shape::of(members, contacts, &self.smooth, params);
+            if splits < MAX_SPLITS && members.len() >= LEAST_SPLIT && shape.normal_length < FLAT {
+                let middle = shape.split(members, contacts);
+                if middle > 0 && middle < members.len() {
+                    self.stack.push((start, start + middle, splits + 1));
+                    self.stack.push((start + middle, end, splits + 1));
+                    continue;
+                }
+            }
+            self.parts.push(Part {
+                members: start..end,
+                normal: shape.normal,
+                least_gap: shape.least_gap,
+            });
+        }
+        self.emit_planes(contacts, params, out);
+    }
+
+    /// Pushes a patch for the parts of each plane, starting with the deepest, up to [`MAX_PATCHES`].
+    fn emit_planes(
+        &mut self,
+        contacts: &[ContactPixel],
+        params: &Params,
+        out: &mut Vec<ContactPatch>,
+    ) {
+        self.parts.sort_unstable_by(|p, q| {
+            (p.least_gap.total_cmp(&q.least_gap)).then(p.members.start.cmp(&q.members.start))
+        });
+        while let Some(deepest) = self.parts.first()
+            && out.len() < MAX_PATCHES
+        {
+            let plane = deepest.normal;
+            self.patch.clear();
+            self.parts.retain(|part| {
+                let in_plane = part.normal.dot(plane) >= SAME_PLANE;
+                if in_plane {
+                    let members = &self.groups.members[part.members.clone()];
+                    self.patch.extend_from_slice(members);
+                }
+                !in_plane
+            });
+            let first = out.len();
+            if !self.push_round_spots(contacts, params, out) {
+                out.truncate(first);
+                let members = std::mem::take(&mut self.patch);
+                out.push(self.patch_of(&members, contacts, params));
+                self.patch = members;
+            }
+        }
+    }
+
+    /// Pushes one patch for each group on one plane, if there are several groups and each is a
+    /// single spot. A body that touches in two spots rolls on both. Returns whether they are.
+    fn push_round_spots(
+        &mut self,
+        contacts: &[ContactPixel],
+        params: &Params,
+        out: &mut Vec<ContactPatch>,
+    ) -> bool {
+        let mut groups = ArrayVec::<u32, PATCH_POINTS>::new();
+        for &member in &self.patch {
+            let group = self.group[member as usize];
+            if !groups.contains(&group) && groups.try_push(group).is_err() {
+                return false;
+            }
+        }
+        let mut spot = std::mem::take(&mut self.spot);
+        let most = MAX_PATCHES - out.len();
+        let are_spots = (2..=most).contains(&groups.len())
+            && groups.into_iter().all(|group| {
+                spot.clear();
+                let members = self.patch.iter().copied();
+                spot.extend(members.filter(|&m| self.group[m as usize] == group));
+                out.push(self.patch_of(&spot, contacts, params));
+                (out.last()).is_some_and(|patch| patch.is_round() && patch.points.len() == 1)
+            });
+        self.spot = spot;
+        are_spots
+    }
+
+    fn patch_of(
+        &mut self,
+        members: &[u32],
+        contacts: &[ContactPixel],
+        params: &Params,
+    ) -> ContactPatch {
+        let shape = Shape::of(members, contacts, &self.smooth, params);
+        let pixels = Pixels {
+            contacts,
+            smooth: &self.smooth,
+            links: &self.links,
+        };
+        shape.patch(members, &pixels, &mut self.shape, params)
+    }
+
+    /// Averages normals over linked neighbours and fits the gaps to them. A third of a sensor's
+    /// noise is left.
+    fn smooth(&mut self, contacts: &[ContactPixel]) {
+        let mut fit = GapFit::default();
+        for (k, contact) in contacts.iter().enumerate() {
+            let (mut normal_a, mut normal_b) = (contact.normal_a, contact.normal_b);
+            let neighbors = self.links.neighbors(k as u32);
+            for neighbor in neighbors.iter().map(|&l| &contacts[l as usize]) {
+                normal_a += neighbor.normal_a;
+                normal_b += neighbor.normal_b;
+            }
+            let count = 1.0 + neighbors.len() as f32;
+            let (normal_a, normal_b) = (normal_a / count, normal_b / count);
+            self.smooth.push(Smooth {
+                gap: fit.gap(k as u32, contacts, &self.links),
+                normal_a,
+                normal_b,
+                normal: common_normal(normal_a, normal_b).unwrap_or_else(|| contact.normal()),
+            });
+        }
+    }
+
+    /// Union-find over linked pixels of like normal.
+    fn group(&mut self) {
+        self.group.clear();
+        self.group.extend(0..self.smooth.len() as u32);
+        for &(k, l) in &self.links.pairs {
+            let normal = |k: u32| self.smooth[k as usize].normal;
+            if normal(k).dot(normal(l)) < SAME_GROUP {
+                continue;
+            }
+            join(&mut self.group, k, l);
+        }
+        for k in 0..self.group.len() as u32 {
+            self.group[k as usize] = root(&mut self.group, k);
+        }
+    }
+}
+
+/// Orders contact pixels by view, row, column and gap.
+fn order(contacts: &mut [ContactPixel]) {
+    let place = |c: &ContactPixel| (c.view, c.pixel[1], c.pixel[0]);
+    if !contacts.is_sorted_by_key(place) {
+        contacts.sort_unstable_by(|c, d| (place(c).cmp(&place(d))).then(d.gap.total_cmp(&c.gap)));
+    }
+}

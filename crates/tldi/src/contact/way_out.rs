@@ -1,0 +1,77 @@
+//! The least way out decides how deep surfaces are in each other.
+//!
+//! A view from the side of a shallow overlap sees its width: true, but not how deep it is. Along the way that such a
+//! contact pixel would push the bodies apart, another view sees them overlap by much less.
+
+use crate::view::camera_policy::MAX_VIEWS;
+use crate::{ContactPixel, PairResult, Params, VirtualCamera};
+use arrayvec::ArrayVec;
+
+/// The share of a contact's depth by which another view must see the surfaces overlap for the contact to count: along an
+/// axis 60° from the way out an overlap seems twice as deep as it is.
+const LEAST_SHARE: f32 = 0.5;
+
+/// Memory of [`WayOut::keep_least`], kept from call to call.
+#[derive(Debug, Default)]
+pub(crate) struct WayOut {
+    is_wide: Vec<bool>,
+}
+
+impl WayOut {
+    /// Drops the contact pixels deeper than a layer that lead through a place where another view sees the surfaces apart or
+    /// in each other by less than half of that. Contact pixels are ordered by view, row and column.
+    ///
+    /// Cost: for each such pixel a binary search for each pixel of its depth and each other view.
+    pub(crate) fn keep_least(&mut self, result: &mut PairResult, params: &Params) {
+        let PairResult { axes, contacts, .. } = result;
+        if axes.len() < 2 {
+            return;
+        }
+        let pixel = params.pixel_size;
+        let cameras: ArrayVec<_, MAX_VIEWS> = (axes.iter())
+            .map(|axis| VirtualCamera::along(*axis, pixel))
+            .collect();
+        self.is_wide.clear();
+        self.is_wide.extend(contacts.iter().map(|contact| {
+            contact.gap < -params.thickness
+                && (cameras.iter().enumerate())
+                    .filter(|(view, _)| *view != contact.view as usize)
+                    .any(|(view, camera)| {
+                        let contacts = of_view(contacts, view as u32);
+                        is_less_elsewhere(contact, contacts, camera, params)
+                    })
+        }));
+        let mut is_wide = self.is_wide.iter();
+        contacts.retain(|_| !is_wide.next().is_some_and(|is_wide| *is_wide));
+    }
+}
+
+fn of_view(contacts: &[ContactPixel], view: u32) -> &[ContactPixel] {
+    let start = contacts.partition_point(|c| c.view < view);
+    let end = contacts.partition_point(|c| c.view <= view);
+    &contacts[start..end]
+}
+
+/// Whether the contact pixels of another view, that of `camera`, show somewhere along the ray of `contact` from one
+/// surface to the other that these are apart or in each other by much less.
+fn is_less_elsewhere(
+    contact: &ContactPixel,
+    others: &[ContactPixel],
+    camera: &VirtualCamera,
+    params: &Params,
+) -> bool {
+    let [from, to] = [contact.point_a, contact.point_b].map(|p| camera.view_from_point(p));
+    let steps = (from.distance(to) / params.pixel_size).ceil();
+    (0..=steps as u32).any(|step| {
+        let at = from.lerp(to, step as f32 / steps);
+        let [i, j] = [at.x, at.y].map(|c| (c / params.pixel_size).floor() as i32);
+        let place = |c: &ContactPixel| (c.pixel[1], c.pixel[0]);
+        let first = others.partition_point(|c| place(c) < (j, i));
+        let there = others[first..].iter().take_while(|c| place(c) == (j, i));
+        there.into_iter().any(|c| {
+            let [a, b] = [c.point_a, c.point_b].map(|p| camera.view_from_point(p).z);
+            let reaches = a.min(b) - params.thickness..=a.max(b) + params.thickness;
+            c.gap > LEAST_SHARE * contact.gap && reaches.contains(&at.z)
+        })
+    })
+}

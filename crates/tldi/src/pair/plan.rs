@@ -1,0 +1,281 @@
+//! What is known about a pair before any of its points is read, and the constants of the stages.
+//! All backends start from here.
+
+use crate::cloud::reach::{Ring, farthest};
+use crate::cpu::{columns, compare, normals, normals_sharpen, planes, splat, sweep};
+use crate::view::{approach, camera_policy};
+use crate::{Aabb, BLOCK, PairQuery, Params, Surface, View};
+use glamx::{Pose3, Vec3};
+
+pub use crate::cpu::compare::CROSSED;
+pub use crate::cpu::cull::Region;
+pub use crate::cpu::normals::SUPPORT;
+pub use crate::cpu::splat::DepthScale;
+pub use crate::cpu::zone::ZoneGrid;
+pub use crate::view::approach::{Approach, Body};
+
+/// Columns in which the surfaces are farther apart along the view than this many thicknesses, or
+/// prediction distances, are not drawn. A contact at the prediction distance is that far along the
+/// view if its normal is 60° off; beyond 60°, depths along the view are no distances. Surfaces that
+/// cross between neighbouring pixels are at most two thicknesses apart in both.
+const REACH: f32 = 2.0;
+
+/// Depth in pixels to which a body is searched that has sunk below all of a surface. Points that
+/// are culled in vain cost little, but two large clouds have many deeper points.
+const SUNK: f32 = 16.0;
+
+/// Points that are kept per pixel of a surface seen face on: enough for the mean of a layer. With 1,
+/// coarse pixels cost a tenth, but bodies fall asleep later on scans.
+const POINTS_PER_PIXEL: f32 = 8.0;
+
+/// Most near points of a cloud whose normals aim the camera, or that are projected onto an exact
+/// surface to aim it; more do not sharpen the mean of their normals.
+pub const AIM_SAMPLES: usize = 512;
+
+/// Whether the normal at a near point is one of those that aim the camera. About every `step`-th
+/// is. The point's index in its cloud decides, so the order in which points are found does not
+/// matter.
+pub fn is_aim_sample(index: u32, step: u32) -> bool {
+    hash(index).is_multiple_of(step.max(1))
+}
+
+/// A mixing of the bits without structure, so that none of a grid of points meets it.
+fn hash(index: u32) -> u32 {
+    let mut hash = (index ^ (index >> 16)).wrapping_mul(0x7feb_352d);
+    hash = (hash ^ (hash >> 15)).wrapping_mul(0x846c_a68b);
+    hash ^ (hash >> 16)
+}
+
+/// What a pair's stages `cull`, `zone` and `aim` need beside the points.
+#[derive(Clone, Debug)]
+pub struct PairPlan {
+    /// Where the points of both sides can touch, in the frame of the first surface.
+    pub overlap: Aabb,
+    /// What is kept of each side.
+    pub sides: [SidePlan; 2],
+    /// Distance in metres up to which points of both sides are near each other. In [uneven
+    /// clouds](crate::PointCloud::is_uneven) it is longer by the amount by which radii exceed the
+    /// mean.
+    pub zone_reach: f32,
+    /// Distance in metres along a view up to which the surfaces of a column can matter to each
+    /// other.
+    pub column_reach: f32,
+    /// What is known of where the second surface lies and comes from.
+    pub approach: Approach,
+}
+
+/// One side of a [`PairPlan`].
+#[derive(Clone, Debug)]
+pub struct SidePlan {
+    /// From the frame of the surface into that of the query.
+    pub frame_from_surface: Pose3,
+    /// Which of its points are kept.
+    pub region: Region,
+    /// Middle of its bounds in the frame of the query, if it is not the larger one of the pair: the
+    /// body, where normals do not tell the inside, reaches at least that far.
+    pub middle: Option<Vec3>,
+}
+
+impl PairPlan {
+    /// The plan of a pair; `None` where the bounds say that nothing can touch. Cost: O(1).
+    ///
+    /// ```
+    /// use tldi::plan::PairPlan;
+    /// use tldi::{PairQuery, Params, PointCloud, Surface, View};
+    /// use tldi::glamx::{Pose3, Vec3};
+    ///
+    /// let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.5).build()?;
+    /// let query = |distance| PairQuery {
+    ///     a: Surface::Cloud(&cloud),
+    ///     b: Surface::Cloud(&cloud),
+    ///     a_from_b: Pose3::translation(distance, 0.0, 0.0),
+    ///     view: View::aimed(),
+    ///     params: Params::for_radius(0.5),
+    /// };
+    /// assert!(PairPlan::new(&query(1.0)).is_some());
+    /// assert!(PairPlan::new(&query(10.0)).is_none());
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    pub fn new(query: &PairQuery) -> Option<Self> {
+        let (a, b) = (&query.a, &query.b);
+        let prediction = query.params.prediction;
+        if !within_reach(query, prediction + farthest(a) + farthest(b)) {
+            return None;
+        }
+        let rings = [ring(a, &query.params), ring(b, &query.params)];
+        let [bounds_a, bounds_b] = bounds_with_inside(query);
+        let b_in_frame = bounds_b.transformed(&query.a_from_b);
+        let overlap =
+            |margin| (bounds_a.loosened(margin)).intersection(b_in_frame.loosened(margin));
+        let widest = overlap(prediction + rings[0].widest().max(rings[1].widest()));
+        if widest.is_empty() {
+            return None;
+        }
+        let [middle_a, middle_b] = middles(query);
+        let side = |frame_from_surface,
+                    other_from_frame,
+                    other_bounds: Aabb,
+                    [own, other]: [Ring; 2],
+                    middle| {
+            let included = own.beside(&other);
+            let margin = prediction + included;
+            SidePlan {
+                frame_from_surface,
+                region: Region {
+                    overlap: overlap(margin),
+                    other_from_frame,
+                    other_bounds: other_bounds.loosened(margin),
+                    ring: own,
+                    included,
+                },
+                middle,
+            }
+        };
+        let [ring_a, ring_b] = rings;
+        let b_from_a = query.a_from_b.inverse();
+        Some(Self {
+            overlap: widest,
+            sides: [
+                side(
+                    Pose3::IDENTITY,
+                    b_from_a,
+                    bounds_b,
+                    [ring_a, ring_b],
+                    middle_a,
+                ),
+                side(
+                    query.a_from_b,
+                    Pose3::IDENTITY,
+                    bounds_a,
+                    [ring_b, ring_a],
+                    middle_b,
+                ),
+            ],
+            zone_reach: prediction + a.mean_radius() + b.mean_radius(),
+            column_reach: column_reach(&query.params),
+            approach: {
+                let (motion, last_axis) = match query.view {
+                    View::Fixed(_) => (Vec3::ZERO, None),
+                    View::Aim {
+                        motion, last_axis, ..
+                    } => (motion, last_axis),
+                };
+                let (a, b) = (query.a.bounds(), query.b.bounds());
+                Approach::new(&a, &b, &query.a_from_b, motion, last_axis)
+            },
+        })
+    }
+}
+
+/// See [`PairPlan::column_reach`].
+pub(crate) fn column_reach(params: &Params) -> f32 {
+    REACH * params.thickness.max(params.prediction)
+}
+
+/// Least number of pixels across the smaller body, in its second longest extent. With fewer, a
+/// penetration looks like the noise of single rays. There are fewer only if the body's own points
+/// are no finer.
+const LEAST_PIXELS: f32 = 8.0;
+
+/// Edge in metres of the largest pixels that resolve a body of these extents, metres, whose points have this mean
+/// radius, metres: eight across its second longest extent, or as large as its points. Cost: O(1).
+///
+/// ```
+/// use tldi::{glamx::Vec3, plan::largest_pixel};
+/// let ruler = Vec3::new(0.3, 0.04, 0.005);
+/// assert_eq!(largest_pixel(ruler, 0.001), 0.005);
+/// assert_eq!(largest_pixel(ruler, 0.02), 0.02);
+/// ```
+pub fn largest_pixel(extents: Vec3, radius: f32) -> f32 {
+    let mut extents = extents.to_array();
+    extents.sort_by(f32::total_cmp);
+    (extents[1] / LEAST_PIXELS).max(radius)
+}
+
+/// Every how many points of a cloud of this mean radius are enough for pixels of this size, metres.
+///
+/// With radii of 0.65 × the distance of the 7th neighbour there are 0.94 (pixel / r̄)² points to a
+/// pixel.
+pub fn stride(mean_radius: f32, pixel_size: f32) -> usize {
+    let per_pixel = 0.94 * (pixel_size / mean_radius).powi(2);
+    ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
+}
+
+/// The first point that is taken of a cloud's `block`-th block, less than `stride`. It differs from
+/// block to block. Otherwise only some columns would remain of a depth image, whose rows may fill
+/// whole blocks.
+pub fn first_taken(block: usize, stride: usize) -> usize {
+    hash(block as u32) as usize % stride
+}
+
+/// Whether the bounds are within `reach` metres of each other in the frames of both surfaces.
+fn within_reach(query: &PairQuery, reach: f32) -> bool {
+    let (a, b) = (query.a.bounds().loosened(reach), query.b.bounds());
+    a.intersects(&b.transformed(&query.a_from_b))
+        && a.transformed(&query.a_from_b.inverse()).intersects(&b)
+}
+
+/// How far beyond the touching region points are kept, metres. Splats reach a radius beyond their
+/// points, on both sides. Estimated normals need their neighbours, or they would err at the rim.
+pub(crate) fn ring(surface: &Surface, params: &Params) -> Ring {
+    let is_bare = match surface {
+        Surface::Cloud(cloud) => cloud.normals().is_none(),
+        Surface::Exact(_) => false,
+        Surface::Device(_) => true,
+    };
+    let support = if is_bare {
+        normals::SUPPORT * (stride(surface.mean_radius(), params.pixel_size) as f32).sqrt()
+    } else {
+        0.0
+    };
+    Ring::new(surface, 2.0 + support)
+}
+
+/// Bounds of both surfaces, each in its own frame. Those of the larger one include the part of the
+/// body that may be behind it, where a floor's bounds do not reach. For a body that passes through
+/// the bounds, that is all of it. For others, it is the part up to their middle, but no more than
+/// [`SUNK`] and their motion.
+fn bounds_with_inside(query: &PairQuery) -> [Aabb; 2] {
+    let (a, b) = (query.a.bounds(), query.b.bounds());
+    let moved = match query.view {
+        View::Aim { motion, .. } => motion.length(),
+        View::Fixed(_) => 0.0,
+    };
+    let with_inside = |larger: Aabb, body: Aabb, body_in_larger: Aabb| {
+        let to_middle = 0.5 * body.extents().min_element();
+        let sunk = to_middle.min(SUNK * query.params.pixel_size + moved);
+        larger.reached_through(body_in_larger).loosened(sunk)
+    };
+    if a.extents().length() >= b.extents().length() {
+        [with_inside(a, b, b.transformed(&query.a_from_b)), b]
+    } else {
+        let a_in_b = a.transformed(&query.a_from_b.inverse());
+        [a, with_inside(b, a, a_in_b)]
+    }
+}
+
+/// See [`SidePlan::middle`].
+fn middles(query: &PairQuery) -> [Option<Vec3>; 2] {
+    let (a, b) = (query.a.bounds(), query.b.bounds());
+    let (size_a, size_b) = (a.extents().length(), b.extents().length());
+    [
+        (size_a <= size_b).then(|| a.center()),
+        (size_b <= size_a).then(|| query.a_from_b * b.center()),
+    ]
+}
+
+/// The numbers of the stages, by the names of the override constants that a GPU backend's shaders
+/// declare for them.
+pub fn stage_constants() -> Vec<(&'static str, f64)> {
+    let mut all = vec![("BLOCK", BLOCK as f64), ("AIM_SAMPLES", AIM_SAMPLES as f64)];
+    all.extend(normals::CONSTANTS);
+    all.extend(planes::CONSTANTS);
+    all.extend(normals_sharpen::CONSTANTS);
+    all.extend(splat::CONSTANTS);
+    all.extend(sweep::CONSTANTS);
+    all.extend(columns::CONSTANTS);
+    all.extend(compare::CONSTANTS);
+    all.extend(camera_policy::CONSTANTS);
+    all.extend(approach::CONSTANTS);
+    all
+}

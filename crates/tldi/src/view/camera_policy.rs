@@ -1,0 +1,479 @@
+//! Stage `aim`: the axes from which a pair is looked at.
+//!
+//! A camera should see the touching surfaces face on, because depths along its axis are then
+//! distances. So the first axis is the main eigenvector of Σ n nᵀ over the near points of both
+//! surfaces. An axis along the motion suits an impact, but looks along the surface when bodies
+//! slide, spin or rest. Up to two more axes follow if the surfaces also meet on faces that the
+//! first axis sees edge-on, as in a corner or a groove.
+//!
+//! The sign of the axis says on which side of `a` the body `b` lies. The motion, the bounds, the
+//! last axis and the outsides of the surfaces decide it.
+
+use crate::AXIS_HYSTERESIS;
+use crate::cloud::point_normals::least_variance_axis;
+use crate::view::approach::Approach;
+use arrayvec::ArrayVec;
+use glamx::{DMat3, DVec3, Mat3, Vec3};
+
+/// How the axes of a pair's views are chosen.
+///
+/// The first is for contacts, the second for the question whether surfaces meet. The others exist
+/// for comparison: see the chart of contact errors against the angle of motion, and the stability
+/// suite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum CameraPolicy {
+    /// By the normals of the contact zone; kept from frame to frame while they agree with it within
+    /// [`AXIS_HYSTERESIS`]; up to three views.
+    #[default]
+    ContactZone,
+    /// As [`ContactZone`](Self::ContactZone), whose views give all contacts. If they show no
+    /// crossing, up to two more views follow, until three axes span all directions. So a query
+    /// whether surfaces meet does not miss walls that the first views see edge-on.
+    AllDirections,
+    /// One view against the motion of `b` relative to `a`; without motion, by the bounds.
+    Motion,
+    /// One view by the normals of the contact zone, anew in every frame.
+    Covariance,
+    /// One view along the axis of the larger surface's frame in which the bounds overlap least.
+    SmallestExtent,
+    /// One view along the last axis; the first time by the normals of the contact zone.
+    LastNormal,
+}
+
+/// Most views of one pair: three axes span all directions.
+pub(crate) const MAX_VIEWS: usize = 3;
+
+/// A normal within this of the axis is well seen: cos 50°. Depth errors of splats grow as the
+/// tangent beyond.
+const WELL_SEEN: f32 = 0.643;
+
+/// The other side must face a further axis within 60° ...
+const SUPPORTED: f32 = 0.5;
+
+/// ... with at least this share of its near points. Fewer is noise at the rim of the zone.
+const LEAST_SHARE: f32 = 0.05;
+
+/// Mean of n·v, over the normals that face an axis, below which their signs say nothing about the
+/// side. (A ring around a deep contact has normals all around the axis.) It is also the least
+/// cosine between an axis and the last one.
+const CONCLUSIVE: f32 = 0.3;
+
+/// Weight of the direction to `b`, if `b` plainly lies or comes from there, beside the normals of a
+/// surface. It matters if bodies are deep in each other or their sides are flush, because normals
+/// then point all around. It turns the axis of a flat contact by 8° at most.
+const HINT_WEIGHT: f32 = 0.5;
+
+/// Weight of the last axis beside the normals of a surface.
+const MEMORY_WEIGHT: f32 = 0.5;
+
+/// For [`stage_constants`](crate::pair::plan::stage_constants).
+pub(crate) const CONSTANTS: [(&str, f64); 7] = [
+    ("WELL_SEEN", WELL_SEEN as f64),
+    ("SUPPORTED", SUPPORTED as f64),
+    ("LEAST_SHARE", LEAST_SHARE as f64),
+    ("CONCLUSIVE", CONCLUSIVE as f64),
+    ("HINT_WEIGHT", HINT_WEIGHT as f64),
+    ("MEMORY_WEIGHT", MEMORY_WEIGHT as f64),
+    ("AXIS_HYSTERESIS", AXIS_HYSTERESIS as f64),
+];
+
+/// Normals of the near points of one surface.
+#[derive(Clone, Copy)]
+pub(crate) struct ZoneNormals<'a> {
+    pub(crate) normals: &'a [Vec3],
+    /// Whether their sign is outward.
+    pub(crate) oriented: bool,
+}
+
+/// Fills `axes`, unit vectors from `b` towards `a`; at least one. Empty normals on either side give
+/// the axis of the approach.
+pub(crate) fn aim(
+    policy: CameraPolicy,
+    sides: [ZoneNormals; 2],
+    approach: &Approach,
+    axes: &mut Vec<Vec3>,
+) {
+    axes.clear();
+    let single = match policy {
+        CameraPolicy::ContactZone | CameraPolicy::AllDirections => None,
+        CameraPolicy::Motion => Some(-approach.toward_b()),
+        CameraPolicy::Covariance => top_eigenvector(&zone_covariance(&sides, &Some)),
+        CameraPolicy::SmallestExtent => {
+            Some([Vec3::X, Vec3::Y, Vec3::Z][approach.half_extents.min_position()])
+        }
+        CameraPolicy::LastNormal => approach.last_axis,
+    };
+    match single {
+        Some(axis) => {
+            let axis = axis.try_normalize().unwrap_or(Vec3::Z);
+            axes.push(oriented(axis, &sides, approach).0);
+        }
+        None => aim_at_zone(&sides, approach, axes),
+    }
+    if axes.is_empty() {
+        let fallback = approach.last_axis.unwrap_or(-approach.toward_b());
+        axes.push(fallback.try_normalize().unwrap_or(Vec3::Z));
+    }
+}
+
+/// Unit vectors across `axes` and each other, which are themselves (nearly) so: together with them three.
+pub(crate) fn further_axes(axes: &[Vec3]) -> ArrayVec<Vec3, MAX_VIEWS> {
+    let mut further = ArrayVec::new();
+    match axes {
+        [axis] => further.extend(<[Vec3; 2]>::from(axis.any_orthonormal_pair())),
+        [first, second] => further.extend(first.cross(*second).try_normalize()),
+        _ => (),
+    }
+    further
+}
+
+fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec3>) {
+    let mut seen: [Vec3; MAX_VIEWS] = [Vec3::ZERO; MAX_VIEWS];
+    let mut views = 0;
+    while views < MAX_VIEWS {
+        let unseen = |n: &Vec3| seen[..views].iter().all(|v| v.dot(*n).abs() < WELL_SEEN);
+        let share = |s: &ZoneNormals, keep: &dyn Fn(&Vec3) -> bool| {
+            s.normals.iter().filter(|n| keep(n)).count() as f32 / s.normals.len().max(1) as f32
+        };
+        // What the earlier views see of a normal is not counted again.
+        let rest = |n: Vec3| seen[..views].iter().fold(n, |n, v| n - n.dot(*v) * *v);
+        let mut covariance = zone_covariance(sides, &|n| unseen(&n).then(|| rest(n)));
+        if views == 0 {
+            covariance += HINT_WEIGHT * approach.plainness() * outer(approach.direction());
+            covariance += MEMORY_WEIGHT * outer(approach.last_axis.unwrap_or(Vec3::ZERO));
+        }
+        let Some(mut axis) = top_eigenvector(&covariance) else {
+            break;
+        };
+        if views > 0 {
+            let left = sides.each_ref().map(|side| share(side, &unseen));
+            let supports = |n: &Vec3| axis.dot(*n).abs() >= SUPPORTED;
+            let worthwhile = left[0].max(left[1]) >= LEAST_SHARE
+                && sides
+                    .iter()
+                    .all(|side| share(side, &supports) >= LEAST_SHARE);
+            if !worthwhile {
+                break;
+            }
+        } else if let Some(last) = approach.last_axis
+            && axis.dot(last).abs() >= AXIS_HYSTERESIS.cos()
+        {
+            axis = last;
+        }
+        let (mut axis, conclusive) = oriented(axis, sides, approach);
+        if let Some(last) = approach.last_axis.filter(|_| views == 0 && !conclusive) {
+            // A body half way through a rough sheet seems to be beside its rim.
+            axis = oriented(last, sides, approach).0;
+        }
+        if views > 0 && !conclusive {
+            // A guess at the side would turn a gap into a penetration.
+            break;
+        }
+        seen[views] = axis;
+        axes.push(axis);
+        views += 1;
+    }
+}
+
+/// The axis or its opposite, such that it points from `b` towards `a`; and whether anything told.
+///
+/// A body keeps its side, whatever it looks like now. This holds it on a sheet without an inside.
+/// Next, two surfaces that show each other their outsides decide; then the place where the body
+/// plainly lies. One surface alone may be thin and passed already, so it only decides about deep
+/// bodies.
+fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3, bool) {
+    let conclusive = |sign: f32| (sign.abs() >= CONCLUSIVE).then_some(sign > 0.0);
+    let by_memory = conclusive(approach.last_axis.map_or(0.0, |last| axis.dot(last)))
+        .filter(|&remembered| !approach.contradicts(remembered, axis));
+    let [of_a, of_b] = sides.each_ref().map(|side| mean_along(side, axis));
+    let by_both = conclusive(of_b).filter(|_| conclusive(of_b) == conclusive(-of_a));
+    let by_position = -approach.leaning(axis);
+    let agrees = by_memory
+        .or(by_both)
+        .or_else(|| approach.side_by_position(axis))
+        .or_else(|| conclusive(of_b - of_a))
+        .or_else(|| conclusive(by_position));
+    if agrees.unwrap_or(by_position >= 0.0) {
+        (axis, agrees.is_some())
+    } else {
+        (-axis, agrees.is_some())
+    }
+}
+
+/// Mean of n·axis over the normals that face it or its opposite, if they tell the outside.
+fn mean_along(side: &ZoneNormals, axis: Vec3) -> f32 {
+    let facing = || {
+        let along = side.normals.iter().map(|n| n.dot(axis));
+        along.filter(|d| d.abs() >= SUPPORTED)
+    };
+    let count = facing().count() as f32;
+    if !side.oriented || count < LEAST_SHARE * side.normals.len() as f32 {
+        return 0.0;
+    }
+    facing().sum::<f32>() / count.max(1.0)
+}
+
+/// Whether `axis` looks at `a`, and at `b`, from behind: their outward normals say so.
+pub(crate) fn seen_from_behind(axis: Vec3, [a, b]: &[ZoneNormals; 2]) -> [bool; 2] {
+    [
+        mean_along(a, axis) >= CONCLUSIVE,
+        mean_along(b, axis) <= -CONCLUSIVE,
+    ]
+}
+
+/// Mean of n nᵀ over the normals of both sides, each as `map` makes it, if it keeps it.
+fn zone_covariance(sides: &[ZoneNormals; 2], map: &dyn Fn(Vec3) -> Option<Vec3>) -> Mat3 {
+    let [a, b] = sides.each_ref().map(|side| {
+        let kept = side.normals.iter().filter_map(|n| map(*n));
+        let sum = kept.fold(Mat3::ZERO, |m, n| m + outer(n));
+        sum * (1.0 / side.normals.len().max(1) as f32)
+    });
+    a + b
+}
+
+fn outer(n: Vec3) -> Mat3 {
+    Mat3::from_cols(n * n.x, n * n.y, n * n.z)
+}
+
+fn top_eigenvector(m: &Mat3) -> Option<Vec3> {
+    let trace = m.x_axis.x + m.y_axis.y + m.z_axis.z;
+    if trace.is_nan() || trace <= 0.0 {
+        return None;
+    }
+    // The largest eigenvalue of m is the least of trace − m.
+    let rest = DMat3::from_diagonal(DVec3::splat(f64::from(trace))) - m.as_dmat3();
+    least_variance_axis(rest).as_vec3().try_normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Aabb;
+    use crate::view::approach::Body;
+    use glamx::{Pose3, Quat};
+
+    /// `b` lies towards `toward_b`, near or far.
+    fn lying(toward_b: Vec3) -> Approach {
+        Approach {
+            larger_from_a: Quat::IDENTITY,
+            half_extents: Vec3::ONE,
+            lies: toward_b,
+            motion: Vec3::ZERO,
+            body: Body {
+                middle: toward_b,
+                half_extents: Vec3::splat(0.5),
+                from_a: Quat::IDENTITY,
+                is_b: true,
+            },
+            sheet: None,
+            last_axis: None,
+        }
+    }
+
+    fn zone(normals: &[Vec3], oriented: bool) -> ZoneNormals<'_> {
+        ZoneNormals { normals, oriented }
+    }
+
+    fn axes_of(policy: CameraPolicy, sides: [ZoneNormals; 2], approach: &Approach) -> Vec<Vec3> {
+        let mut axes = vec![];
+        aim(policy, sides, approach, &mut axes);
+        axes
+    }
+
+    fn zone_axes(sides: [ZoneNormals; 2], approach: &Approach) -> Vec<Vec3> {
+        axes_of(CameraPolicy::ContactZone, sides, approach)
+    }
+
+    #[test]
+    fn facing_planes_give_one_axis_from_b_to_a() {
+        let (up, down) = (vec![Vec3::Y; 50], vec![-Vec3::Y; 30]);
+        let oriented = [zone(&up, true), zone(&down, true)];
+        // Two outsides that face each other decide; one alone only where `b` is deep in it.
+        assert_eq!(zone_axes(oriented, &lying(-2.0 * Vec3::Y)), [-Vec3::Y]);
+        let half = [zone(&up, true), zone(&down, false)];
+        assert_eq!(zone_axes(half, &lying(-0.5 * Vec3::Y)), [-Vec3::Y]);
+        assert_eq!(zone_axes(half, &lying(-2.0 * Vec3::Y)), [Vec3::Y]);
+        let bare = [zone(&up, false), zone(&down, false)];
+        assert_eq!(zone_axes(bare, &lying(-0.5 * Vec3::Y)), [Vec3::Y]);
+    }
+
+    #[test]
+    fn a_corner_gives_two_axes_and_a_box_on_a_floor_one() {
+        let corner = [vec![Vec3::Y; 50], vec![Vec3::X; 30]].concat();
+        let edges = [vec![-Vec3::Y; 20], vec![-Vec3::X; 20]].concat();
+        let edges = zone(&edges, true);
+        let above = lying(0.5 * Vec3::Y);
+        assert_eq!(
+            zone_axes([zone(&corner, true), edges], &above),
+            [-Vec3::Y, -Vec3::X]
+        );
+        let floor = vec![Vec3::Y; 50];
+        assert_eq!(zone_axes([zone(&floor, true), edges], &above), [-Vec3::Y]);
+    }
+
+    #[test]
+    fn further_axes_span_what_is_left() {
+        let first = Vec3::new(0.6, 0.0, 0.8);
+        let second = first.any_orthonormal_vector();
+        for axes in [
+            vec![first],
+            vec![first, second],
+            vec![first, second, first.cross(second)],
+        ] {
+            let all: Vec<Vec3> = axes.iter().copied().chain(further_axes(&axes)).collect();
+            assert_eq!(all.len(), 3);
+            let volume = all[0].dot(all[1].cross(all[2]));
+            assert!((volume.abs() - 1.0).abs() < 1e-5, "{all:?}");
+        }
+    }
+
+    /// A ball's normals around a flat contact are no second face.
+    #[test]
+    fn a_ball_on_a_floor_is_seen_once() {
+        let around = |k: u32| Vec3::new((k as f32).cos(), -0.75, (k as f32).sin()).normalize();
+        let (up, ball) = (vec![Vec3::Y; 50], (0..50).map(around).collect::<Vec<_>>());
+        let sides = [zone(&up, false), zone(&ball, true)];
+        assert_eq!(zone_axes(sides, &lying(2.0 * Vec3::Y)).len(), 1);
+    }
+
+    /// The axis stays the same within the hysteresis, and its side beyond it, even if `b` seems to
+    /// lie on the other one.
+    #[test]
+    fn the_last_axis_and_side_are_kept() {
+        let tilted = |angle: f32| vec![Vec3::new(angle.sin(), angle.cos(), 0.0); 10];
+        for toward_b in [Vec3::Y, -2.0 * Vec3::Y] {
+            let approach = Approach {
+                last_axis: Some(-Vec3::Y),
+                ..lying(toward_b)
+            };
+            for (angle, kept) in [(0.1, true), (0.3, false)] {
+                let normals = tilted(angle);
+                let side = zone(&normals, false);
+                let axes = zone_axes([side, side], &approach);
+                assert_eq!(axes[0] == -Vec3::Y, kept, "{angle}");
+                assert!(axes[0].y < 0.0);
+            }
+        }
+    }
+
+    /// What each policy looks along: flat surfaces tilted by 0.1, a motion along x, a last axis.
+    #[test]
+    fn policies() {
+        let tilt = Vec3::new(0.1f32.sin(), 0.1f32.cos(), 0.0);
+        let (up, down) = (vec![tilt; 10], vec![-tilt; 10]);
+        let sides = [zone(&up, true), zone(&down, true)];
+        let unit = Aabb {
+            min: -Vec3::ONE,
+            max: Vec3::ONE,
+        };
+        let above = Pose3::translation(0.3, 1.9, 0.0);
+        let last = Vec3::new(0.0, -0.6, 0.8);
+        let approach = |motion| Approach::new(&unit, &unit, &above, motion, Some(last));
+        let axis = |policy| axes_of(policy, sides, &approach(9.0 * Vec3::X))[0];
+        assert_eq!(axis(CameraPolicy::SmallestExtent), -Vec3::Y);
+        assert!(axis(CameraPolicy::Covariance).distance(-tilt) < 1e-5);
+        assert_eq!(axis(CameraPolicy::LastNormal), last);
+        let against = axis(CameraPolicy::Motion);
+        assert!(against.x.abs() > 0.98, "{against}");
+        let still = axes_of(CameraPolicy::Motion, sides, &approach(Vec3::ZERO))[0];
+        assert!(still.y < -0.95, "{still}");
+    }
+
+    /// A motion towards `a` puts `b` on the side that it came from, however deep it is.
+    #[test]
+    fn motion_tells_where_b_came_from() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        let sheet = Aabb {
+            min: Vec3::new(-9.0, 0.0, -9.0),
+            max: Vec3::new(9.0, 0.0, 9.0),
+        };
+        let body = Aabb {
+            min: -Vec3::ONE,
+            max: Vec3::ONE,
+        };
+        let half_through = Pose3::translation(0.0, -0.2, 0.0);
+        for (motion, axis) in [
+            (-Vec3::Y, -Vec3::Y),
+            (Vec3::Y, Vec3::Y),
+            (Vec3::ZERO, Vec3::Y),
+        ] {
+            let approach = Approach::new(&sheet, &body, &half_through, motion, None);
+            assert_eq!(zone_axes(sides, &approach), [axis], "{motion}");
+        }
+    }
+
+    /// A body of half a metre at a bare sheet through the origin.
+    fn at_sheet(toward_b: Vec3, motion: Vec3, last_axis: Option<Vec3>) -> Approach {
+        Approach {
+            motion,
+            sheet: Some(Vec3::ZERO),
+            last_axis,
+            ..lying(toward_b)
+        }
+    }
+
+    /// What was remembered gives way where the body plainly lies on the other side, and not where it
+    /// is half through or comes from there.
+    #[test]
+    fn a_memory_that_cannot_be_is_corrected() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        let axis = |y: f32, motion: f32| {
+            let approach = at_sheet(y * Vec3::Y, motion * Vec3::Y, Some(Vec3::Y));
+            zone_axes(sides, &approach)[0]
+        };
+        assert_eq!(axis(0.4, 0.0), -Vec3::Y);
+        assert_eq!(axis(0.2, 0.0), Vec3::Y);
+        assert_eq!(axis(0.4, 2.0), Vec3::Y);
+    }
+
+    /// A motion along a slope does not tell from which side of it a body came.
+    #[test]
+    fn a_fast_body_is_on_the_side_of_a_slope_where_it_lies() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        // 3 m along the slope, and away from it by more than the body is wide.
+        let along = Vec3::new(3.0, 1.2, 0.0);
+        let approach = at_sheet(0.4 * Vec3::Y, along, None);
+        assert!(zone_axes(sides, &approach)[0].y < -0.9);
+        let across = Vec3::new(1.2, 3.0, 0.0);
+        let approach = at_sheet(0.4 * Vec3::Y, across, None);
+        assert!(zone_axes(sides, &approach)[0].y > 0.9);
+    }
+
+    /// A body less than half through lies on the side of its middle, whatever the bounds seem to tell.
+    #[test]
+    fn a_body_deep_in_a_sheet_lies_on_the_side_of_its_middle() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        for (y, axis) in [(0.1_f32, -Vec3::Y), (-0.1, Vec3::Y)] {
+            let approach = Approach {
+                lies: Vec3::new(0.1, -0.3 * y.signum(), 0.0),
+                ..at_sheet(y * Vec3::Y, Vec3::ZERO, None)
+            };
+            assert!(zone_axes(sides, &approach)[0].dot(axis) > 0.9, "{y}");
+        }
+    }
+
+    /// Half way through a rough sheet the normals of a ball's rim make an axis along the sheet, to
+    /// which nothing gives a sign: the last one is better.
+    #[test]
+    fn an_axis_without_a_sign_gives_way_to_the_last_one() {
+        let normals = [vec![Vec3::X; 10], vec![Vec3::Y; 2]].concat();
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        let last = -Vec3::Y;
+        let approach = at_sheet(Vec3::ZERO, Vec3::ZERO, Some(last));
+        assert_eq!(zone_axes(sides, &approach)[0], last);
+    }
+
+    #[test]
+    fn behind_is_where_outward_normals_point_away() {
+        let up = vec![Vec3::Y; 10];
+        let behind = |axis| seen_from_behind(axis, &[zone(&up, true), zone(&up, true)]);
+        assert_eq!(behind(-Vec3::Y), [false, true]);
+        assert_eq!(behind(Vec3::Y), [true, false]);
+        let bare = [zone(&up, false), zone(&up, false)];
+        assert_eq!(seen_from_behind(Vec3::Y, &bare), [false, false]);
+    }
+}

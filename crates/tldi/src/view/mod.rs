@@ -1,0 +1,6 @@
+//! Views: virtual cameras, how they are aimed, and the layered images that they see.
+
+pub(crate) mod approach;
+pub(crate) mod camera;
+pub(crate) mod camera_policy;
+pub(crate) mod tldi;
