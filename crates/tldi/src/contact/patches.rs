@@ -10,6 +10,7 @@ use crate::contact::lone_points::{Culled, LonePoints};
 use crate::contact::noise::allow_for_noise;
 use crate::contact::part_shape::{Pixels, Shape, ShapeScratch, common_normal};
 use crate::contact::way_out::WayOut;
+use crate::cpu::sweep::SAME_FACE;
 use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params};
 use arrayvec::ArrayVec;
 use glamx::Vec3;
@@ -120,6 +121,7 @@ impl PatchScratch {
 
     fn link(&mut self, result: &mut PairResult, params: &Params) {
         order(&mut result.contacts);
+        drop_between_faces(result);
         self.way_out.keep_least(result, params);
         self.links.find(&result.contacts, params);
     }
@@ -276,6 +278,25 @@ impl PatchScratch {
         for k in 0..self.group.len() as u32 {
             self.group[k as usize] = root(&mut self.group, k);
         }
+    }
+}
+
+/// Drops contact pixels of faces that do not face each other, if another view sees one of the faces
+/// better. An example is a floor's edge and the wall behind it, which are far apart along the view
+/// and near beside it. Where they are half of all or more there is nothing better.
+fn drop_between_faces(result: &mut PairResult) {
+    let PairResult { axes, contacts, .. } = result;
+    let is_between = |contact: &ContactPixel| {
+        let seen_better = |normal: Vec3| {
+            let here = normal.dot(axes[contact.view as usize]).abs();
+            axes.iter().any(|axis| normal.dot(*axis).abs() > here)
+        };
+        let lengths = contact.normal_a.length() * contact.normal_b.length();
+        contact.normal_a.dot(contact.normal_b) > -SAME_FACE * lengths
+            && (seen_better(contact.normal_a) || seen_better(contact.normal_b))
+    };
+    if axes.len() > 1 && 2 * contacts.iter().filter(|c| is_between(c)).count() < contacts.len() {
+        contacts.retain(|contact| !is_between(contact));
     }
 }
 
