@@ -3,7 +3,7 @@
 //!
 //! A cloud is a collider like any other: fixed (a scan), dynamic (a scanned object), kinematic (a
 //! robot's link), with points that stay or that are new in every step. It collides with other
-//! clouds and with all of rapier's shapes.
+//! clouds and with all of rapier's shapes that have a surface.
 //!
 //! ```
 //! use rapier3d::{glamx::Vec3Swizzles, prelude::*};
@@ -45,7 +45,10 @@
 //! # What does not work
 //! - Sweeps of fast bodies (continuous collision detection) take the shapes as they are at the
 //!   beginning of the step: what a surface does that deforms comes after.
-//! - Rapier's character controller asks its own dispatcher and passes through clouds.
+//! - Segments, polylines and shapes without width have no surface, and pass through clouds; so do rapier's
+//!   soft bodies. The pipeline says so once for each such collider ([`TldiError::PassesThrough`]).
+//! - Rapier's `KinematicCharacterController` asks its own dispatcher and passes through clouds. The crate
+//!   cannot see that, nor a step of a world that no pipeline was ever attached to.
 //! - A body wholly inside a cloud's volume, surfaces apart, is not in contact.
 //! - Rapier cannot serialise custom shapes, nor the state of pairs with clouds.
 
@@ -62,6 +65,7 @@ mod manifolds;
 mod mass;
 mod measured;
 mod parts;
+mod passing;
 mod pipeline;
 mod planes;
 pub mod prelude;
@@ -73,6 +77,7 @@ mod rolling;
 mod sampled_motion;
 mod shape;
 mod shape_casts;
+mod straight_way;
 mod surface_motion;
 mod surface_push;
 mod sweeps;
@@ -84,6 +89,7 @@ pub use dispatcher::TldiDispatcher;
 pub use error::TldiError;
 pub use exact::ExactShape;
 pub use mass::{MassModel, unit_mass_properties};
+pub use passing::Passes;
 pub use pipeline::TldiPipeline;
 pub use report::{Contact, StepReport};
 pub use resolution::Resolution;

@@ -6,6 +6,7 @@ use crate::batching::{Frame, PairMemory};
 use crate::candidates::CandidateSearch;
 use crate::exact::ExactShape;
 use crate::parts::append_queries;
+use crate::passing::Told;
 use crate::prepared::{PROBE_ANSWER, Shared};
 use crate::report::{ComparedBy, cloud_pairs, contacts_of};
 use crate::rolling::move_to_mid_step;
@@ -38,6 +39,7 @@ pub struct TldiPipeline {
     search: CandidateSearch,
     memory: PairMemory,
     changed: Vec<ColliderHandle>,
+    told: Told,
     motions: SurfaceMotions,
     sides: Vec<[ExactShape<'static>; 2]>,
     queries: Vec<PairQuery<'static>>,
@@ -75,6 +77,7 @@ impl TldiPipeline {
             search: CandidateSearch::default(),
             memory: PairMemory::default(),
             changed: Vec::new(),
+            told: Told::default(),
             motions: SurfaceMotions::default(),
             sides: Vec::new(),
             queries: Vec::new(),
@@ -140,6 +143,7 @@ impl TldiPipeline {
         let candidates = self
             .search
             .find(bodies, colliders, integration, &self.changed);
+        self.told.look_for_passing(candidates, colliders);
         let config = shared.config();
         let frame = Frame {
             gravity,
@@ -206,8 +210,8 @@ impl TldiPipeline {
     /// velocity into it.
     ///
     /// # Errors
-    /// [`TldiError::NotAttached`], and [`TldiError::OnTheSpot`] where comparisons inside the step
-    /// failed.
+    /// [`TldiError::NotAttached`], [`TldiError::OnTheSpot`] where comparisons inside the step
+    /// failed, and [`TldiError::PassesThrough`] where a collider of a kind that does not meet clouds came near one.
     pub fn finish(
         &mut self,
         bodies: &mut RigidBodySet,
@@ -248,6 +252,7 @@ impl TldiPipeline {
         if !self.is_attached(narrow_phase) {
             return Err(TldiError::NotAttached);
         }
+        self.told.take()?;
         for pair in cloud_pairs(narrow_phase, colliders) {
             report.pairs_in_contact += usize::from(pair.has_any_active_contact());
             for contact in contacts_of(pair, colliders) {
