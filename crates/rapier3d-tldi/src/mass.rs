@@ -3,7 +3,7 @@
 mod orient;
 mod surfels;
 
-use rapier3d::glamx::{DMat3, DSymmetricEigen3, DVec3};
+use rapier3d::glamx::{DMat3, DQuat, DSymmetricEigen3, DVec3};
 use rapier3d::prelude::MassProperties;
 use surfels::Surfel;
 use tldi::PointCloud;
@@ -89,10 +89,16 @@ impl Moments {
         let central = self.central();
         let trace = central.x_axis.x + central.y_axis.y + central.z_axis.z;
         let inertia = DMat3::from_diagonal(DVec3::splat(trace)) - central;
-        MassProperties::with_inertia_matrix(
+        // Of large clouds the squares of moments are beyond f32.
+        let mut eigen = DSymmetricEigen3::new(inertia);
+        if eigen.eigenvectors.determinant() < 0.0 {
+            eigen.eigenvectors.z_axis *= -1.0;
+        }
+        MassProperties::with_principal_inertia_frame(
             (self.origin + center).as_vec3(),
             self.volume as f32,
-            inertia.as_mat3(),
+            eigen.eigenvalues.max(DVec3::ZERO).as_vec3(),
+            DQuat::from_mat3(&eigen.eigenvectors).normalize().as_quat(),
         )
     }
 }

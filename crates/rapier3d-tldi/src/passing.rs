@@ -5,6 +5,8 @@ use crate::candidates::Candidate;
 use crate::parts::{cloud_of, has_cloud, part, part_count};
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::parry::shape::{Shape, ShapeType};
+use tldi::Params;
+use tldi::plan::largest_pixel;
 
 /// Why a collider passes through clouds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,10 +38,9 @@ pub(crate) fn has_surface(shape: &dyn Shape) -> bool {
     if cloud_of(shape).is_some() {
         return true;
     }
-    let mut extents = shape.compute_local_aabb().extents().to_array();
-    extents.sort_by(f32::total_cmp);
+    let pixel = largest_pixel(shape.compute_local_aabb().extents(), 0.0);
     let is_line = matches!(shape.shape_type(), ShapeType::Segment | ShapeType::Polyline);
-    extents[1] > 0.0 && !is_line
+    pixel >= *Params::LENGTHS.start() && !is_line
 }
 
 /// Why the collider passes through clouds, if it does.

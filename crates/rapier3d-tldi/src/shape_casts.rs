@@ -140,6 +140,9 @@ pub(crate) fn cast_shapes_nonlinear(
     };
     // Where a pose leaves the numbers there is no way to cast along.
     let is_finite = |time: f32| time.is_finite() && pos12_at(time).is_finite();
+    if start > end {
+        return Ok(None);
+    }
     if !(is_finite(start) && is_finite(end)) {
         shared.fail(BackendError::Unsupported {
             pair: 0,
