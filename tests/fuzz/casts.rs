@@ -52,7 +52,7 @@ fn questions_have_answers() {
             let pos12 = pose.at(size);
 
             // What touches at the start is told at any end, rapier's own answers likewise.
-            let is_within = |hit: f32| hit >= 0.0 && !(hit > time.max(0.0));
+            let is_within = |hit: f32| (0.0..=time.max(0.0)).contains(&hit);
             if let Ok(answer) = dispatcher.distance(&pos12, shape1, shape2) {
                 prop_assert!(answer.distance >= 0.0, "{}", answer.distance);
             }

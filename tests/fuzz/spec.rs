@@ -193,7 +193,7 @@ impl CloudSpec {
                 Layout::Block => Vec3::from_array(std::array::from_fn(|_| rng.f32() - 0.5)),
                 Layout::Line => Vec3::splat(k as f32 / self.count as f32 - 0.5),
                 Layout::Place => Vec3::new(0.1, 0.2, 0.3),
-                Layout::Uneven if k % 2 > 0 => 10.0 * at,
+                Layout::Uneven if !k.is_multiple_of(2) => 10.0 * at,
                 Layout::Uneven => at,
             }
         };

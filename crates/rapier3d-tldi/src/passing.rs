@@ -46,12 +46,11 @@ pub(crate) fn has_surface(shape: &dyn Shape) -> bool {
 /// Why the collider passes through clouds, if it does.
 fn passes(collider: &Collider) -> Option<Passes> {
     let shape = collider.shape();
-    let parts = || (0..part_count(shape)).map(|i| part(shape, i).1);
-    match () {
-        () if collider.deformable_mesh_ref().is_some() => Some(Passes::SoftBody),
-        () if !parts().all(has_surface) => Some(Passes::Line),
-        () => None,
+    let mut parts = (0..part_count(shape)).map(|i| part(shape, i).1);
+    if collider.deformable_mesh_ref().is_some() {
+        return Some(Passes::SoftBody);
     }
+    (!parts.all(has_surface)).then_some(Passes::Line)
 }
 
 /// The colliders of which it was said that they pass.
