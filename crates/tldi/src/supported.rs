@@ -23,6 +23,9 @@ impl PairQuery<'_> {
         if !(is_view_finite && self.a_from_b.is_finite()) {
             return Err("a_from_b, motion and last_axis must be finite");
         }
+        if matches!(self.view, View::Aim { .. }) {
+            has_few_pixels([self.a, self.b], self.params.pixel_size)?;
+        }
         let exact = matches!(self.a, Surface::Exact(_)) || matches!(self.b, Surface::Exact(_));
         if exact && self.params.variant() == Variant::Paper {
             return Err("the paper's variant compares clouds only: use Variant::Oriented");
@@ -59,16 +62,35 @@ pub(crate) fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static 
     }
 }
 
+/// Most pixels from a cloud's origin to a point: an `i32` holds eight times as many. Only pixels far smaller than radii
+/// have more, since coordinates have no more than 2¹⁹ radii.
+const MOST_PIXELS: f32 = (1 << 28) as f32;
+
+fn has_few_pixels(surfaces: [Surface; 2], pixel_size: f32) -> Result<(), &'static str> {
+    let farthest = |surface: Surface| match surface {
+        Surface::Cloud(cloud) => {
+            let bounds = cloud.bounds();
+            bounds.min.abs().max(bounds.max.abs()).max_element() + cloud.max_radius()
+        }
+        Surface::Exact(_) | Surface::Device(_) => 0.0,
+    };
+    match surfaces.into_iter().map(farthest).fold(0.0, f32::max) <= MOST_PIXELS * pixel_size {
+        true => Ok(()),
+        false => {
+            Err("pixel_size is less than 2^-28 of the farthest coordinate: choose a larger one")
+        }
+    }
+}
+
 impl ImpactQuery<'_> {
     /// Whether the CPU can find the impact; if not, why, and what to do instead.
     pub(crate) fn check(&self) -> Result<(), &'static str> {
         supported_surfaces(self.a, self.b)?;
         self.params.check()?;
-        if self.a_from_b.is_finite() && self.motion.is_finite() && self.touching.is_finite() {
-            Ok(())
-        } else {
-            Err("a_from_b, motion and touching must be finite")
+        if !(self.a_from_b.is_finite() && self.motion.is_finite() && self.touching.is_finite()) {
+            return Err("a_from_b, motion and touching must be finite");
         }
+        has_few_pixels([self.a, self.b], self.params.pixel_size)
     }
 }
 
