@@ -1,5 +1,6 @@
 //! What can go wrong between the clouds and rapier.
 
+use crate::Passes;
 use rapier3d::geometry::ColliderHandle;
 use thiserror::Error;
 use tldi::{BackendError, CloudError};
@@ -59,6 +60,17 @@ pub enum TldiError {
         count: usize,
         /// The error of one of them.
         first: BackendError,
+    },
+    /// A collider whose kind clouds cannot meet is near one and passes through it. The step was taken. Said
+    /// once for each such collider, of one in a step.
+    #[error("collider {collider:?} passes through the cloud of collider {cloud:?}: {reason}")]
+    PassesThrough {
+        /// What passes.
+        collider: ColliderHandle,
+        /// The collider with the cloud.
+        cloud: ColliderHandle,
+        /// Why.
+        reason: Passes,
     },
     /// The new points of a collider are not a valid cloud. It keeps the old ones.
     #[error("the new points of collider {collider:?}: {source}")]

@@ -3,7 +3,7 @@
 //!
 //! A cloud is a collider like any other: fixed (a scan), dynamic (a scanned object) or kinematic (a
 //! robot's link). Its points may stay, or be new in every step. It collides with other clouds and
-//! with all of rapier's shapes.
+//! with all of rapier's shapes that have a surface.
 //!
 //! ```
 //! use rapier3d::{glamx::Vec3Swizzles, prelude::*};
@@ -45,7 +45,11 @@
 //! # What does not work
 //! - Sweeps of fast bodies (continuous collision detection) take the shapes as they are at the
 //!   beginning of the step: what a surface does that deforms comes after.
-//! - Rapier's character controller asks its own dispatcher and passes through clouds.
+//! - Segments, polylines and shapes without width have no surface, and pass through clouds; so do rapier's
+//!   soft bodies. The pipeline says so once for each such collider ([`TldiError::PassesThrough`]).
+//! - Rapier's `KinematicCharacterController` asks rapier's own dispatcher and passes through clouds, and so does
+//!   everything in a world that no pipeline is attached to. The crate sees neither collider nor step then, only that
+//!   it is not asked: it warns once in the [`log`].
 //! - A body wholly inside a cloud's volume, surfaces apart, is not in contact.
 //! - Rapier cannot serialise custom shapes, nor the state of pairs with clouds.
 
@@ -65,6 +69,7 @@ pub use corrections::surface_motion::TldiHooks;
 pub use debug_render::{DEBUG_POINT_LIMIT, TldiDebugRenderMode};
 pub use error::TldiError;
 pub use narrow_phase::dispatcher::TldiDispatcher;
+pub use narrow_phase::passing::Passes;
 pub use shape::cloud_shape::PointCloudShape;
 pub use shape::collider::cloud_collider;
 pub use shape::exact::ExactShape;

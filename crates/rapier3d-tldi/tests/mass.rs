@@ -377,3 +377,24 @@ fn shapes_scale_their_mass_by_the_density() {
     let block = SharedShape::new(Cuboid::new(HALF));
     assert!(block.mass_properties(1.0).mass() > 0.0);
 }
+
+/// Clouds from a micrometre to a thousand kilometres have a frame of inertia, few points too.
+#[test]
+fn every_size_has_a_frame() {
+    for exponent in -6..=6 {
+        let size = 10f32.powi(exponent);
+        for points in [
+            vec![Vec3::ZERO],
+            vec![-0.5 * size * Vec3::X, 0.5 * size * Vec3::new(1.0, 0.3, 0.2)],
+        ] {
+            let cloud = PointCloud::builder(points)
+                .radius(0.3 * size)
+                .build()
+                .unwrap();
+            let mass = unit_mass_properties(&cloud, MassModel::Solid);
+            let frame = mass.principal_inertia_local_frame;
+            assert!(frame.is_normalized(), "{size}: {frame}");
+            assert!(mass.principal_inertia().cmpgt(Vec3::ZERO).all(), "{size}");
+        }
+    }
+}

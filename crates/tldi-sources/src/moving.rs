@@ -211,37 +211,52 @@ fn read_npy(path: &Path) -> Result<MovingPoints, MovingError> {
     } else {
         Box::new(&mut raw)
     };
-    let mut exact = |bytes: &mut [u8], what: &str| {
-        (source.read_exact(bytes)).map_err(|error| bad(&format!("the {what} ends early ({error})")))
+    // No more is taken than really comes, whatever the header says.
+    let mut exact = |bytes: &mut Vec<u8>, length: u64, what: &str| {
+        bytes.clear();
+        match source.by_ref().take(length).read_to_end(bytes) {
+            Ok(found) if found as u64 == length => Ok(()),
+            Ok(found) => Err(bad(&format!(
+                "the {what} ends early, after {found} of {length} bytes"
+            ))),
+            Err(error) => Err(bad(&format!("the {what} ends early ({error})"))),
+        }
     };
-    let mut start = [0; 8];
-    exact(&mut start, "header")?;
+    let mut start = Vec::new();
+    exact(&mut start, 8, "header")?;
     if !start.starts_with(b"\x93NUMPY") {
         return Err(bad("it is no NumPy file"));
     }
-    let mut length = [0; 4];
     // Version 1 has two bytes of length, later ones four.
-    let bytes = if start[6] == 1 { 2 } else { 4 };
-    exact(&mut length[..bytes], "header")?;
-    let length = u32::from_le_bytes(length) as usize;
+    let mut bytes = Vec::new();
+    exact(&mut bytes, if start[6] == 1 { 2 } else { 4 }, "header")?;
+    let length = bytes
+        .iter()
+        .rev()
+        .fold(0, |length, byte| length << 8 | u64::from(*byte));
     if length > 1 << 16 {
         return Err(bad("its header is too long"));
     }
-    let mut header = vec![0; length];
-    exact(&mut header, "header")?;
+    let mut header = Vec::new();
+    exact(&mut header, length, "header")?;
     let header = String::from_utf8_lossy(&header);
     let Header { is_double, shape } = parse_header(&header).map_err(|reason| bad(&reason))?;
     let [frames, points] = shape;
+    if frames == 0 || points == 0 {
+        return Err(bad(&format!(
+            "its shape is ({frames}, {points}, 3): there are no frames, or no points in them"
+        )));
+    }
     let numbers = frames.checked_mul(points).and_then(|n| n.checked_mul(3));
     let Some(numbers) = numbers.filter(|n| *n <= MAX_NUMBERS) else {
         return Err(bad("it is too large"));
     };
     let size = if is_double { 8 } else { 4 };
     let mut found = Vec::new();
-    // Frame by frame: no more is taken than really comes.
-    let mut frame = vec![0; (numbers / frames.max(1) * size) as usize];
+    let mut frame = Vec::new();
     for index in 0..frames {
-        exact(&mut frame, &format!("frame {index} of {frames}"))?;
+        let what = format!("frame {index} of {frames}");
+        exact(&mut frame, numbers / frames * size, &what)?;
         let number = |bytes: &[u8]| match is_double {
             true => f64::from_le_bytes(std::array::from_fn(|k| bytes[k])) as f32,
             false => f32::from_le_bytes(std::array::from_fn(|k| bytes[k])),

@@ -100,6 +100,14 @@ fn what_is_wrong_is_said() {
         (npy("<f4", "(0, 4, 3)", b""), "no frames"),
         (npy("<f4", "(4, 0, 3)", b""), "no points"),
         (npy("<f4", "(99999999, 99999999, 3)", b""), "too large"),
+        // Frames without bytes: they end no earlier than memory does.
+        (npy("<f4", "(9223372036854775807, 0, 3)", b""), "no points"),
+        (npy("<f4", "(0, 9223372036854775807, 3)", b""), "no frames"),
+        // 4 GiB by its header.
+        (
+            npy("<f8", "(1, 178956970, 3)", b""),
+            "after 0 of 4294967280 bytes",
+        ),
         (
             npy("<f4", "(1, 1, 3)", &f32::NAN.to_le_bytes().repeat(3)),
             "point 0 of frame 0",

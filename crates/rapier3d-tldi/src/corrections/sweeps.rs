@@ -6,11 +6,11 @@
 //! every step, its corrections included, and it would keep its velocity until the trough has closed over
 //! it. So it loses there what is directed into the slope, as by an impact without friction or rebound.
 //!
-//! Rapier asks for sweeps without naming the colliders: they are known by their shapes, and by where what
-//! moves was when the step began.
+//! Rapier asks for sweeps without naming the colliders: they are known by their shapes, by where what
+//! moves was when the step began, and by where its target is.
 
 use crate::corrections::impulses::{PushedPoint, separate};
-use crate::step::prepared::{Batch, PreparedPair, address, locked};
+use crate::step::prepared::{Batch, PreparedPair, Question, address, locked};
 use rapier3d::dynamics::RigidBodySet;
 use rapier3d::geometry::{Collider, ColliderSet};
 use rapier3d::math::{Pose, Vector};
@@ -23,8 +23,8 @@ const SAME_SIDE: f32 = 0.5;
 /// A pair that rapier sweeps: what moves, and its target.
 pub(crate) struct SweptPair<'a> {
     pub(crate) shapes: [&'a dyn Shape; 2],
-    /// Of what moves in world space, at first.
-    pub(crate) pose1: Pose,
+    /// In world space, at first. A target that the step has moved already is where it is then.
+    pub(crate) poses: [Pose; 2],
 }
 
 /// Where a sweep holds a pair, in world space.
@@ -36,16 +36,24 @@ pub(crate) struct Blocked {
 }
 
 impl Batch {
-    /// The pair that is swept, and which of its colliders the first and the second shape belong to.
+    /// The pair that is swept, and which of its colliders the first and the second shape belong to. Of targets
+    /// that share a shape (tiles) it is the one nearest to where the target is; sensors hold nothing.
     fn swept(&self, swept: &SweptPair<'_>) -> Option<(&PreparedPair, [usize; 2])> {
         let shapes = swept.shapes.map(address);
-        self.pairs.iter().find_map(|pair| {
+        let solid = (self.pairs.iter()).filter(|pair| pair.question != Question::Crossing);
+        let alike = solid.filter_map(|pair| {
             let is_it = |[k, l]: &[usize; 2]| {
                 let of_pair = [&pair.shapes[*k], &pair.shapes[*l]];
-                of_pair.map(|shape| address(&*shape.0)) == shapes && pair.poses[*k] == swept.pose1
+                of_pair.map(|shape| address(&*shape.0)) == shapes
+                    && pair.poses[*k] == swept.poses[0]
             };
             Some((pair, [[0, 1], [1, 0]].into_iter().find(is_it)?))
-        })
+        });
+        let off = |(pair, [_, l]): &(&PreparedPair, [usize; 2])| {
+            let target = swept.poses[1].translation;
+            pair.poses[*l].translation.distance_squared(target)
+        };
+        alike.min_by(|m, n| off(m).total_cmp(&off(n)))
     }
 
     /// How two parts of a swept pair are in each other, by the contacts that push them to the side that is
@@ -103,5 +111,83 @@ impl Batch {
             })
         });
         separate(&mut blocked.collect::<Vec<_>>(), bodies);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::narrow_phase::parts::{Hint, ShapePair, append_part_pairs};
+    use crate::{PointCloudShape, TldiConfig};
+    use rapier3d::geometry::{ColliderHandle, SharedShape};
+    use std::sync::Mutex;
+    use std::sync::atomic::AtomicBool;
+    use tldi::{ContactPatch, ContactPoint, PairResult, PointCloud};
+
+    /// A body between two tiles of one shape is as deep in each as that one's contacts say; a sensor tile holds nothing.
+    #[test]
+    fn targets_of_one_shape_are_told_apart() {
+        let points: Vec<Vector> = (0..64)
+            .map(|k| 0.1 * Vector::new((k % 8) as f32, 0.0, (k / 8) as f32))
+            .collect();
+        let cloud = PointCloud::builder(points).radius(0.1).build().unwrap();
+        let [tile, body] =
+            [cloud.clone(), cloud].map(|c| SharedShape::new(PointCloudShape::new(c)));
+        let at = Pose::from_translation(0.05 * Vector::Y);
+        let tiles = [0.0, 0.1, 0.1].map(|x| Pose::from_translation(x * Vector::X));
+        let mut batch = Batch::default();
+        let mut sides = Vec::new();
+        for (k, pose) in tiles.into_iter().enumerate() {
+            let question = match k {
+                2 => Question::Crossing,
+                _ => Question::Contacts(0.1),
+            };
+            let pair = ShapePair {
+                shape1: &*tile.0,
+                shape2: &*body.0,
+                pos12: pose.inv_mul(&at),
+                prediction: 0.1,
+            };
+            let hint = |_, _: Option<&Pose>, _| Hint {
+                motion: Vector::ZERO,
+                last_axis: Some(-Vector::Y),
+            };
+            let first = batch.parts.len();
+            let config = TldiConfig::default();
+            append_part_pairs(pair, &config, &mut batch.parts, &mut sides, hint);
+            let contact = ContactPoint {
+                gap: -0.01 * (k + 1) as f32,
+                ..ContactPoint::default()
+            };
+            batch.results.push(PairResult {
+                patches: vec![ContactPatch {
+                    normal: Vector::Y,
+                    points: [contact].into_iter().collect(),
+                    ..ContactPatch::default()
+                }],
+                ..PairResult::default()
+            });
+            let prepared = PreparedPair {
+                colliders: [k as u32, 9].map(|i| ColliderHandle::from_raw_parts(i, 0)),
+                bodies: [None; 2],
+                poses: [pose, at],
+                question,
+                parts: first..batch.parts.len(),
+                used: AtomicBool::new(true),
+                blocked: Mutex::default(),
+                is_kept: false,
+                measured: None,
+                shapes: [tile.clone(), body.clone()],
+            };
+            batch.push(prepared, &pair.pos12);
+        }
+        for (pose, depth) in [(tiles[0], 0.01), (tiles[1], 0.02)] {
+            let swept = SweptPair {
+                shapes: [&*body.0, &*tile.0],
+                poses: [at, pose],
+            };
+            let found = batch.penetration(&swept, [0, 0]).unwrap();
+            assert_eq!((found.normal, found.depth), (-Vector::Y, depth));
+        }
     }
 }

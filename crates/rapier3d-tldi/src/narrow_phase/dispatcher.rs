@@ -5,7 +5,7 @@ use super::queries;
 use super::shape_casts;
 use crate::narrow_phase::parts::{PartPair, ShapePair, has_cloud, part};
 use crate::step::measured::{Measured, rolls};
-use crate::step::prepared::{Batch, PROBE_ANSWER, PairKey, PreparedPair, Shared};
+use crate::step::prepared::{PROBE_ANSWER, PairKey, Question, Shared};
 use rapier3d::geometry::{ContactData, ContactManifold, ContactManifoldData};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::details::{
@@ -94,11 +94,6 @@ impl TldiDispatcher {
         Self { shared }
     }
 
-    /// What the batch holds about `pair`, if rapier asks as foreseen.
-    fn prepared<'b>(batch: &'b Batch, pair: &ShapePair<'_>) -> Option<&'b PreparedPair> {
-        batch.get(&PairKey::new(pair.shape1, pair.shape2, &pair.pos12))
-    }
-
     /// Declines unless one of the shapes holds a cloud.
     fn accept(shape1: &dyn Shape, shape2: &dyn Shape) -> Result<(), Unsupported> {
         if has_cloud(shape1) || has_cloud(shape2) {
@@ -127,7 +122,12 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for TldiDispatc
             prediction,
         };
         let batch = self.shared.batch();
-        let prepared = Self::prepared(&batch, &pair).filter(|p| p.prediction == prediction);
+        let key = PairKey::new(Question::Contacts(prediction), [shape1, shape2], pos12);
+        let bodies = manifolds.first().map(|manifold| {
+            let data = &manifold.data;
+            [data.rigid_body1, data.rigid_body2]
+        });
+        let prepared = batch.get(&key, bodies);
         if let Some(prepared) = prepared.filter(|prepared| !prepared.is_kept) {
             prepared.used.store(true, Ordering::Relaxed);
             let parts = &batch.parts[prepared.parts.clone()];
@@ -202,7 +202,8 @@ impl QueryDispatcher for TldiDispatcher {
             crossing.map(|pair| pair.parts)
         };
         let batch = self.shared.batch();
-        let prepared = Self::prepared(&batch, &pair).filter(|prepared| !prepared.is_kept);
+        let key = PairKey::new(Question::Crossing, [shape1, shape2], pos12);
+        let prepared = batch.get(&key, None).filter(|prepared| !prepared.is_kept);
         let crossing = if let Some(prepared) = prepared {
             prepared.used.store(true, Ordering::Relaxed);
             first_crossing(&batch.parts[prepared.parts.clone()], &batch.results)

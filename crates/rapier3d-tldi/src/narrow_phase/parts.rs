@@ -1,5 +1,6 @@
 //! From a pair of shapes to the comparisons it needs: one for each pair of parts.
 
+use crate::narrow_phase::passing::has_surface;
 use crate::shape::exact::ExactShape;
 use crate::{PointCloudShape, TldiConfig};
 use rapier3d::math::{Pose, Vector};
@@ -138,7 +139,8 @@ pub(crate) fn append_part_pairs<'a>(
             if let Some(pose1) = pose1 {
                 a_from_b = pose1.inv_mul(&a_from_b);
             }
-            if !within_reach(part1, part2, &a_from_b, prediction) {
+            let is_near = within_reach(part1, part2, &a_from_b, prediction);
+            if !(is_near && has_surface(part1) && has_surface(part2)) {
                 continue;
             }
             let comparison = config.params([part1, part2], prediction).map(|params| {

@@ -12,6 +12,8 @@ use super::queries;
 use crate::TldiConfig;
 use crate::corrections::sweeps::{Blocked, SweptPair};
 use crate::narrow_phase::parts::{ShapePair, has_cloud, part, part_count, surface};
+use crate::narrow_phase::passing::has_surface;
+use crate::narrow_phase::straight_way::StraightWay;
 use crate::shape::exact::ExactShape;
 use crate::step::prepared::Shared;
 use rapier3d::math::{Pose, Vector};
@@ -21,7 +23,7 @@ use rapier3d::parry::query::{
     Unsupported,
 };
 use rapier3d::parry::shape::Shape;
-use tldi::{Impact, ImpactQuery, Params, Penetration};
+use tldi::{BackendError, Impact, ImpactQuery, Params, Penetration};
 
 /// Most pieces of the motion of a body that turns.
 const MAX_PIECES: f32 = 64.0;
@@ -50,9 +52,6 @@ const BLOCKED: f32 = 1.0;
 /// Depth in pixels from which a pair is deep in contact. Bodies that slide over noise are
 /// shallower.
 const DEEP: f32 = 0.5;
-
-/// Longest straight cast in pixels. Images resolve no more in depth.
-const MAX_PIXELS: f32 = 131_072.0;
 
 /// Least cosine between normal and motion by which a target distance is divided: beyond, the
 /// surface is seen edge-on.
@@ -115,6 +114,9 @@ pub(crate) fn cast_shapes(
         let pos12 = pose1.inv_mul(&(pair.pos12 * pose2));
         let velocity = pose1.rotation.inverse() * velocity12;
         if has_cloud(parts[0]) || has_cloud(parts[1]) {
+            if !parts.into_iter().all(has_surface) {
+                return Err(Unsupported);
+            }
             let moving = Moving::new(parts);
             let (a_from_b, velocity) = if moving.is_swapped {
                 let inverse = pos12.inverse();
@@ -137,11 +139,26 @@ pub(crate) fn cast_shapes_nonlinear(
     (start, end): (f32, f32),
     stop_at_penetration: bool,
 ) -> Result<Option<ShapeCastHit>, Unsupported> {
-    let [at_start1, at_start2] = motions.map(|motion| motion.position_at_time(start));
+    let pos12_at = |time: f32| {
+        let [pose1, pose2] = motions.map(|motion| motion.position_at_time(time));
+        pose1.inv_mul(&pose2)
+    };
+    // Where a pose leaves the numbers there is no way to cast along.
+    let is_finite = |time: f32| time.is_finite() && pos12_at(time).is_finite();
+    if start > end {
+        return Ok(None);
+    }
+    if !(is_finite(start) && is_finite(end)) {
+        shared.fail(BackendError::Unsupported {
+            pair: 0,
+            reason: "a shape cast leads to poses that are not finite: give it a lower velocity or a shorter time",
+        });
+        return Ok(None);
+    }
     let pair = ShapePair {
         shape1: shapes[0],
         shape2: shapes[1],
-        pos12: at_start1.inv_mul(&at_start2),
+        pos12: pos12_at(start),
         prediction: 0.0,
     };
     if stop_at_penetration && let Some(mut hit) = overlap(shared, &pair, 0.0)? {
@@ -150,11 +167,14 @@ pub(crate) fn cast_shapes_nonlinear(
     }
     let swept = SweptPair {
         shapes,
-        pose1: motions[0].start,
+        poses: [motions[0].start, motions[1].start],
     };
     first_of_parts(&pair, |parts, indices, [pose1, pose2]| {
         let motions = [motions[0].prepend(pose1), motions[1].prepend(pose2)];
         if has_cloud(parts[0]) || has_cloud(parts[1]) {
+            if !parts.into_iter().all(has_surface) {
+                return Err(Unsupported);
+            }
             let moving = Moving::new(parts);
             let motions = moving.order(motions);
             let from_1_to_2 = if moving.is_swapped { -1.0 } else { 1.0 };
@@ -258,24 +278,20 @@ fn straight_impact(
     velocity: Vector,
     options: ShapeCastOptions,
 ) -> Option<ShapeCastHit> {
-    let speed = velocity.length();
     let params = moving.params(&shared.config())?;
-    // No farther than the bounds reach, if they are bounded.
-    let [sphere_a, sphere_b] = moving
-        .parts
-        .map(|part| part.compute_local_bounding_sphere());
-    let apart = sphere_a.center.distance(a_from_b * sphere_b.center);
-    let reach = apart + sphere_a.radius + sphere_b.radius;
-    let longest = if reach.is_finite() { reach } else { f32::MAX };
-    let way = (speed * options.max_time_of_impact + options.target_distance)
-        .min(longest)
-        .min(MAX_PIXELS * params.pixel_size);
+    let speed = velocity.as_dvec3().length();
+    let [max_time, target_distance] =
+        [options.max_time_of_impact, options.target_distance].map(f64::from);
+    let direction = velocity.as_dvec3().try_normalize()?;
+    // A cast without an end is one of the longest that there is.
+    let length = (speed * max_time + target_distance).min(f64::from(f32::MAX));
+    let way = StraightWay::new(moving.parts, &a_from_b, length * direction, &params)?;
     let [a, b] = moving.parts.map(ExactShape);
     let impact = shared.impact_on_the_spot(&ImpactQuery {
         a: surface(&a),
         b: surface(&b),
-        a_from_b,
-        motion: way * velocity.try_normalize()?,
+        a_from_b: way.begin(&a_from_b),
+        motion: way.motion(),
         touching: match options.stop_at_penetration {
             true => 0.0,
             false => TOUCHING * params.pixel_size,
@@ -284,12 +300,11 @@ fn straight_impact(
         penetration: None,
         params,
     })?;
-    let cosine = -impact.normal.dot(velocity) / speed;
-    let early = options.target_distance / cosine.max(LEAST_COSINE);
-    let time = (impact.distance - early).max(0.0) / speed;
-    let is_in_time = time <= options.max_time_of_impact;
-    let moved = Pose::from_translation(velocity * (impact.distance / speed)) * a_from_b;
-    is_in_time.then(|| hit_of(&impact, time, &moved))
+    let cosine = -impact.normal.dot(way.direction);
+    let early = target_distance / f64::from(cosine.max(LEAST_COSINE));
+    let time = (way.from + f64::from(impact.distance) - early).max(0.0) / speed;
+    let moved = way.at(&a_from_b, impact.distance);
+    (time <= max_time).then(|| hit_of(&impact, time as f32, &moved))
 }
 
 /// The motion of two parts both of which may turn.
@@ -335,8 +350,9 @@ impl Turning<'_> {
         let [motion_a, motion_b] = self.motions;
         let bounds = self.moving.parts[1].compute_local_aabb();
         let duration = end - start;
-        let turn_a = motion_a.angvel.length() * duration;
-        let turn = (motion_b.angvel - motion_a.angvel).length() * duration;
+        let turn_by = |angvel: Vector| (angvel.as_dvec3().length() * f64::from(duration)) as f32;
+        let turn_a = turn_by(motion_a.angvel);
+        let turn = turn_by(motion_b.angvel - motion_a.angvel);
         // The corners of the second part turn by so much, and its middle's way bends about the first.
         let turned = 0.5 * turn * bounds.half_extents().length();
         let lever = [start, end]
@@ -347,11 +363,13 @@ impl Turning<'_> {
             .max(turn_a * (lever / (8.0 * allowed)).sqrt())
             .ceil()
             .clamp(1.0, MAX_PIECES);
+        let diameter = 2.0 * bounds.half_extents().length();
         let time_at = move |piece: u32| start + duration * piece as f32 / count;
         (0..count as u32).map(move |piece| Piece {
             from: time_at(piece),
             to: time_at(piece + 1),
-            displacement: turned / count,
+            // No turn displaces a point by more than the part's diameter.
+            displacement: (turned / count).min(diameter),
         })
     }
 
@@ -396,32 +414,36 @@ impl Turning<'_> {
         } = piece;
         let touching = TOUCHING * self.params.pixel_size;
         let frozen = self.a_from_b(from, 0.5 * (from + to));
-        let way = self.a_from_b(to, 0.5 * (from + to)).translation - frozen.translation;
-        let direction = way.try_normalize()?;
+        let moved_to = self.a_from_b(to, 0.5 * (from + to)).translation;
+        let way = moved_to.as_dvec3() - frozen.translation.as_dvec3();
         // What would seem to touch already in the next piece is met in this one.
         let beyond = if to < self.end {
             touching + 2.0 * displacement
         } else {
             0.0
         };
+        let length = way.length();
+        let longer = way + f64::from(beyond) * way.try_normalize()?;
+        let way = StraightWay::new(self.moving.parts, &frozen, longer, &self.params)?;
         let [a, b] = self.moving.parts.map(ExactShape);
         let impact = self.shared.impact_on_the_spot(&ImpactQuery {
             a: surface(&a),
             b: surface(&b),
-            a_from_b: frozen,
-            motion: way + beyond * direction,
+            a_from_b: way.begin(&frozen),
+            motion: way.motion(),
             touching,
             core_only: true,
             penetration: self.penetration,
             params: self.params,
         })?;
         // Not at the very start, which a solver takes for a contact that it has.
-        let distance = (impact.distance - displacement)
-            .max(0.5 * impact.distance)
-            .max(0.5 * touching);
-        let time = (from + (to - from) * distance / way.length()).min(self.end);
-        let moved = Pose::from_translation(impact.distance * direction) * frozen;
-        Some(hit_of(&impact, time, &moved))
+        let distance = way.from + f64::from(impact.distance);
+        let early = (distance - f64::from(displacement))
+            .max(0.5 * distance)
+            .max(f64::from(0.5 * touching));
+        let time = f64::from(from) + f64::from(to - from) * early / length;
+        let moved = way.at(&frozen, impact.distance);
+        Some(hit_of(&impact, (time as f32).min(self.end), &moved))
     }
 
     fn met_by_turning(&self, Piece { from, to, .. }: Piece) -> Option<ShapeCastHit> {
@@ -449,12 +471,14 @@ fn met_by_turning(
     let longest = bounds
         .vertices()
         .into_iter()
-        .map(|corner| way_of(before * corner).length());
+        .map(|corner| way_of(before * corner).as_dvec3().length() as f32);
+    // What is farther than the part is large, its motion brings it to and not its turning.
+    let diameter = 2.0 * bounds.half_extents().length();
     let pair = ShapePair {
         shape1: moving.parts[0],
         shape2: moving.parts[1],
         pos12: before,
-        prediction: touching + longest.fold(0.0, f32::max),
+        prediction: touching + longest.fold(0.0, f32::max).min(diameter),
     };
     shared.contacts_on_the_way(pair, &shared.config(), |patches| {
         let meetings = patches.iter().flat_map(|patch| {

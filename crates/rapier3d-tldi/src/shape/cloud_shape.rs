@@ -9,7 +9,7 @@ use rapier3d::parry::shape::{FeatureId, Shape, ShapeType, TypedShape};
 use rapier3d::prelude::MassProperties;
 use std::f32::consts::FRAC_PI_4;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Once, OnceLock};
 use tldi::{CloudError, NonFinite, PointCloud, Radii};
 
 /// Neighbours for normals that are not given or that scaling made wrong.
@@ -310,7 +310,17 @@ impl Shape for PointCloudShape {
         )
     }
 
+    /// Warns once, in the log: only rapier's default dispatcher asks for it before it finds contacts, and it has
+    /// none for clouds.
     fn shape_type(&self) -> ShapeType {
+        static WARNING: Once = Once::new();
+        WARNING.call_once(|| {
+            log::warn!(
+                "rapier's own dispatcher was asked about contacts of a point cloud, and finds none: bodies pass \
+                 through it. Call TldiPipeline::attach before the world's first step. Rapier's \
+                 KinematicCharacterController always asks that dispatcher: move the character as a body"
+            );
+        });
         ShapeType::Custom
     }
 

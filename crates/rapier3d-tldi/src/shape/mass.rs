@@ -3,7 +3,7 @@
 mod orient;
 mod surfels;
 
-use rapier3d::glamx::{DMat3, DSymmetricEigen3, DVec3};
+use rapier3d::glamx::{DMat3, DSymmetricEigen3, DVec3, Vec3};
 use rapier3d::prelude::MassProperties;
 use surfels::Surfel;
 use tldi::PointCloud;
@@ -122,11 +122,17 @@ impl Moments {
         let central = self.central();
         let trace = central.x_axis.x + central.y_axis.y + central.z_axis.z;
         let inertia = DMat3::from_diagonal(DVec3::splat(trace)) - central;
-        MassProperties::with_inertia_matrix(
-            (self.origin + center).as_vec3(),
-            self.volume as f32,
-            inertia.as_mat3(),
-        )
+        // The axes are found of a matrix near 1: of large clouds the squares of moments are beyond f32.
+        let scale = trace.log2().floor().exp2().recip();
+        let near_one = (inertia * scale).as_mat3();
+        let center = (self.origin + center).as_vec3();
+        let mut properties =
+            MassProperties::with_inertia_matrix(center, self.volume as f32, near_one);
+        properties.inv_principal_inertia *= scale as f32;
+        if !properties.inv_principal_inertia.is_finite() {
+            properties.inv_principal_inertia = Vec3::ZERO; // as rapier's own for what is too small
+        }
+        properties
     }
 }
 

@@ -5,7 +5,7 @@ use crate::narrow_phase::parts::{Hint, ShapePair, append_part_pairs, within_reac
 use crate::shape::exact::ExactShape;
 use crate::step::candidates::{Candidate, contact_reach, effective_prediction, parent_of, pose_of};
 use crate::step::measured::Measured;
-use crate::step::prepared::{Batch, PairKey, PreparedPair};
+use crate::step::prepared::{Batch, PreparedPair, Question};
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet};
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
@@ -49,8 +49,11 @@ impl<'a> Frame<'a> {
             pos12,
             prediction,
         };
-        let is_measured_anew = collider1.is_sensor()
-            || collider2.is_sensor()
+        let question = match collider1.is_sensor() || collider2.is_sensor() {
+            true => Question::Crossing,
+            false => Question::Contacts(prediction),
+        };
+        let is_measured_anew = question == Question::Crossing
             || colliders.iter().any(|handle| self.changed.contains(handle));
         let kept = self
             .memory
@@ -65,11 +68,11 @@ impl<'a> Frame<'a> {
             self.push_parts(looked_for, candidate, &pose1, batch, sides);
         }
         batch.push(
-            PairKey::new(shape1, shape2, &pos12),
             PreparedPair {
                 colliders,
+                bodies: [collider1, collider2].map(Collider::parent),
                 poses: [pose1, pose2],
-                prediction,
+                question,
                 parts: first_part..batch.parts.len(),
                 used: AtomicBool::new(false),
                 blocked: Mutex::default(),
@@ -77,6 +80,7 @@ impl<'a> Frame<'a> {
                 measured: kept.or_else(|| Measured::new(&pair, self.config)),
                 shapes: [collider1, collider2].map(|c| c.shared_shape().clone()),
             },
+            &pos12,
         );
     }
 
@@ -282,8 +286,9 @@ mod tests {
             });
             let prepared = PreparedPair {
                 colliders,
+                bodies: [None; 2],
                 poses: [turned; 2],
-                prediction: pair.prediction,
+                question: Question::Contacts(pair.prediction),
                 parts: 0..1,
                 used: AtomicBool::new(true),
                 blocked: Mutex::default(),
@@ -291,10 +296,7 @@ mod tests {
                 measured: None,
                 shapes: [shape.clone(), shape.clone()],
             };
-            batch.push(
-                PairKey::new(pair.shape1, pair.shape2, &pair.pos12),
-                prepared,
-            );
+            batch.push(prepared, &pair.pos12);
             memory.update(&[], &batch);
             memory.axis(colliders, [0, 0])
         };

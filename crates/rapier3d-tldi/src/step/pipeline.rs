@@ -6,6 +6,7 @@ use crate::corrections::rolling::move_to_mid_step;
 use crate::corrections::surface_motion::{SurfaceMotions, TldiHooks};
 use crate::corrections::surface_push;
 use crate::narrow_phase::parts::append_queries;
+use crate::narrow_phase::passing::Told;
 use crate::shape::exact::ExactShape;
 use crate::step::batching::{Frame, PairMemory};
 use crate::step::candidates::CandidateSearch;
@@ -38,6 +39,7 @@ pub struct TldiPipeline {
     search: CandidateSearch,
     memory: PairMemory,
     changed: Vec<ColliderHandle>,
+    told: Told,
     motions: SurfaceMotions,
     sides: Vec<[ExactShape<'static>; 2]>,
     queries: Vec<PairQuery<'static>>,
@@ -75,6 +77,7 @@ impl TldiPipeline {
             search: CandidateSearch::default(),
             memory: PairMemory::default(),
             changed: Vec::new(),
+            told: Told::default(),
             motions: SurfaceMotions::default(),
             sides: Vec::new(),
             queries: Vec::new(),
@@ -140,6 +143,7 @@ impl TldiPipeline {
         let candidates = self
             .search
             .find(bodies, colliders, integration, &self.changed);
+        self.told.look_for_passing(candidates, colliders);
         let config = shared.config();
         let frame = Frame {
             gravity,
@@ -206,8 +210,8 @@ impl TldiPipeline {
     /// velocity into it.
     ///
     /// # Errors
-    /// [`TldiError::NotAttached`], and [`TldiError::OnTheSpot`] where comparisons inside the step
-    /// failed.
+    /// [`TldiError::NotAttached`], [`TldiError::OnTheSpot`] where comparisons inside the step
+    /// failed, and [`TldiError::PassesThrough`] where a collider of a kind that does not meet clouds came near one.
     pub fn finish(
         &mut self,
         bodies: &mut RigidBodySet,
@@ -248,6 +252,7 @@ impl TldiPipeline {
         if !self.is_attached(narrow_phase) {
             return Err(TldiError::NotAttached);
         }
+        self.told.take()?;
         for pair in cloud_pairs(narrow_phase, colliders) {
             report.pairs_in_contact += usize::from(pair.has_any_active_contact());
             for contact in contacts_of(pair, colliders) {

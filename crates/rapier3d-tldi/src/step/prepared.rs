@@ -7,6 +7,7 @@ use crate::narrow_phase::parts::{
 };
 use crate::step::measured::{Measured, rolls};
 use crate::{TldiConfig, TldiError};
+use rapier3d::dynamics::RigidBodyHandle;
 use rapier3d::geometry::{ColliderHandle, SharedShape};
 use rapier3d::math::Pose;
 use rapier3d::parry::shape::{Ball, Shape};
@@ -19,10 +20,21 @@ use tldi::{Backend, BackendError, ContactPatch, CpuBackend, Impact, ImpactQuery,
 /// A distance that no other dispatcher gives.
 pub(crate) const PROBE_ANSWER: f32 = -1.0;
 
-/// What the dispatcher sees of a pair: the addresses of both shapes, and the relative pose, bit by
-/// bit.
+/// What rapier asks about a pair.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Question {
+    /// Contacts up to this gap, metres.
+    Contacts(f32),
+    /// Whether the surfaces of a pair with a sensor cross.
+    Crossing,
+}
+
+/// What the dispatcher sees of a pair: the question, the addresses of both shapes, and the relative pose,
+/// bit by bit. A solid and a sensor that share a shape are told apart by the question.
 #[derive(PartialEq, Eq, Hash)]
 pub(crate) struct PairKey {
+    /// Bits of the gap; of none for a crossing.
+    contacts_up_to: Option<u32>,
     shapes: [usize; 2],
     pos12: [u32; 7],
 }
@@ -33,11 +45,15 @@ pub(crate) fn address(shape: &dyn Shape) -> usize {
 }
 
 impl PairKey {
-    pub(crate) fn new(shape1: &dyn Shape, shape2: &dyn Shape, pos12: &Pose) -> Self {
+    pub(crate) fn new(question: Question, shapes: [&dyn Shape; 2], pos12: &Pose) -> Self {
         let [x, y, z] = pos12.translation.to_array();
         let [i, j, k, w] = pos12.rotation.to_array();
         Self {
-            shapes: [address(shape1), address(shape2)],
+            contacts_up_to: match question {
+                Question::Contacts(gap) => Some(gap.to_bits()),
+                Question::Crossing => None,
+            },
+            shapes: shapes.map(address),
             pos12: [x, y, z, i, j, k, w].map(f32::to_bits),
         }
     }
@@ -46,10 +62,12 @@ impl PairKey {
 /// A pair of the batch.
 pub(crate) struct PreparedPair {
     pub(crate) colliders: [ColliderHandle; 2],
+    /// Of the colliders.
+    pub(crate) bodies: [Option<RigidBodyHandle>; 2],
     /// Of the colliders in world space.
     pub(crate) poses: [Pose; 2],
-    /// Contacts up to this gap were sought, metres.
-    pub(crate) prediction: f32,
+    /// What rapier is expected to ask.
+    pub(crate) question: Question,
     /// Its parts, in [`Batch::parts`].
     pub(crate) parts: Range<usize>,
     /// Whether rapier asked for it and took this answer.
@@ -68,7 +86,10 @@ pub(crate) struct PreparedPair {
 /// The pairs of a step and their results.
 #[derive(Default)]
 pub(crate) struct Batch {
+    /// The last pair with a key; the one before it is in `alike`.
     index: HashMap<PairKey, usize>,
+    /// Of each pair the one before it with the same key.
+    alike: Vec<Option<usize>>,
     pub(crate) pairs: Vec<PreparedPair>,
     pub(crate) parts: Vec<PartPair>,
     /// The result of query `k` is `results[k]`; there may be left-over ones behind.
@@ -79,14 +100,19 @@ impl Batch {
     /// Forgets the pairs, keeping the memory.
     pub(crate) fn clear(&mut self) {
         self.index.clear();
+        self.alike.clear();
         self.pairs.clear();
         self.parts.clear();
     }
 
-    /// Appends a pair. Where two have the same key (bodies that share a shape and lie alike), the
-    /// first answers for both.
-    pub(crate) fn push(&mut self, key: PairKey, pair: PreparedPair) {
-        self.index.entry(key).or_insert(self.pairs.len());
+    /// Appends a pair.
+    pub(crate) fn push(&mut self, pair: PreparedPair, pos12: &Pose) {
+        let key = PairKey::new(
+            pair.question,
+            [&*pair.shapes[0].0, &*pair.shapes[1].0],
+            pos12,
+        );
+        self.alike.push(self.index.insert(key, self.pairs.len()));
         self.pairs.push(pair);
     }
 
@@ -126,9 +152,19 @@ impl Batch {
         }
     }
 
-    /// The pair with this key.
-    pub(crate) fn get(&self, key: &PairKey) -> Option<&PreparedPair> {
-        self.index.get(key).map(|&i| &self.pairs[i])
+    /// The pair with this key. Of several (bodies that share shapes and lie alike) the one of these bodies,
+    /// which a pair's old manifolds tell, or else the first: without contacts so far, it answers for all.
+    pub(crate) fn get(
+        &self,
+        key: &PairKey,
+        bodies: Option<[Option<RigidBodyHandle>; 2]>,
+    ) -> Option<&PreparedPair> {
+        let alike = || {
+            std::iter::successors(self.index.get(key).copied(), |&i| self.alike[i])
+                .map(|i| &self.pairs[i])
+        };
+        let own = alike().find(|pair| Some(pair.bodies) == bodies);
+        own.or_else(|| alike().last())
     }
 
     /// Pairs that are compared, and those whose earlier contacts hold.
@@ -298,12 +334,15 @@ impl Shared {
         let mut spot = locked(&self.spots).pop().unwrap_or_default();
         let answer = run(&mut spot);
         locked(&self.spots).push(spot);
-        answer
-            .map_err(|error| match &mut *locked(&self.failed) {
-                Some((count, _)) => *count += 1,
-                failed @ None => *failed = Some((1, error)),
-            })
-            .ok()
+        answer.map_err(|error| self.fail(error)).ok()
+    }
+
+    /// Keeps an error for [`take_failures`](Self::take_failures).
+    pub(crate) fn fail(&self, error: BackendError) {
+        match &mut *locked(&self.failed) {
+            Some((count, _)) => *count += 1,
+            failed @ None => *failed = Some((1, error)),
+        }
     }
 
     /// Comparisons on the spot since the last call.

@@ -27,6 +27,13 @@ const SMALL: usize = 1 << 16;
 /// nothing can be folded, still gets all of them; twice as many would double a pair's memory and its longest step.
 const LARGE: usize = 1 << 22;
 
+/// Fragments that an image may have whatever the number of points: a quarter of a second. Pixels that are much
+/// smaller than points show no more of them.
+const MANY: usize = 1 << 24;
+
+/// Fragments for each point beyond these: pixels of a sixth of a radius.
+const FRAGMENTS_PER_POINT: usize = 128;
+
 /// Edges of a cell in reaches beyond which its grid is folded. The cells of surfaces, which fill little of their
 /// bounds, are up to three times as large as the reach.
 const COARSE: f32 = 4.0;
@@ -166,16 +173,17 @@ impl ViewFold {
         rect.pixels() > SMALL + PER_POINT * points
     }
 
-    /// Whether there is no room for an image of so many `points`; [`coarser`](Self::coarser) then says what pixels
-    /// it needs.
-    pub(super) fn refuses(&mut self, rect: &Rect, points: usize) -> bool {
-        let most = LARGE + PER_POINT * points;
-        let is_too_large = rect.pixels() > most;
-        if is_too_large {
-            let larger = (rect.pixels() as f32 / most as f32).sqrt();
-            self.coarser = Some(larger.max(std::f32::consts::SQRT_2));
+    /// Whether there is no room for an image of so many `points`, or no time for so many `fragments`;
+    /// [`coarser`](Self::coarser) then says what pixels it needs.
+    pub(super) fn refuses(&mut self, rect: &Rect, points: usize, fragments: f32) -> bool {
+        let most = |whatever: usize, per_point: usize| (whatever + per_point * points) as f32;
+        let of_pixels = rect.pixels() as f32 / most(LARGE, PER_POINT);
+        let of_fragments = fragments / most(MANY, FRAGMENTS_PER_POINT);
+        let share = of_pixels.max(of_fragments);
+        if share > 1.0 {
+            self.coarser = Some(share.sqrt().max(std::f32::consts::SQRT_2));
         }
-        is_too_large
+        share > 1.0
     }
 
     /// Folds the gaps between view coordinates `[x, y]`, metres, of points that reach out by `reach` pixels.

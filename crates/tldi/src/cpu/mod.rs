@@ -26,7 +26,6 @@ pub(crate) mod sweep;
 pub(crate) mod zone;
 
 use crate::cloud::reach::Ring;
-use crate::pair::supported::supported_surfaces;
 use crate::{
     Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,
     Tldi, Variant, VirtualCamera, Work, paper,
@@ -131,8 +130,8 @@ impl CpuBackend {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn impact(&self, query: &ImpactQuery) -> Result<Option<Impact>, BackendError> {
-        supported_surfaces(query.a, query.b)
-            .and_then(|()| query.params.check())
+        query
+            .check()
             .map_err(|reason| BackendError::Unsupported { pair: 0, reason })?;
         Ok(self.with_scratch(|scratch| scratch.impact(query)))
     }
@@ -259,7 +258,8 @@ pub fn build(
             sharpens: true,
         };
         if let Some(seen) = side.project(&view) {
-            if camera.size.is_none() && room.refuses(&seen.rect, side.points.len()) {
+            let fragments = side.fragments_in(&view, &seen.rect);
+            if camera.size.is_none() && room.refuses(&seen.rect, side.points.len(), fragments) {
                 camera = camera.coarser(room.coarser.unwrap_or(1.0));
                 continue;
             }

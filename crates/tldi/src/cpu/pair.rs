@@ -463,7 +463,8 @@ impl Scratch {
             side_b.columns.fold(&self.fold, camera, &mut seen_b);
             rect = seen_a.rect.intersection(&seen_b.rect)?;
         }
-        if camera.size.is_none() && self.fold.refuses(&rect, count) {
+        let fragments = side_a.fragments_in(a, &rect) + side_b.fragments_in(b, &rect);
+        if camera.size.is_none() && self.fold.refuses(&rect, count, fragments) {
             return None;
         }
         for (seen, side) in [(&mut seen_a, &*side_a), (&mut seen_b, &*side_b)] {

@@ -152,6 +152,12 @@ impl Side {
         self.columns.project(&self.points, largest, view.camera)
     }
 
+    /// About how many fragments an image of the culled points has.
+    pub(super) fn fragments_in(&self, view: &CloudView, rect: &Rect) -> f32 {
+        let edge = 2.0 * self.mean_radius(view.cloud) / view.camera.pixel_size_at(0.0);
+        self.points.len() as f32 * (edge * edge).min(rect.pixels() as f32)
+    }
+
     /// Radius in metres about a point in which others decide its normal; 0 where it is given.
     pub(super) fn support_radius(&self, cloud: &PointCloud) -> f32 {
         match cloud.normals() {
@@ -344,7 +350,7 @@ impl Side {
             covered = None;
             rect = seen.rect;
         }
-        if follows && fold.refuses(&rect, self.points.len()) {
+        if follows && fold.refuses(&rect, self.points.len(), self.fragments_in(view, &rect)) {
             return None;
         }
         let reach = DepthScale::reach(view.params);

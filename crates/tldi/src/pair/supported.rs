@@ -1,6 +1,8 @@
 //! Which pairs can be compared, and why others cannot.
 
-use crate::{PairQuery, Params, Projection, Surface, Variant, View, paper};
+use crate::{ImpactQuery, PairQuery, Params, Projection, Surface, Variant, View, paper};
+use glamx::Vec3;
+use std::ops::RangeInclusive;
 
 /// Why the CPU does not compare what lives on a device.
 const ON_A_DEVICE: &str = "the points live on a device: only its backend compares them, with clouds, \
@@ -12,6 +14,18 @@ impl PairQuery<'_> {
     pub fn check(&self) -> Result<(), &'static str> {
         supported_surfaces(self.a, self.b)?;
         self.params.check()?;
+        let is_view_finite = match self.view {
+            View::Aim {
+                motion, last_axis, ..
+            } => motion.is_finite() && last_axis.is_none_or(Vec3::is_finite),
+            View::Fixed(_) => true,
+        };
+        if !(is_view_finite && self.a_from_b.is_finite()) {
+            return Err("a_from_b, motion and last_axis must be finite");
+        }
+        if matches!(self.view, View::Aim { .. }) {
+            has_few_pixels([self.a, self.b], self.params.pixel_size)?;
+        }
         let exact = matches!(self.a, Surface::Exact(_)) || matches!(self.b, Surface::Exact(_));
         if exact && self.params.variant() == Variant::Paper {
             return Err("the paper's variant compares clouds only: use Variant::Oriented");
@@ -48,17 +62,54 @@ pub(crate) fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static 
     }
 }
 
+/// Most pixels from a cloud's origin to a point: an `i32` holds eight times as many. Only pixels far smaller than radii
+/// have more, since coordinates have no more than 2¹⁹ radii.
+const MOST_PIXELS: f32 = (1 << 28) as f32;
+
+fn has_few_pixels(surfaces: [Surface; 2], pixel_size: f32) -> Result<(), &'static str> {
+    let farthest = |surface: Surface| match surface {
+        Surface::Cloud(cloud) => {
+            let bounds = cloud.bounds();
+            bounds.min.abs().max(bounds.max.abs()).max_element() + cloud.max_radius()
+        }
+        Surface::Exact(_) | Surface::Device(_) => 0.0,
+    };
+    match surfaces.into_iter().map(farthest).fold(0.0, f32::max) <= MOST_PIXELS * pixel_size {
+        true => Ok(()),
+        false => {
+            Err("pixel_size is less than 2^-28 of the farthest coordinate: choose a larger one")
+        }
+    }
+}
+
+impl ImpactQuery<'_> {
+    /// Whether the CPU can find the impact; if not, why, and what to do instead.
+    pub(crate) fn check(&self) -> Result<(), &'static str> {
+        supported_surfaces(self.a, self.b)?;
+        self.params.check()?;
+        if !(self.a_from_b.is_finite() && self.motion.is_finite() && self.touching.is_finite()) {
+            return Err("a_from_b, motion and touching must be finite");
+        }
+        has_few_pixels([self.a, self.b], self.params.pixel_size)
+    }
+}
+
 impl Params {
+    /// What [`pixel_size`](Self::pixel_size) and the other lengths may be, metres: squares and quotients of two
+    /// of them stay within `f32`.
+    pub const LENGTHS: RangeInclusive<f32> = 1e-14..=1e14;
+
     /// Whether a backend can use them; if not, why.
     pub fn check(&self) -> Result<(), &'static str> {
-        if self.pixel_size > 0.0
-            && self.merge_gap > 0.0
-            && self.thickness > 0.0
-            && self.prediction >= 0.0
-        {
+        let lengths = [self.pixel_size, self.merge_gap, self.thickness];
+        let are_valid = lengths.iter().all(|length| Self::LENGTHS.contains(length));
+        if are_valid && (0.0..=*Self::LENGTHS.end()).contains(&self.prediction) {
             Ok(())
         } else {
-            Err("pixel_size, merge_gap and thickness must be positive, prediction not negative")
+            Err(
+                "pixel_size, merge_gap and thickness must be 1e-14 to 1e14, prediction 0 to 1e14: choose others, \
+                 or another unit of length",
+            )
         }
     }
 }

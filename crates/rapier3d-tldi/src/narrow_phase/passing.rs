@@ -1,0 +1,97 @@
+//! What passes through clouds, and that a pipeline says so once for each collider.
+
+use crate::TldiError;
+use crate::narrow_phase::parts::{cloud_of, has_cloud, part, part_count};
+use crate::step::candidates::Candidate;
+use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
+use rapier3d::parry::shape::{Shape, ShapeType};
+use tldi::Params;
+use tldi::plan::largest_pixel;
+
+/// Why a collider passes through clouds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Passes {
+    /// Its shape, or a part of its compound, is a line or a point: a segment, a polyline, or what has no width.
+    Line,
+    /// It is the skin of one of rapier's soft bodies, whose particles rapier holds up by its own tests.
+    SoftBody,
+}
+
+impl std::fmt::Display for Passes {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Line => {
+                "its shape has a part without a surface (a segment, a polyline or what has no width): \
+                 give it a width, as a capsule has"
+            }
+            Self::SoftBody => {
+                "rapier's soft bodies do not collide with clouds: take a rigid body, or give the cloud's \
+                 ground a shape of rapier's for it to rest on"
+            }
+        })
+    }
+}
+
+/// Whether rays can cross the shape or it is a cloud, whose points have radii.
+pub(crate) fn has_surface(shape: &dyn Shape) -> bool {
+    if cloud_of(shape).is_some() {
+        return true;
+    }
+    let pixel = largest_pixel(shape.compute_local_aabb().extents(), 0.0);
+    let is_line = matches!(shape.shape_type(), ShapeType::Segment | ShapeType::Polyline);
+    pixel >= *Params::LENGTHS.start() && !is_line
+}
+
+/// Why the collider passes through clouds, if it does.
+fn passes(collider: &Collider) -> Option<Passes> {
+    let shape = collider.shape();
+    let mut parts = (0..part_count(shape)).map(|i| part(shape, i).1);
+    if collider.deformable_mesh_ref().is_some() {
+        return Some(Passes::SoftBody);
+    }
+    (!parts.all(has_surface)).then_some(Passes::Line)
+}
+
+/// The colliders of which it was said that they pass.
+#[derive(Default)]
+pub(crate) struct Told {
+    colliders: Vec<ColliderHandle>,
+    /// Not returned yet.
+    next: Option<TldiError>,
+}
+
+impl Told {
+    /// Looks for the first candidate that passes and of which nothing was said so far.
+    pub(crate) fn look_for_passing(&mut self, candidates: &[Candidate], colliders: &ColliderSet) {
+        let passing = |[collider, other]: [ColliderHandle; 2]| {
+            let reason = passes(colliders.get(collider)?)?;
+            let is_new =
+                has_cloud(colliders.get(other)?.shape()) && !self.colliders.contains(&collider);
+            is_new.then_some(TldiError::PassesThrough {
+                collider,
+                cloud: other,
+                reason,
+            })
+        };
+        self.next = candidates.iter().find_map(|candidate| {
+            let Candidate {
+                collider1: c1,
+                collider2: c2,
+                ..
+            } = *candidate;
+            passing([c1, c2]).or_else(|| passing([c2, c1]))
+        });
+    }
+
+    /// What is to be said, once.
+    pub(crate) fn take(&mut self) -> Result<(), TldiError> {
+        let Some(error) = self.next.take() else {
+            return Ok(());
+        };
+        if let TldiError::PassesThrough { collider, .. } = error {
+            self.colliders.push(collider);
+        }
+        Err(error)
+    }
+}

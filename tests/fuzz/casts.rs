@@ -1,0 +1,105 @@
+//! What users ask a dispatcher: distances, contacts, straight and turning casts, rays.
+
+use crate::check;
+use crate::shapes::shape;
+use crate::spec::{any_number, cloud, pose};
+use proptest::prelude::*;
+use rapier3d::parry::query::details::ShapeCastOptions;
+use rapier3d::parry::query::{NonlinearRigidMotion, QueryDispatcher};
+use rapier3d::prelude::*;
+use rapier3d_tldi::prelude::*;
+
+/// Velocities up to what `f32` holds, in sizes a second, and numbers that are none.
+fn velocity() -> impl Strategy<Value = Vector> {
+    let number = prop_oneof![
+        3 => -10.0..10.0f32,
+        1 => any_number(),
+        1 => (0..=37i32).prop_map(|e| -(10f32.powi(e))),
+    ];
+    let number = number.boxed();
+    [number.clone(), number.clone(), number].prop_map(Vector::from_array)
+}
+
+#[test]
+fn questions_have_answers() {
+    let shapes = (cloud(-6..=6i32, false), cloud(Just(0), false), shape());
+    let motions = (
+        pose(),
+        velocity(),
+        velocity(),
+        any_number(),
+        any::<[bool; 3]>(),
+    );
+    check(
+        &(shapes, motions),
+        |((a, mut b, shape), (pose, linear, angular, time, flags))| {
+            b.exponent = a.exponent;
+            let (Ok(cloud_a), Ok(cloud_b), Some(shape)) =
+                (a.build(), b.build(), shape.build(a.scale()))
+            else {
+                return Ok(());
+            };
+            let tldi = TldiPipeline::new(TldiConfig::default()).expect("the settings are valid");
+            let dispatcher = tldi.dispatcher();
+            let (first, other) = (PointCloudShape::new(cloud_a), PointCloudShape::new(cloud_b));
+            let other: &dyn Shape = if flags[0] { &other } else { &*shape.0 };
+            let (shape1, shape2): (&dyn Shape, &dyn Shape) = if flags[1] {
+                (&first, other)
+            } else {
+                (other, &first)
+            };
+            let size = a.scale();
+            let pos12 = pose.at(size);
+
+            // What touches at the start is told at any end, rapier's own answers likewise.
+            let is_within = |hit: f32| (0.0..=time.max(0.0)).contains(&hit);
+            if let Ok(answer) = dispatcher.distance(&pos12, shape1, shape2) {
+                prop_assert!(answer.distance >= 0.0, "{}", answer.distance);
+            }
+            if let Ok(Some(contact)) = dispatcher.contact(&pos12, shape1, shape2, size) {
+                prop_assert!(contact.dist.is_finite() && contact.normal1.is_finite());
+            }
+            let _ = dispatcher.closest_points(&pos12, shape1, shape2, size);
+            let _ = dispatcher.intersection_test(&pos12, shape1, shape2);
+            let options = ShapeCastOptions {
+                stop_at_penetration: flags[2],
+                ..ShapeCastOptions::with_max_time_of_impact(time)
+            };
+            let straight = dispatcher.cast_shapes(&pos12, size * linear, shape1, shape2, options);
+            if let Ok(Some(hit)) = straight {
+                prop_assert!(is_within(hit.time_of_impact), "{:?}", hit);
+                prop_assert!(
+                    hit.witness1.is_finite() && hit.normal1.is_finite(),
+                    "{:?}",
+                    hit
+                );
+            }
+            let still = NonlinearRigidMotion::constant_position(Pose::IDENTITY);
+            let motion = NonlinearRigidMotion::new(pos12, Vector::ZERO, size * linear, angular);
+            let turning = dispatcher
+                .cast_shapes_nonlinear(&still, shape1, &motion, shape2, 0.0, time, flags[2]);
+            if let Ok(Some(hit)) = turning {
+                prop_assert!(is_within(hit.time_of_impact), "{:?}", hit);
+                prop_assert!(
+                    hit.witness1.is_finite() && hit.normal1.is_finite(),
+                    "{:?}",
+                    hit
+                );
+            }
+            let ray = Ray::new(pos12.translation, linear);
+            if let Some(hit) = first.cast_local_ray_and_get_normal(&ray, time, true) {
+                prop_assert!(
+                    hit.time_of_impact >= 0.0 && hit.normal.is_finite(),
+                    "{:?}",
+                    hit
+                );
+            }
+            let _ = first.project_local_point(pos12.translation, flags[2]);
+            let mass = first.mass_properties(1.0);
+            prop_assert!(mass.mass().is_finite() && mass.local_com.is_finite());
+            prop_assert!(mass.principal_inertia().is_finite());
+            prop_assert!(mass.principal_inertia_local_frame.is_normalized());
+            Ok(())
+        },
+    );
+}
