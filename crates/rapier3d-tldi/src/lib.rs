@@ -61,6 +61,7 @@ mod impulses;
 mod manifolds;
 mod mass;
 mod measured;
+mod own_points;
 mod parts;
 mod pipeline;
 mod planes;
@@ -71,8 +72,10 @@ mod report;
 mod resolution;
 mod rolling;
 mod sampled_motion;
+mod sampling;
 mod shape;
 mod shape_casts;
+mod stream;
 mod surface_motion;
 mod surface_push;
 mod sweeps;
@@ -84,9 +87,15 @@ pub use dispatcher::TldiDispatcher;
 pub use error::TldiError;
 pub use exact::ExactShape;
 pub use mass::{MassModel, unit_mass_properties};
+pub use own_points::points_on;
 pub use pipeline::TldiPipeline;
 pub use report::{Contact, StepReport};
 pub use resolution::Resolution;
+pub use sampling::{SampleError, sample_shape};
 pub use shape::PointCloudShape;
+pub use stream::{CloudStream, StreamFrame};
 pub use surface_motion::TldiHooks;
-pub use tldi::{self, CameraPolicy, CloudError, NonFinite, PointCloud, RayHit, RaySurface};
+pub use tldi::{
+    self, CameraPolicy, CloudError, CloudRecipe, NonFinite, PointCloud, RadiusRule, RayHit,
+    RaySurface,
+};
