@@ -77,25 +77,26 @@ fn clouds_are_told_up_to_their_radius() {
     assert!((700..1200).contains(&count), "{count}");
 }
 
-/// Without a side there is no inside: only what is near the samples is on them.
+/// Without a side there is no inside: only what is near the samples is on them. The squares are tilted, so that
+/// their bounds hold all points.
 #[test]
 fn bare_clouds_and_open_meshes_have_no_inside() {
+    let tilted = |x: f32, z: f32| Vector::new(x, x, z);
     let square: Vec<Vector> = (0..400)
-        .map(|i| Vector::new((i % 20) as f32 - 9.5, 0.0, (i / 20) as f32 - 9.5) * 0.05)
+        .map(|i| {
+            tilted(
+                ((i % 20) as f32 - 9.5) * 0.05,
+                ((i / 20) as f32 - 9.5) * 0.05,
+            )
+        })
         .collect();
-    let bare = PointCloud::builder(&square)
-        .radius(0.04)
-        .build()
-        .expect("a square");
-    let bare = PointCloudShape::new(bare.into_owned());
-    let mesh = SharedShape::trimesh(
-        [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
-            .map(|[x, z]| Vector::new(x, 0.0, z))
-            .to_vec(),
-        vec![[0, 1, 2], [0, 2, 3]],
-    )
-    .expect("a mesh");
-    let seen = [0.005, -0.005, 0.2, -0.2].map(|y| Vector::new(0.1, y, 0.2));
+    let bare = PointCloud::builder(&square).radius(0.05).build();
+    let bare = PointCloudShape::new(bare.expect("a square").into_owned());
+    let corners = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]].map(|[x, z]| tilted(x, z));
+    let mesh = SharedShape::trimesh(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]);
+    let mesh = mesh.expect("a mesh");
+    let normal = Vector::new(-1.0, 1.0, 0.0).normalize();
+    let seen = [0.005, -0.005, 0.2, -0.2].map(|height| tilted(0.1, 0.2) + height * normal);
     for shape in [&bare as &dyn Shape, &*mesh] {
         let on = points_on(&seen, &[(Pose::IDENTITY, shape)], MARGIN);
         assert_eq!(on, [true, true, false, false]);

@@ -87,16 +87,7 @@ fn patches_of_part(part: &dyn Shape, pose: Pose) -> Result<Vec<Patch<'_>>, Sampl
         TypedShape::Voxels(s) => s.to_trimesh(),
         TypedShape::TriMesh(s) => (s.vertices().to_vec(), s.indices().to_vec()),
         TypedShape::Triangle(s) => (s.vertices().to_vec(), vec![[0, 1, 2]]),
-        TypedShape::HeightField(s) => {
-            let (vertices, faces) = s.to_trimesh();
-            let mut patches = flat(&vertices, &faces, pose, |_| 1.0)?;
-            for patch in &mut patches {
-                if let Kind::Flat { normal } = &mut patch.kind {
-                    *normal *= 1f32.copysign(normal.y);
-                }
-            }
-            return Ok(patches);
-        }
+        TypedShape::HeightField(s) => s.to_trimesh(),
         TypedShape::Ball(_)
         | TypedShape::Capsule(_)
         | TypedShape::Cylinder(_)
@@ -115,15 +106,14 @@ fn patches_of_part(part: &dyn Shape, pose: Pose) -> Result<Vec<Patch<'_>>, Sampl
             return Err(SampleError::NoSurface { shape });
         }
     };
-    flat(&vertices, &faces, pose, outside)
+    flat(&vertices, &faces, pose)
 }
 
-/// The faces of a mesh, with normals on the side that `outside` tells.
+/// The faces of a mesh, with normals on their [`outside`].
 fn flat<'a>(
     vertices: &[Vec3],
     faces: &[[u32; 3]],
     pose: Pose,
-    outside: impl Fn(&[[Vec3; 3]]) -> f64,
 ) -> Result<Vec<Patch<'a>>, SampleError> {
     let triangles: Vec<[Vec3; 3]> = (faces.iter())
         .map(|face| face.map(|i| vertices[i as usize]))
