@@ -6,7 +6,7 @@ use tldi_tests::{ClosedShape, measure_overlaps};
 /// than a splat. Without the rule of the least way out 16 of these 300 are.
 #[test]
 fn closed_clouds_are_not_told_the_width_of_an_overlap() {
-    let overlaps = measure_overlaps(&ClosedShape::analytic_shapes(), 300, 8, || ());
+    let overlaps = measure_overlaps(&ClosedShape::primitives(), 300, 8, || ());
     let (without, told): (Vec<_>, Vec<_>) = overlaps.iter().partition(|o| o.told.is_none());
     assert!(told.len() > 280, "{without:?}");
     let falsely_deep: Vec<_> = told.iter().filter(|o| o.is_falsely_deep()).collect();

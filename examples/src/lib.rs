@@ -6,6 +6,7 @@ pub mod cli;
 pub mod depth;
 pub mod devices;
 pub mod gallop;
+pub mod lidar;
 pub mod load;
 pub mod output;
 pub mod query;

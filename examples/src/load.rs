@@ -15,8 +15,8 @@ const PLAUSIBLE_BODY_SIZES: std::ops::RangeInclusive<f32> = 0.02..=1.0;
 /// Least extent of a body in mean radii of the scan: a smaller one would lie in the noise.
 const LEAST_BODY_RADII: f32 = 10.0;
 
-/// Loads a scan, `scale` metres a unit of the file: radii from neighbours, normals by principal
-/// component analysis, colours kept.
+/// Loads a scan, `scale` metres a unit of the file: colours, radii and normals of the file, else radii from
+/// neighbours and normals by principal component analysis.
 ///
 /// # Errors
 /// Those of reading the file and of building the cloud, with the path.
@@ -25,7 +25,10 @@ pub fn scan_from_file(path: &Path, scale: f32) -> anyhow::Result<PointCloud<'sta
         .with_context(|| format!("cannot read the scan {}", path.display()))?;
     if scale != 1.0 {
         raw.points.iter_mut().for_each(|point| *point *= scale);
-        raw.radii = None;
+        raw.radii
+            .iter_mut()
+            .flatten()
+            .for_each(|radius| *radius *= scale);
         raw.viewpoint = raw.viewpoint.map(|viewpoint| viewpoint * scale);
     }
     finish_scan(raw.into_builder())
@@ -42,7 +45,6 @@ pub fn scan_from_surface(surface: SampledSurface) -> Result<PointCloud<'static>,
 
 fn finish_scan(builder: CloudBuilder<'_>) -> Result<PointCloud<'static>, CloudError> {
     let cloud = builder
-        .knn_radii(7, 0.65)
         .pca_normals(SCAN_NORMAL_NEIGHBORS)
         .spatial_order()
         .build()?;
@@ -58,7 +60,6 @@ pub fn body_from_file(path: &Path) -> anyhow::Result<PointCloud<'static>> {
         .with_context(|| format!("cannot read the body {}", path.display()))?;
     let cloud = raw
         .into_builder()
-        .knn_radii(7, 0.65)
         .pca_normals(BODY_NORMAL_NEIGHBORS)
         .build()
         .with_context(|| format!("cannot use the body {}", path.display()))?;

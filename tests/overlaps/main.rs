@@ -25,7 +25,7 @@ struct Args {
 #[allow(clippy::print_stdout, reason = "the table is what the program is for")]
 fn main() -> anyhow::Result<()> {
     let args = Args::parse();
-    let mut shapes = ClosedShape::analytic_shapes();
+    let mut shapes = ClosedShape::primitives();
     shapes.extend(ClosedShape::models());
     let bar = ProgressBar::new(args.poses.into());
     bar.set_style(ProgressStyle::with_template("{bar:40} {pos}/{len} {eta}")?);

@@ -1,17 +1,14 @@
 //! Closed clouds that overlap at random, and how deep they are told to be beside the least way out.
 
-use crate::{
-    Samples, WayOut, compare_batch, data_file, deepest_contact, random_pose, random_unit,
-    sampled_box, sampled_sphere,
-};
-use rapier3d::parry::shape::Capsule;
+use crate::{WayOut, compare_batch, data_file, deepest_contact, random_pose, random_unit};
+use rapier3d::prelude::SharedShape;
+use rapier3d_tldi::sample_shape;
 use rayon::prelude::*;
 use serde::Serialize;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{PairQuery, Params, PointCloud, Surface, View};
-use tldi_sources::sample_mesh;
 
-/// Spacing of the samples of analytic shapes and their radius, metres. These are 15 to 40 radii wide.
+/// Spacing of the samples of primitives and their radius, metres. These are 15 to 40 radii wide.
 const R: f32 = 0.01;
 
 /// Largest extent of a model, metres.
@@ -36,31 +33,26 @@ pub struct ClosedShape {
 }
 
 impl ClosedShape {
-    fn analytic(name: &'static str, sampled: impl Fn(f32) -> Samples) -> Self {
-        let samples = sampled(R);
+    fn sampled(name: &'static str, shape: &SharedShape) -> Self {
+        let sampled = |spacing| sample_shape(&**shape, spacing).expect("the shape has a surface");
+        let cloud = sampled(R);
+        let points: Vec<Vec3> = cloud.points().collect();
+        let bare = (PointCloud::builder(points).radius(R).build()).expect("points of a cloud");
         let spacing = 0.5 * R;
         Self {
             name,
-            clouds: [samples.cloud(R), samples.bare_cloud(R)],
-            dense: sampled(spacing).points,
+            clouds: [cloud, bare],
+            dense: sampled(spacing).points().collect(),
             spacing,
         }
     }
 
     /// Sphere, box and capsule.
-    pub fn analytic_shapes() -> Vec<Self> {
-        let capsule = |spacing| {
-            let (points, faces) = Capsule::new_y(0.12, 0.08).to_trimesh(64, 32);
-            let sample = sample_mesh(&points, &faces, spacing, 3);
-            let (points, normals) = (sample.points, sample.normals);
-            Samples { points, normals }
-        };
-        let half = Vec3::new(0.15, 0.12, 0.18);
-        let cuboid = |spacing| sampled_box(half, spacing, &mut fastrand::Rng::with_seed(5));
+    pub fn primitives() -> Vec<Self> {
         vec![
-            Self::analytic("sphere", |spacing| sampled_sphere(0.2, spacing)),
-            Self::analytic("box", cuboid),
-            Self::analytic("capsule", capsule),
+            Self::sampled("sphere", &SharedShape::ball(0.2)),
+            Self::sampled("box", &SharedShape::cuboid(0.15, 0.12, 0.18)),
+            Self::sampled("capsule", &SharedShape::capsule_y(0.12, 0.08)),
         ]
     }
 
@@ -89,7 +81,10 @@ impl ClosedShape {
             .build())
         .expect("the test data is valid");
         let spacing = bare.mean_radius();
-        let dense = sample_mesh(&raw.points, &raw.faces, spacing, 1).points;
+        let mesh = SharedShape::trimesh(raw.points.clone(), raw.faces.clone())
+            .expect("the model has faces");
+        let dense = sample_shape(&*mesh, spacing).expect("a mesh has a surface");
+        let dense = dense.points().collect();
         let cloud =
             (raw.into_builder().knn_radii(7, 0.65).build()).expect("the test data is valid");
         Some(Self {

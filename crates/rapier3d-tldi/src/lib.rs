@@ -63,6 +63,7 @@ mod narrow_phase;
 pub mod prelude;
 mod shape;
 mod step;
+mod stream;
 
 pub use config::TldiConfig;
 pub use corrections::surface_motion::TldiHooks;
@@ -74,7 +75,13 @@ pub use shape::cloud_shape::PointCloudShape;
 pub use shape::collider::cloud_collider;
 pub use shape::exact::ExactShape;
 pub use shape::mass::{MassModel, unit_mass_properties};
+pub use shape::sampling::{SampleError, sample_shape};
 pub use step::pipeline::TldiPipeline;
 pub use step::report::{Contact, StepReport};
 pub use step::resolution::Resolution;
-pub use tldi::{self, CameraPolicy, CloudError, NonFinite, PointCloud, RayHit, RaySurface};
+pub use stream::cloud_stream::{CloudStream, StreamFrame};
+pub use stream::own_points::points_on;
+pub use tldi::{
+    self, CameraPolicy, CloudError, CloudRecipe, NonFinite, PointCloud, RadiusRule, RayHit,
+    RaySurface,
+};

@@ -1,7 +1,7 @@
 //! Everything a program with clouds in rapier names.
 
 pub use crate::{
-    Contact as CloudContact, MassModel, PointCloudShape, Resolution, StepReport, TldiConfig,
-    TldiError, TldiPipeline, cloud_collider,
+    CloudStream, Contact as CloudContact, MassModel, PointCloudShape, Resolution, StepReport,
+    TldiConfig, TldiError, TldiPipeline, cloud_collider,
 };
 pub use tldi::{CameraPolicy, CloudError, NonFinite, PointCloud, Variant};

@@ -221,7 +221,7 @@ fn projections_without_normals_go_to_the_nearest_point() {
 }
 
 #[test]
-fn new_points_move_everything_but_the_mass_and_leave_clones_alone() {
+fn moved_points_move_everything_but_the_mass_and_leave_clones_alone() {
     let mut shape = PointCloudShape::new(sphere(2000, true));
     let clone = shape.clone();
     assert_eq!(shape.revision(), clone.revision());
@@ -232,7 +232,7 @@ fn new_points_move_everything_but_the_mass_and_leave_clones_alone() {
     let radii: Vec<f32> = (0..2000).map(|i| shape.cloud().radius(i)).collect();
     let doubled: Vec<Vec3> = shape.cloud().points().map(|p| 2.0 * p).collect();
     let normals = shape.cloud().normals().unwrap().to_vec();
-    shape.set_points(&doubled, Some(&normals)).unwrap();
+    shape.move_points(&doubled, Some(&normals)).unwrap();
     assert_ne!(shape.revision(), clone.revision());
     assert!(shape.compute_local_aabb().maxs.x > 1.9);
     assert!(clone.compute_local_aabb().maxs.x < 1.2);
@@ -250,7 +250,7 @@ fn new_points_move_everything_but_the_mass_and_leave_clones_alone() {
     assert!((shape.cast_local_ray(&ray, 10.0, true).unwrap() - 3.0).abs() < 0.02);
     let aside = 5.0 * Vec3::X;
     let moved: Vec<Vec3> = doubled.iter().map(|p| aside + 0.75 * *p).collect();
-    shape.set_points(&moved, Some(&normals)).unwrap();
+    shape.move_points(&moved, Some(&normals)).unwrap();
     assert!(shape.revision() > before);
     // A neighbour's disc may stand out by radius² / 2R, here 0.3 mm.
     let ray = Ray::new(moved[0] + 2.0 * normals[0], -normals[0]);

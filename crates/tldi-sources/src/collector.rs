@@ -1,8 +1,8 @@
 //! Gathers points, whatever the format, into a [`RawCloud`].
 
-use crate::scalar::Scalar;
-use crate::slot::{Columns, Slot};
-use crate::{RawCloud, ReadOptions, SourceErrorKind};
+use crate::scalar::{Endian, Scalar};
+use crate::slot::{Column, Columns, Slot};
+use crate::{RawCloud, ReadOptions, SourceErrorKind, splat};
 use tldi::glamx::{DVec3, Vec3};
 
 /// Points seen before the origin is chosen.
@@ -32,13 +32,28 @@ pub(crate) struct Layout {
     pub(crate) normals: bool,
     pub(crate) colors: Option<ColorScale>,
     pub(crate) radii: bool,
+    /// If the points are splats, how they become points.
+    pub(crate) splats: Option<Splats>,
     /// Whether coordinates may not fit into `f32`.
     pub(crate) wide: bool,
 }
 
+/// How splats become points.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Splats {
+    /// Of what is less opaque no point is made.
+    least_opacity: f32,
+    /// Whether their colour is that of their harmonics.
+    color: bool,
+}
+
 impl Layout {
-    pub(crate) fn of(columns: &Columns) -> Self {
-        let colors = if columns.has_packed_color() {
+    pub(crate) fn of(columns: &Columns, options: &ReadOptions) -> Self {
+        let splats = columns.has_splat().then(|| Splats {
+            least_opacity: options.least_opacity,
+            color: columns.has_splat_color(),
+        });
+        let colors = if splats.is_some_and(|splats| splats.color) || columns.has_packed_color() {
             Some(ColorScale::Bytes)
         } else if !columns.has(Slot::Color(0)) {
             None
@@ -50,9 +65,10 @@ impl Layout {
             Some(ColorScale::Reals)
         };
         Self {
-            normals: columns.has_normal(),
+            normals: splats.is_some() || columns.has_normal(),
             colors,
-            radii: columns.has(Slot::Radius),
+            radii: splats.is_some() || columns.has(Slot::Radius),
+            splats,
             wide: columns.has_wide_position(),
         }
     }
@@ -66,6 +82,8 @@ pub(crate) struct Sample {
     /// Red, green, blue, alpha on the scale of the file; alpha NaN where there is none.
     pub(crate) color: [f32; 4],
     pub(crate) radius: f32,
+    /// Of a Gaussian splat, as in the file.
+    pub(crate) splat: [f32; splat::PARTS],
 }
 
 impl Sample {
@@ -74,7 +92,19 @@ impl Sample {
         normal: [0.0; 3],
         color: [0.0, 0.0, 0.0, f32::NAN],
         radius: 0.0,
+        splat: [0.0; splat::PARTS],
     };
+
+    /// Sets the column from its bytes.
+    #[inline]
+    pub(crate) fn decode(&mut self, column: &Column, bytes: &[u8], endian: Endian) {
+        if column.slot.is_packed() {
+            // Exact: 32 bits fit into f64.
+            self.set_packed(column.slot, Scalar::U32.decode(bytes, endian) as u32);
+        } else {
+            self.set(column.slot, column.scalar.decode(bytes, endian));
+        }
+    }
 
     /// Sets what `slot` stands for, for all but packed colours.
     #[inline]
@@ -84,6 +114,7 @@ impl Sample {
             Slot::Normal(axis) => self.normal[axis] = value as f32,
             Slot::Color(channel) => self.color[channel] = value as f32,
             Slot::Radius => self.radius = value as f32,
+            Slot::Splat(part) => self.splat[part] = value as f32,
             Slot::PackedRgb | Slot::PackedRgba => {}
         }
     }
@@ -118,6 +149,8 @@ pub(crate) struct Collector {
     normals: Option<Vec<Vec3>>,
     colors: Colors,
     radii: Option<Vec<f32>>,
+    splats: Option<Splats>,
+    left_out: u64,
     origin: DVec3,
     /// Positions kept back until the origin is chosen; `None` once it is.
     pending: Option<Vec<DVec3>>,
@@ -141,6 +174,8 @@ impl Collector {
                 },
             },
             radii: layout.radii.then(|| Vec::with_capacity(reserve)),
+            splats: layout.splats,
+            left_out: 0,
             origin: options.origin.unwrap_or(DVec3::ZERO),
             pending: (layout.wide && options.origin.is_none()).then(Vec::new),
         }
@@ -155,6 +190,13 @@ impl Collector {
     pub(crate) fn push(&mut self, sample: &Sample) -> Result<(), SourceErrorKind> {
         if self.count() >= self.max_points {
             return Err(too_many(self.max_points));
+        }
+        let mut sample = *sample;
+        if let Some(splats) = self.splats
+            && !splat::finish(&mut sample, splats.color, splats.least_opacity)
+        {
+            self.left_out += 1;
+            return Ok(());
         }
         let position = DVec3::from_array(sample.position);
         match &mut self.pending {
@@ -204,7 +246,10 @@ impl Collector {
     pub(crate) fn finish(mut self) -> Result<RawCloud, SourceErrorKind> {
         self.choose_origin();
         if self.points.is_empty() {
-            return Err(SourceErrorKind::NoPoints);
+            return Err(match self.left_out {
+                0 => SourceErrorKind::NoPoints,
+                count => SourceErrorKind::TooFaint { count },
+            });
         }
         let colors = match self.colors {
             Colors::None => None,
@@ -219,6 +264,8 @@ impl Collector {
             normals: self.normals,
             colors,
             radii: self.radii,
+            has_unsigned_normals: self.splats.is_some(),
+            left_out: self.left_out,
             faces: Vec::new(),
             origin: self.origin,
             viewpoint: None,

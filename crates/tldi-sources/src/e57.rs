@@ -43,6 +43,7 @@ fn read(
 
     let has_color = scans.iter().any(|s| color_ranges(s).is_some());
     let layout = Layout {
+        splats: None,
         normals: false,
         colors: has_color.then_some(ColorScale::Bytes),
         radii: false,

@@ -77,7 +77,7 @@ pub enum SourceErrorKind {
     Io(io::Error),
     /// Neither the content nor the file's extension tells the format.
     #[error(
-        "unknown format: name it .ply, .pcd, .xyz, .txt, .csv, .pts, .las, .laz or .e57 (each may be followed by .gz), or name the format in the call"
+        "unknown format: name it .ply, .pcd, .xyz, .txt, .csv, .pts, .bin, .las, .laz or .e57 (each may be followed by .gz), or name the format in the call"
     )]
     UnknownFormat,
     /// Support for this format was not compiled in.
@@ -155,6 +155,20 @@ pub enum SourceErrorKind {
         format: Format,
         /// Most bytes that are held in memory.
         limit: u64,
+    },
+    /// A message breaks the rules of its type.
+    #[error("bad PointCloud2: {reason}")]
+    Message {
+        /// Which rule.
+        reason: String,
+    },
+    /// There are Gaussian splats, but all are too faint, or have no extent.
+    #[error(
+        "none of the {count} splats is opaque enough to be a point: lower ReadOptions::least_opacity"
+    )]
+    TooFaint {
+        /// Number of splats.
+        count: u64,
     },
     /// The file is sound but has no points.
     #[error("there are no points in it: give a file with at least one")]

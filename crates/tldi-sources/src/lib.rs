@@ -3,7 +3,9 @@
 //! | format | extensions | read |
 //! |---|---|---|
 //! | PLY | `ply` | ascii, binary little and big endian; faces |
+//! | Gaussian splats | `ply` | as PLY, told by their properties; see below |
 //! | PCD | `pcd` | ascii, binary, binary_compressed |
+//! | KITTI | `bin` | x, y, z, intensity as little-endian `f32`, seen from the origin |
 //! | columns of text | `xyz`, `txt`, `csv`, `asc`, `pts` | see below |
 //! | LAS, LAZ | `las`, `laz` | feature `las` |
 //! | E57 | `e57` | feature `e57` |
@@ -22,8 +24,13 @@
 //! | 7 | x y z, one ignored, r g b (the PTS layout; a first line with nothing but the count is passed over) |
 //! | 9 | x y z r g b nx ny nz, or x y z nx ny nz r g b if only the last three are such whole numbers |
 //!
-//! Besides, [`depth`] has folders of depth frames, [`MovingPoints`] deforming meshes as NumPy arrays
-//! or folders of clouds, and [`sample_mesh`] even samples of a mesh's faces.
+//! PLY files of Gaussian splats have the properties `scale_0` to `scale_2` (logarithms of standard
+//! deviations), `rot_0` to `rot_3` (quaternion, w first), `opacity` (logit) and `f_dc_0` to `f_dc_2`. A
+//! splat of at least [`ReadOptions::least_opacity`] becomes a point: its radius is √(σ₁ σ₂) of its two
+//! longer axes, its normal the shortest one, of either sign, and its colour ½ + `f_dc` / (2 √π).
+//!
+//! Besides, [`PointCloud2`] reads messages of ROS, [`depth`] has folders of depth frames, and [`MovingPoints`] deforming meshes as NumPy arrays
+//! or folders of clouds.
 //!
 //! Any file may be packed with gzip (`.gz`), which is told by its content. Positions, normals, colours
 //! and radii are kept, whatever their order and type in the file; all else is skipped. Units are
@@ -47,24 +54,26 @@ mod e57;
 mod error;
 mod header;
 mod input;
+mod kitti;
 #[cfg(feature = "las")]
 mod las;
-mod mesh_sampling;
 mod moving;
 mod options;
 mod pcd;
 mod ply;
+mod point_cloud2;
 mod raw_cloud;
 mod read;
 mod scalar;
 #[cfg(any(feature = "las", feature = "e57"))]
 mod seekable;
 mod slot;
+mod splat;
 mod text;
 
 pub use error::{Position, SourceError, SourceErrorKind};
-pub use mesh_sampling::{MeshSample, sample_mesh};
 pub use moving::{MovingError, MovingPoints};
 pub use options::{Format, Progress, ReadOptions};
+pub use point_cloud2::{PointCloud2, PointField};
 pub use raw_cloud::RawCloud;
 pub use read::{read, read_from, read_with_progress};

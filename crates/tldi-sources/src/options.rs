@@ -12,6 +12,8 @@ pub enum Format {
     Ply,
     /// Point cloud data (PCL): ascii, binary, binary_compressed.
     Pcd,
+    /// Sweeps of KITTI's laser scanner: x, y, z, intensity.
+    Kitti,
     /// One point a line, in columns: XYZ, TXT, CSV, ASC, PTS.
     Text,
     /// ASPRS LAS and LAZ (feature `las`).
@@ -40,6 +42,7 @@ impl Format {
         match extension.to_str()? {
             "ply" => Some(Self::Ply),
             "pcd" => Some(Self::Pcd),
+            "bin" => Some(Self::Kitti),
             "xyz" | "txt" | "csv" | "asc" | "pts" | "xyzrgb" | "xyzn" => Some(Self::Text),
             "las" | "laz" => Some(Self::Las),
             "e57" => Some(Self::E57),
@@ -47,8 +50,8 @@ impl Format {
         }
     }
 
-    /// The format that the first bytes of an uncompressed file give away. Columns of text have no
-    /// mark of their own.
+    /// The format that the first bytes of an uncompressed file give away. Columns of text and KITTI's
+    /// sweeps have no mark of their own.
     ///
     /// ```
     /// use tldi_sources::Format;
@@ -81,6 +84,7 @@ impl fmt::Display for Format {
         f.write_str(match self {
             Self::Ply => "PLY",
             Self::Pcd => "PCD",
+            Self::Kitti => "KITTI",
             Self::Text => "XYZ/CSV",
             Self::Las => "LAS/LAZ",
             Self::E57 => "E57",
@@ -103,6 +107,10 @@ pub struct ReadOptions {
     /// file. `None`: chosen per file as [`RawCloud::origin`](crate::RawCloud::origin) tells. Give
     /// the same for several files whose clouds belong together.
     pub origin: Option<DVec3>,
+    /// Opacity, of 0 to 1, from which on a Gaussian splat is a point: 0.5, where it hides more than it lets
+    /// through. What is fainter is no surface; [`RawCloud::left_out`](crate::RawCloud::left_out)
+    /// counts it.
+    pub least_opacity: f32,
 }
 
 impl Default for ReadOptions {
@@ -110,6 +118,7 @@ impl Default for ReadOptions {
         Self {
             max_points: 100_000_000,
             origin: None,
+            least_opacity: 0.5,
         }
     }
 }

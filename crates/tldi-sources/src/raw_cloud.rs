@@ -22,6 +22,11 @@ pub struct RawCloud {
     pub colors: Option<Vec<[u8; 4]>>,
     /// Radius of the ball around each point, in units of the file.
     pub radii: Option<Vec<f32>>,
+    /// Whether the sign of the normals means nothing: those of Gaussian splats are their shortest axes.
+    pub has_unsigned_normals: bool,
+    /// Gaussian splats of which no point was made, since they are fainter than
+    /// [`ReadOptions::least_opacity`](crate::ReadOptions::least_opacity), or have no extent.
+    pub left_out: u64,
     /// Triangles: indices of points, all in range. Polygons are cut into fans.
     pub faces: Vec<[u32; 3]>,
     /// What was subtracted from the file's coordinates, in `f64`, before they were narrowed to
@@ -101,10 +106,15 @@ impl RawCloud {
                 .any(|n| n.is_finite() && n.length_squared() > 0.0)
         };
         let from_file = self.normals.take().filter(usable);
+        let is_unsigned = self.has_unsigned_normals && from_file.is_some();
         let normals = from_file.or_else(|| self.vertex_normals().filter(usable));
         let mut builder = PointCloud::builder(self.points);
         if let Some(normals) = normals {
-            builder = builder.normals(normals);
+            builder = if is_unsigned {
+                builder.unoriented_normals(normals)
+            } else {
+                builder.normals(normals)
+            };
         }
         if let Some(colors) = self.colors {
             builder = builder.colors(colors);
@@ -128,6 +138,8 @@ impl fmt::Debug for RawCloud {
             .field("normals", &self.normals.is_some())
             .field("colors", &self.colors.is_some())
             .field("radii", &self.radii.is_some())
+            .field("has_unsigned_normals", &self.has_unsigned_normals)
+            .field("left_out", &self.left_out)
             .field("faces", &self.faces.len())
             .field("origin", &self.origin)
             .field("viewpoint", &self.viewpoint)

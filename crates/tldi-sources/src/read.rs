@@ -116,6 +116,7 @@ fn dispatch(
     let cloud = match format {
         Format::Ply => crate::ply::parse(&mut input, options)?,
         Format::Pcd => crate::pcd::parse(&mut input, options)?,
+        Format::Kitti => crate::kitti::parse(&mut input, options)?,
         Format::Text => crate::text::parse(&mut input, options)?,
         #[cfg(feature = "las")]
         Format::Las => crate::las::parse(&mut input, path, options)?,

@@ -1,6 +1,7 @@
 //! What a named column or property of a file means.
 
 use crate::scalar::Scalar;
+use crate::splat;
 
 /// The value of a point that a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +18,8 @@ pub(crate) enum Slot {
     PackedRgba,
     /// Radius of the point's ball.
     Radius,
+    /// Part of a Gaussian splat.
+    Splat(usize),
 }
 
 impl Slot {
@@ -36,8 +39,13 @@ impl Slot {
             "rgb" => Self::PackedRgb,
             "rgba" => Self::PackedRgba,
             "radius" => Self::Radius,
-            _ => return None,
+            other => Self::Splat(splat::part_from_name(other)?),
         })
+    }
+
+    /// Whether it is a colour in one value.
+    pub(crate) fn is_packed(self) -> bool {
+        matches!(self, Self::PackedRgb | Self::PackedRgba)
     }
 }
 
@@ -57,7 +65,7 @@ pub(crate) struct Column {
 pub(crate) struct Columns(pub(crate) Vec<Column>);
 
 impl Columns {
-    /// The first column of each slot, without incomplete normals and colours.
+    /// The first column of each slot, without incomplete normals, colours and splats.
     pub(crate) fn new(all: impl IntoIterator<Item = Column>) -> Self {
         let mut kept: Vec<Column> = Vec::new();
         for column in all {
@@ -72,9 +80,20 @@ impl Columns {
         if !(0..3).all(|channel| columns.has(Slot::Color(channel))) {
             columns.0.retain(|c| !matches!(c.slot, Slot::Color(_)));
         } else {
-            let packed = |c: &Column| matches!(c.slot, Slot::PackedRgb | Slot::PackedRgba);
-            columns.0.retain(|c| !packed(c));
+            columns.0.retain(|c| !c.slot.is_packed());
         }
+        let has_all = |needed: bool| {
+            (0..splat::PARTS)
+                .filter(|part| splat::is_needed(*part) == needed)
+                .all(|part| columns.has(Slot::Splat(part)))
+        };
+        let (is_splat, has_color) = (has_all(true), has_all(false));
+        columns.0.retain(|c| match c.slot {
+            Slot::Splat(part) => is_splat && (splat::is_needed(part) || has_color),
+            // A splat's come from its axes; files have zeros there.
+            Slot::Normal(_) | Slot::Radius => !is_splat,
+            _ => true,
+        });
         columns
     }
 
@@ -89,6 +108,18 @@ impl Columns {
 
     pub(crate) fn has_normal(&self) -> bool {
         self.has(Slot::Normal(0))
+    }
+
+    /// Whether the points are Gaussian splats.
+    pub(crate) fn has_splat(&self) -> bool {
+        self.has(Slot::Splat(0))
+    }
+
+    /// Whether splats have a colour, and only one.
+    pub(crate) fn has_splat_color(&self) -> bool {
+        self.has(Slot::Splat(splat::PARTS - 1))
+            && !self.has(Slot::Color(0))
+            && !self.has_packed_color()
     }
 
     pub(crate) fn has_packed_color(&self) -> bool {

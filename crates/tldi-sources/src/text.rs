@@ -236,7 +236,7 @@ impl Table {
             width,
             named: true,
             triples: Vec::new(),
-            collector: Collector::new(Layout::of(&columns), 0, options),
+            collector: Collector::new(Layout::of(&columns, options), 0, options),
             columns,
             fields: Vec::new(),
         }
@@ -263,7 +263,7 @@ impl Table {
             width,
             named: false,
             triples,
-            collector: Collector::new(Layout::of(&columns), 0, options),
+            collector: Collector::new(Layout::of(&columns, options), 0, options),
             columns,
             fields: Vec::new(),
         })

@@ -17,6 +17,7 @@ pub use cloud::builder::{CloudBuilder, NonFinite, Positions};
 pub use cloud::error::CloudError;
 pub use cloud::knn::{KdTree, Neighbor};
 pub use cloud::point_cloud::{BLOCK, PointCloud, Radii};
+pub use cloud::recipe::{CloudRecipe, RadiusRule};
 pub use contact::bowl::Lowest;
 pub use contact::patch_types::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS};
 pub use contact::patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};

@@ -29,6 +29,7 @@ fn a_warm_cloud_allocates_nothing() {
         .build()
         .expect("valid");
     let mut ordered = PointCloud::builder(&whole)
+        .radius(0.1)
         .spatial_order()
         .build()
         .expect("valid");

@@ -9,7 +9,7 @@ use cloud_support::{
 use fastrand::Rng;
 use std::borrow::Cow;
 use tldi::glamx::Vec3;
-use tldi::{CloudError, NonFinite, PointCloud, Radii};
+use tldi::{CloudError, NonFinite, PointCloud, Radii, RadiusRule};
 
 #[test]
 fn new_points_replace_the_old_ones() {
@@ -214,4 +214,104 @@ fn failing_leaves_the_cloud_unchanged() {
             assert_eq!(state(&cloud), before);
         }
     }
+}
+
+/// A square grid in the plane y = 0.
+fn grid(n: i32, spacing: f32) -> Vec<Vec3> {
+    let point = |i: i32| Vec3::new((i % n) as f32, 0.0, (i / n) as f32) * spacing;
+    (0..n * n).map(point).collect()
+}
+
+/// Radii and normals that were asked for are made of other points, as many as there are: on a grid the fourth
+/// neighbour is a spacing away, and the viewpoint is above.
+#[test]
+fn what_was_asked_for_holds_for_new_points() {
+    let mut cloud = PointCloud::builder(grid(9, 1.0))
+        .knn_radii(4, 0.8)
+        .pca_normals(8)
+        .viewpoint(Vec3::new(1.0, 9.0, 1.0))
+        .noise(0.01)
+        .build()
+        .expect("valid");
+    for (n, spacing) in [(9, 1.0), (9, 0.5), (30, 0.25), (4, 2.0), (9, 1.0)] {
+        cloud.set_points(&grid(n, spacing), None).expect("valid");
+        let middle = (n / 2 * n + n / 2) as usize;
+        assert!((cloud.radius(middle) - 0.8 * spacing).abs() < 1e-6);
+        let radii = (0..cloud.len()).map(|i| cloud.radius(i));
+        assert_eq!(cloud.max_radius(), radii.clone().fold(0.0, f32::max));
+        let mean = radii.sum::<f32>() / cloud.len() as f32;
+        assert!((cloud.mean_radius() - mean).abs() < 1e-5 * mean);
+        let normals = cloud.normals().expect("asked for");
+        assert_eq!(normals.len(), (n * n) as usize);
+        assert!(normals.iter().all(|normal| normal.distance(Vec3::Y) < 1e-6));
+        assert!(cloud.normals_oriented());
+        assert_eq!(cloud.noise(), 0.01);
+        assert!(cloud.consists_of(&grid(n, spacing), None));
+    }
+    // Given normals count for their points only.
+    let down = vec![-Vec3::Y; 81];
+    cloud.set_points(&grid(9, 1.0), Some(&down)).expect("valid");
+    assert_eq!(cloud.normals(), Some(&down[..]));
+    assert!(!cloud.consists_of(&grid(9, 1.0), None));
+    cloud.set_points(&grid(9, 1.0), None).expect("valid");
+    assert!(cloud.normals().is_some_and(|normals| normals[0].y > 0.999));
+
+    // A global radius that is set takes the place of the neighbours'.
+    cloud.set_radii(Radii::Global(0.3)).expect("valid");
+    assert_eq!(cloud.recipe().radii, RadiusRule::Global(0.3));
+    cloud.set_points(&grid(5, 1.0), None).expect("valid");
+    assert_eq!(cloud.radii(), &Radii::Global(0.3));
+}
+
+/// Points that move keep their radii; without all of them they are new points.
+#[test]
+fn points_that_move_keep_radii_from_neighbours() {
+    let mut cloud = PointCloud::builder(grid(9, 1.0)).knn_radii(4, 0.8);
+    cloud = cloud.pca_normals(8).viewpoint(9.0 * Vec3::Y);
+    let mut cloud = cloud.build().expect("valid");
+    let radii = cloud.radii().clone();
+    cloud.move_points(&grid(9, 3.0), None).expect("valid");
+    assert_eq!(cloud.radii(), &radii);
+    assert!(cloud.normals_oriented());
+    let mut holed = grid(9, 3.0);
+    holed[0] = Vec3::NAN;
+    cloud.move_points(&holed, None).expect("valid");
+    assert_eq!(cloud.len(), 80);
+    assert!((cloud.radius(39) - 2.4).abs() < 1e-6);
+}
+
+/// One place has no spacing: the cloud stays as it was.
+#[test]
+fn points_without_a_spacing_are_refused() {
+    let mut cloud = PointCloud::builder(grid(9, 1.0)).build().expect("valid");
+    let before = state(&cloud);
+    let refused = cloud.set_points(&[Vec3::ONE; 5], None);
+    assert_eq!(refused, Err(CloudError::NoSpacing { count: 5 }));
+    assert_eq!(state(&cloud), before);
+}
+
+/// Normals of which the sign says nothing are turned to a viewpoint, and count for nothing without one.
+#[test]
+fn unoriented_normals_have_the_side_of_the_viewpoint() {
+    let normals: Vec<Vec3> = (0..81)
+        .map(|i| if i % 3 == 0 { 2.0 * Vec3::Y } else { -Vec3::Y })
+        .collect();
+    let builder = || PointCloud::builder(grid(9, 1.0)).unoriented_normals(&normals);
+    let bare = builder().build().expect("valid");
+    assert!(!bare.normals_oriented());
+    assert_eq!(
+        bare.normals().map(|n| [n[0], n[1]]),
+        Some([Vec3::Y, -Vec3::Y])
+    );
+    for side in [Vec3::Y, -Vec3::Y] {
+        let seen = builder().viewpoint(3.0 * side).build().expect("valid");
+        assert!(seen.normals_oriented());
+        assert!(
+            seen.normals()
+                .is_some_and(|normals| normals.iter().all(|n| *n == side))
+        );
+    }
+    let outward = PointCloud::builder(grid(9, 1.0)).normals(&normals);
+    let outward = outward.viewpoint(3.0 * Vec3::Y).build().expect("valid");
+    assert_eq!(outward.normals().map(|n| n[1]), Some(-Vec3::Y));
 }

@@ -2,13 +2,12 @@
 
 use super::description::Description;
 use super::kinematics::Kinematics;
-use crate::load;
-use crate::surface_sampling::SampledSurface;
 use anyhow::Context;
 use rapier3d::geometry::{Group, InteractionGroups, InteractionTestMode};
+use rapier3d::parry::shape::TriMesh;
+use rapier3d_tldi::sample_shape;
 use tldi::glamx::Pose3;
 use tldi::{KdTree, PointCloud};
-use tldi_sources::sample_mesh;
 
 /// The surface of one link.
 #[derive(Clone, Debug)]
@@ -58,12 +57,8 @@ impl Spacing {
 /// The clouds of the links that have a surface.
 ///
 /// # Errors
-/// Those of building a cloud, with the link.
-pub fn clouds_of_links(
-    robot: &Description,
-    spacing: Spacing,
-    seed: u64,
-) -> anyhow::Result<Vec<LinkCloud>> {
+/// Those of sampling its mesh, with the link.
+pub fn clouds_of_links(robot: &Description, spacing: Spacing) -> anyhow::Result<Vec<LinkCloud>> {
     let mut clouds = Vec::new();
     for (link, mesh) in robot.meshes.iter().enumerate() {
         if mesh.faces.is_empty() {
@@ -71,13 +66,9 @@ pub fn clouds_of_links(
         }
         let name = robot.urdf.links[link].name.clone();
         let distance = spacing.of(mesh.bounds().extents());
-        let sample = sample_mesh(&mesh.points, &mesh.faces, distance, seed ^ link as u64);
-        let surface = SampledSurface {
-            points: sample.points,
-            normals: sample.normals,
-            colors: Vec::new(),
-        };
-        let cloud = load::body_from_surface(surface)
+        let cloud = TriMesh::new(mesh.points.clone(), mesh.faces.clone())
+            .map_err(anyhow::Error::from)
+            .and_then(|mesh| Ok(sample_shape(&mesh, distance)?))
             .with_context(|| format!("link {name} cannot be made a cloud"))?;
         clouds.push(LinkCloud { link, name, cloud });
     }
@@ -154,6 +145,7 @@ pub(super) fn world_groups() -> InteractionGroups {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::load;
     use crate::robot::kinematics::{JointKind, JointModel};
     use crate::scene::BodyShape;
     use tldi::glamx::Vec3;

@@ -126,7 +126,7 @@ impl RobotSimulation {
             robot, up, seed, ..
         } = scene;
         let scan_radius = scene.scan.mean_radius();
-        let clouds = clouds_of_links(&robot, Spacing { scan_radius }, seed)?;
+        let clouds = clouds_of_links(&robot, Spacing { scan_radius })?;
         let build = Build::of(&robot.kinematics, &clouds, scene.base);
         let start = start_pose(&robot.kinematics, &build);
         let root_from_link = robot.kinematics.poses(&start);

@@ -129,8 +129,7 @@ impl PointCloudShape {
         self.content.revision
     }
 
-    /// Replaces the points, and the normals by those given (without any the cloud has none any
-    /// more), see [`PointCloud::set_points`]. On an error the shape is as it was.
+    /// Replaces the points, see [`PointCloud::set_points`]. On an error the shape is as it was.
     ///
     /// The mass properties stay those of the former points, once they were asked for: a body that
     /// deforms keeps its mass, and noise does not shake its centre. Call
@@ -144,15 +143,35 @@ impl PointCloudShape {
         points: &[Vec3],
         normals: Option<&[Vec3]>,
     ) -> Result<(), CloudError> {
+        self.change(|cloud| cloud.set_points(points, normals))
+    }
+
+    /// [`set_points`](Self::set_points) for a surface that deforms, see [`PointCloud::move_points`].
+    ///
+    /// # Errors
+    /// Those of `set_points`.
+    pub fn move_points(
+        &mut self,
+        points: &[Vec3],
+        normals: Option<&[Vec3]>,
+    ) -> Result<(), CloudError> {
+        self.change(|cloud| cloud.move_points(points, normals))
+    }
+
+    /// Changes the cloud, and forgets what was derived from it.
+    fn change(
+        &mut self,
+        change: impl FnOnce(&mut PointCloud<'static>) -> Result<(), CloudError>,
+    ) -> Result<(), CloudError> {
         if let Some(content) = Arc::get_mut(&mut self.content) {
-            content.cloud.set_points(points, normals)?;
+            change(&mut content.cloud)?;
             content.bvh.take();
             content.fitted_normals.take();
             content.least_radius.take();
             content.revision = next_revision();
         } else {
             let mut cloud = self.cloud().clone();
-            cloud.set_points(points, normals)?;
+            change(&mut cloud)?;
             let mut content = Content::new(cloud, self.mass_model());
             content.unit_mass = self.content.unit_mass.clone();
             self.content = Arc::new(content);
@@ -220,7 +239,7 @@ impl PointCloudShape {
     }
 
     /// Index of the point nearest to `point`; `None` if that is not finite.
-    fn nearest(&self, point: Vec3) -> Option<usize> {
+    pub(crate) fn nearest(&self, point: Vec3) -> Option<usize> {
         self.bvh()
             .find_best(
                 f32::MAX,

@@ -4,3 +4,4 @@ pub(crate) mod cloud_shape;
 pub(crate) mod collider;
 pub(crate) mod exact;
 pub(crate) mod mass;
+pub(crate) mod sampling;

@@ -48,6 +48,7 @@ fn read(
     let mut reader = Reader::new(source).map_err(|e| error(e, Position::Unknown))?;
 
     let layout = Layout {
+        splats: None,
         normals: false,
         colors: header
             .point_format()

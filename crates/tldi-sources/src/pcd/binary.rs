@@ -2,26 +2,13 @@
 //! that write it are.
 
 use super::header::Header;
-use super::{lzf, set};
+use super::lzf;
 use crate::collector::{Collector, Sample};
 use crate::error::Result;
 use crate::input::Input;
 use crate::scalar::{Endian, Scalar};
-use crate::slot::{Column, Columns};
+use crate::slot::Columns;
 use crate::{SourceError, SourceErrorKind};
-
-/// Sets the column from its bytes.
-#[inline]
-fn decode(sample: &mut Sample, column: &Column, bytes: &[u8]) {
-    let value = column.scalar.decode(bytes, Endian::Little);
-    let bits = if column.scalar.size() == 4 {
-        // Exact: 32 bits fit into f64.
-        Scalar::U32.decode(bytes, Endian::Little) as u32
-    } else {
-        0
-    };
-    set(sample, column, value, bits);
-}
 
 pub(super) fn read(
     input: &mut Input<'_>,
@@ -38,7 +25,7 @@ pub(super) fn read(
         for record in records.chunks_exact(size) {
             let mut sample = Sample::EMPTY;
             for column in &columns.0 {
-                decode(&mut sample, column, &record[column.place..]);
+                sample.decode(column, &record[column.place..], Endian::Little);
             }
             collector
                 .push(&sample)
@@ -84,7 +71,7 @@ pub(super) fn read_compressed(
         let mut sample = Sample::EMPTY;
         for column in &columns.0 {
             let start = column.place * points + index * column.scalar.size();
-            decode(&mut sample, column, &unpacked[start..]);
+            sample.decode(column, &unpacked[start..], Endian::Little);
         }
         collector
             .push(&sample)

@@ -58,7 +58,7 @@ impl Header {
         for field in &self.fields {
             if field.count == 1
                 && let Some(slot) = Slot::from_name(&field.name)
-                && (field.scalar.size() == 4 || !is_packed(slot))
+                && (field.scalar.size() == 4 || !slot.is_packed())
             {
                 // In text, a coordinate may have more digits than its type.
                 let is_wide_text =
@@ -84,10 +84,6 @@ impl Header {
     pub(super) fn record_size(&self) -> usize {
         self.fields.iter().map(Field::size).sum()
     }
-}
-
-fn is_packed(slot: Slot) -> bool {
-    matches!(slot, Slot::PackedRgb | Slot::PackedRgba)
 }
 
 /// The header so far.

@@ -12,7 +12,7 @@ mod lzf;
 use crate::collector::{Collector, Layout, Sample, check_count};
 use crate::error::Result;
 use crate::input::Input;
-use crate::slot::{Column, Slot};
+use crate::slot::Column;
 use crate::{Format, RawCloud, ReadOptions, SourceErrorKind};
 use header::{Encoding, Header};
 
@@ -26,7 +26,7 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
         }));
     }
     check_count(header.points, options).map_err(|kind| input.error_at_line(kind))?;
-    let mut collector = Collector::new(Layout::of(&columns), header.points, options);
+    let mut collector = Collector::new(Layout::of(&columns, options), header.points, options);
     match header.encoding {
         Encoding::Ascii => ascii::read(input, &header, &columns, &mut collector)?,
         Encoding::Binary => binary::read(input, &header, &columns, &mut collector)?,
@@ -44,8 +44,9 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
 /// Sets the value of one column; `bits` are the first four bytes of the value.
 #[inline]
 fn set(sample: &mut Sample, column: &Column, value: f64, bits: u32) {
-    match column.slot {
-        Slot::PackedRgb | Slot::PackedRgba => sample.set_packed(column.slot, bits),
-        slot => sample.set(slot, value),
+    if column.slot.is_packed() {
+        sample.set_packed(column.slot, bits);
+    } else {
+        sample.set(column.slot, value);
     }
 }

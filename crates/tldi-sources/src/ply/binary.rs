@@ -34,9 +34,7 @@ pub(super) fn columns(element: &Element) -> Columns {
 
 /// PLY has no packed colours: `rgb` means nothing there.
 pub(super) fn without_packed(columns: Vec<Column>) -> impl Iterator<Item = Column> {
-    columns
-        .into_iter()
-        .filter(|c| !matches!(c.slot, Slot::PackedRgb | Slot::PackedRgba))
+    columns.into_iter().filter(|c| !c.slot.is_packed())
 }
 
 /// Size of one record in bytes, unless it has lists.

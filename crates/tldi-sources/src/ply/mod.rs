@@ -4,7 +4,8 @@
 //! refuses `nan`, `.5` and `1.` in ascii files, reads lines of any length into memory, stores the
 //! lists it is told to ignore, and tells neither progress nor byte offsets.
 //!
-//! Read are the element `vertex` (see [`Slot`](crate::slot::Slot) for the names of properties) and
+//! Read are the element `vertex` (see [`Slot`](crate::slot::Slot) for the names of properties; with those of
+//! Gaussian splats, see [`splat`](crate::splat)) and
 //! the list `vertex_indices` or `vertex_index` of the element `face`; faces of fewer than three
 //! corners are left out. Other elements and properties, triangle strips among them, are passed
 //! over, but must be there.
@@ -44,7 +45,7 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
     }
     check_count(vertices.count, options).map_err(|kind| input.error_at_line(kind))?;
 
-    let mut collector = Collector::new(Layout::of(&columns), vertices.count, options);
+    let mut collector = Collector::new(Layout::of(&columns, options), vertices.count, options);
     let mut faces = Faces::new(vertices.count, options);
     for element in &header.elements {
         match header.encoding {

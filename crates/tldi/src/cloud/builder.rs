@@ -3,19 +3,15 @@
 use crate::cloud::gather::{Gathered, block_bounds, non_finite_indices, without};
 use crate::cloud::morton::{morton_order, permuted};
 use crate::cloud::point_cloud::{Spare, next_content_id};
-use crate::cloud::point_normals::{fill_from_nearest, normalize, pca_normals};
+use crate::cloud::point_normals::{fill_from_nearest, normalize, pca_normals, turn_towards};
 use crate::cloud::radii::{check_coordinates, check_radii, knn_radii, mean_and_max};
-use crate::{Aabb, CloudError, KdTree, PointCloud, Radii};
+use crate::{Aabb, CloudError, CloudRecipe, KdTree, PointCloud, Radii, RadiusRule};
 use glamx::Vec3;
 use std::borrow::Cow;
 use std::cell::LazyCell;
 
 /// Most points of a cloud: indices, and counts of up to 64 pixels for each point, fit 32 bits.
 const MAX_POINTS: usize = (u32::MAX / 64) as usize;
-
-/// The paper's spherical cover: 0.65 × the distance to the 7th nearest neighbour.
-const DEFAULT_NEIGHBORS: usize = 7;
-const DEFAULT_SCALE: f32 = 0.65;
 
 /// Where the positions of a cloud come from.
 ///
@@ -86,11 +82,12 @@ pub enum NonFinite {
     Refuse,
 }
 
-/// How the radii are found.
+/// Normals of the caller's.
 #[derive(Clone, Debug)]
-enum RadiusSource<'a> {
-    Given(Radii<'a>),
-    NearestNeighbors { k: usize, scale: f32 },
+struct GivenNormals<'a> {
+    normals: Cow<'a, [Vec3]>,
+    /// Whether their sign tells the outside.
+    outward: bool,
 }
 
 /// Builds a [`PointCloud`]: validates everything once, reading the positions once.
@@ -118,13 +115,10 @@ enum RadiusSource<'a> {
 #[derive(Clone, Debug)]
 pub struct CloudBuilder<'a> {
     positions: Positions<'a>,
-    radii: RadiusSource<'a>,
-    noise: f32,
-    normals: Option<Cow<'a, [Vec3]>>,
-    pca_neighbors: Option<usize>,
-    viewpoint: Option<Vec3>,
+    recipe: CloudRecipe,
+    radii: Option<Cow<'a, [f32]>>,
+    normals: Option<GivenNormals<'a>>,
     colors: Option<Cow<'a, [[u8; 4]]>>,
-    non_finite: NonFinite,
     spatial_order: bool,
 }
 
@@ -132,32 +126,35 @@ impl<'a> CloudBuilder<'a> {
     pub(crate) fn new(positions: Positions<'a>) -> Self {
         Self {
             positions,
-            radii: RadiusSource::NearestNeighbors {
-                k: DEFAULT_NEIGHBORS,
-                scale: DEFAULT_SCALE,
-            },
-            noise: 0.0,
+            recipe: CloudRecipe::default(),
+            radii: None,
             normals: None,
-            pca_neighbors: None,
-            viewpoint: None,
             colors: None,
-            non_finite: NonFinite::default(),
             spatial_order: false,
         }
+    }
+
+    /// All that [`radius`](Self::radius), [`knn_radii`](Self::knn_radii),
+    /// [`noise`](Self::noise), [`pca_normals`](Self::pca_normals), [`viewpoint`](Self::viewpoint)
+    /// and [`non_finite`](Self::non_finite) say, at once.
+    pub fn recipe(mut self, recipe: CloudRecipe) -> Self {
+        self.recipe = recipe;
+        self
     }
 
     /// One radius in metres for all points, 10⁻¹² to 10¹². The cheapest, and right for evenly
     /// sampled surfaces: at least 0.71 × the spacing of a square grid covers it. Of this,
     /// [`radii`](Self::radii) and [`knn_radii`](Self::knn_radii) the last call counts.
     pub fn radius(mut self, radius: f32) -> Self {
-        self.radii = RadiusSource::Given(Radii::Global(radius));
+        self.recipe.radii = RadiusRule::Global(radius);
+        self.radii = None;
         self
     }
 
     /// One radius in metres for each point given, as from a sensor's range model. Borrowed, unless
     /// points are dropped or reordered.
     pub fn radii(mut self, radii: impl Into<Cow<'a, [f32]>>) -> Self {
-        self.radii = RadiusSource::Given(Radii::PerPoint(radii.into()));
+        self.radii = Some(radii.into());
         self
     }
 
@@ -179,7 +176,8 @@ impl<'a> CloudBuilder<'a> {
     /// Fails with [`CloudError::BadParameter`] for `k` = 0 or a scale that is not positive and
     /// finite, with [`CloudError::NoSpacing`] if all points coincide.
     pub fn knn_radii(mut self, k: usize, scale: f32) -> Self {
-        self.radii = RadiusSource::NearestNeighbors { k, scale };
+        self.recipe.radii = RadiusRule::NearestNeighbors { k, scale };
+        self.radii = None;
         self
     }
 
@@ -191,7 +189,7 @@ impl<'a> CloudBuilder<'a> {
     /// `docs/benchmarks.md`). Fails with [`CloudError::BadParameter`] for a value that is negative or not
     /// finite.
     pub fn noise(mut self, sigma: f32) -> Self {
-        self.noise = sigma;
+        self.recipe.noise = sigma;
         self
     }
 
@@ -202,7 +200,31 @@ impl<'a> CloudBuilder<'a> {
     /// the nearest point with a usable one; if none is, the build fails with
     /// [`CloudError::NoUsableNormal`].
     pub fn normals(mut self, normals: impl Into<Cow<'a, [Vec3]>>) -> Self {
-        self.normals = Some(normals.into());
+        self.normals = Some(GivenNormals {
+            normals: normals.into(),
+            outward: true,
+        });
+        self
+    }
+
+    /// [`normals`](Self::normals) whose sign says nothing of the outside, such as the shortest axes of
+    /// splats. Of the two the last call counts. With a [`viewpoint`](Self::viewpoint) they are
+    /// turned to its side and count as oriented.
+    ///
+    /// ```
+    /// use tldi::{PointCloud, glamx::Vec3};
+    /// let seen = PointCloud::builder(vec![Vec3::ZERO, Vec3::X])
+    ///     .unoriented_normals(vec![Vec3::Y, -Vec3::Y])
+    ///     .viewpoint(Vec3::new(0.5, 3.0, 0.0))
+    ///     .build()?;
+    /// assert_eq!(seen.normals(), Some(&[Vec3::Y, Vec3::Y][..]));
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    pub fn unoriented_normals(mut self, normals: impl Into<Cow<'a, [Vec3]>>) -> Self {
+        self.normals = Some(GivenNormals {
+            normals: normals.into(),
+            outward: false,
+        });
         self
     }
 
@@ -214,15 +236,15 @@ impl<'a> CloudBuilder<'a> {
     /// Where no plane fits best, the normal is one of those that fit: across a line of points, or
     /// along z if all points coincide. Fails with [`CloudError::BadParameter`] for `k` < 2.
     pub fn pca_normals(mut self, k: usize) -> Self {
-        self.pca_neighbors = Some(k);
+        self.recipe.pca_neighbors = Some(k);
         self
     }
 
     /// Where the surface was seen from, in the cloud's frame: normals made by
-    /// [`pca_normals`](Self::pca_normals) point to its side, and count as oriented. Without effect
-    /// on given normals.
+    /// [`pca_normals`](Self::pca_normals), and [unoriented](Self::unoriented_normals) ones, point to
+    /// its side, and count as oriented. Without effect on [`normals`](Self::normals).
     pub fn viewpoint(mut self, point: Vec3) -> Self {
-        self.viewpoint = Some(point);
+        self.recipe.viewpoint = Some(point);
         self
     }
 
@@ -236,7 +258,7 @@ impl<'a> CloudBuilder<'a> {
     /// What to do with points that have a NaN or infinite coordinate; they are dropped by default.
     /// Also applies to [`PointCloud::set_points`].
     pub fn non_finite(mut self, policy: NonFinite) -> Self {
-        self.non_finite = policy;
+        self.recipe.non_finite = policy;
         self
     }
 
@@ -250,17 +272,17 @@ impl<'a> CloudBuilder<'a> {
 
     /// Validates and builds. See [`CloudError`] for what can be wrong.
     pub fn build(self) -> Result<PointCloud<'a>, CloudError> {
-        self.check_parameters()?;
+        self.recipe.check()?;
         let count = self.check_lengths()?;
         let (mut coordinates, mut blocks, dropped) = gather(self.positions);
-        check_dropped(self.non_finite, count, &dropped)?;
+        let recipe = self.recipe;
+        check_dropped(recipe.non_finite, count, &dropped)?;
         let mut radii = self.radii;
-        let mut normals = self.normals;
+        let outward = self.normals.as_ref().is_some_and(|given| given.outward);
+        let mut normals = self.normals.map(|given| given.normals);
         let mut colors = self.colors;
         if !dropped.is_empty() {
-            if let RadiusSource::Given(Radii::PerPoint(r)) = &mut radii {
-                *r = Cow::Owned(without(r, &dropped));
-            }
+            radii = radii.map(|r| Cow::Owned(without(&r, &dropped)));
             normals = normals.map(|n| Cow::Owned(without(&n, &dropped)));
             colors = colors.map(|c| Cow::Owned(without(&c, &dropped)));
         }
@@ -269,9 +291,7 @@ impl<'a> CloudBuilder<'a> {
         if self.spatial_order {
             let curve = morton_order(coordinates.each_ref().map(|c| &**c), merged(&blocks));
             coordinates = coordinates.map(|c| Cow::Owned(permuted(&c, &curve)));
-            if let RadiusSource::Given(Radii::PerPoint(r)) = &mut radii {
-                *r = Cow::Owned(permuted(r, &curve));
-            }
+            radii = radii.map(|r| Cow::Owned(permuted(&r, &curve)));
             normals = normals.map(|n| Cow::Owned(permuted(&n, &curve)));
             colors = colors.map(|c| Cow::Owned(permuted(&c, &curve)));
             blocks = block_bounds(coordinates.each_ref().map(|c| &**c));
@@ -287,20 +307,27 @@ impl<'a> CloudBuilder<'a> {
             index_before_drop(kept, &dropped)
         };
         let tree = LazyCell::new(|| KdTree::from_coordinates(axes));
-        let radii = match radii {
-            RadiusSource::Given(radii) => radii,
-            RadiusSource::NearestNeighbors { k, scale } => {
+        let radii_given = radii.is_some();
+        let radii = match (radii, recipe.radii) {
+            (Some(given), _) => Radii::PerPoint(given),
+            (None, RadiusRule::Global(radius)) => Radii::Global(radius),
+            (None, RadiusRule::NearestNeighbors { k, scale }) => {
                 Radii::PerPoint(Cow::Owned(knn_radii(&tree, k, scale)?))
             }
         };
         check_radii(&radii, given_index)?;
         check_coordinates(axes, bounds, &radii, given_index)?;
 
-        let normals_oriented = normals.is_some() || self.viewpoint.is_some();
-        let normals = match (normals, self.pca_neighbors) {
-            (Some(given), _) => Some(usable_normals(given, axes)?),
-            (None, Some(k)) => Some(Cow::Owned(pca_normals(&tree, k, self.viewpoint))),
-            (None, None) => None,
+        let normals_given = normals.is_some();
+        let normals = match (normals, recipe.pca_neighbors, recipe.viewpoint) {
+            (Some(given), _, Some(viewpoint)) if !outward => {
+                let mut normals = usable_normals(given, axes)?.into_owned();
+                turn_towards(viewpoint, axes, &mut normals);
+                Some(Cow::Owned(normals))
+            }
+            (Some(given), _, _) => Some(usable_normals(given, axes)?),
+            (None, Some(k), viewpoint) => Some(Cow::Owned(pca_normals(&tree, k, viewpoint))),
+            (None, None, _) => None,
         };
         drop(tree);
 
@@ -311,57 +338,21 @@ impl<'a> CloudBuilder<'a> {
             y,
             z,
             radii,
-            normals_oriented: normals_oriented && normals.is_some(),
+            radii_given,
+            normals_oriented: normals.is_some() && (outward || recipe.viewpoint.is_some()),
+            normals_given,
             normals,
             colors,
             bounds,
             blocks,
             mean_radius,
             max_radius,
-            noise: self.noise,
             dropped: dropped.len(),
-            non_finite: self.non_finite,
+            recipe,
             order,
             content: next_content_id(),
             spare: Spare::default(),
         })
-    }
-
-    /// Checks what does not depend on the points.
-    fn check_parameters(&self) -> Result<(), CloudError> {
-        let bad = |parameter, value, expected| {
-            Err(CloudError::BadParameter {
-                parameter,
-                value,
-                expected,
-            })
-        };
-        if let RadiusSource::NearestNeighbors { k, scale } = self.radii {
-            if k == 0 {
-                return bad("knn_radii: k", 0.0, "at least one neighbour is needed");
-            }
-            if !(scale.is_finite() && scale > 0.0) {
-                return bad(
-                    "knn_radii: scale",
-                    scale,
-                    "it must be finite and greater than zero",
-                );
-            }
-        }
-        if !(self.noise.is_finite() && self.noise >= 0.0) {
-            let expected = "it is a standard deviation in metres: finite and not negative";
-            return bad("noise", self.noise, expected);
-        }
-        if let Some(k) = self.pca_neighbors.filter(|k| *k < 2) {
-            let expected = "a plane needs at least two neighbours";
-            return bad("pca_normals: k", k as f32, expected);
-        }
-        if let Some(viewpoint) = self.viewpoint
-            && let Some(value) = viewpoint.to_array().into_iter().find(|v| !v.is_finite())
-        {
-            return bad("viewpoint", value, "its coordinates must be finite");
-        }
-        Ok(())
     }
 
     /// Number of points given, if it is within the limit and all attributes have as many entries.
@@ -373,11 +364,11 @@ impl<'a> CloudBuilder<'a> {
         check_count(count)?;
         check_length("y", y, count)?;
         check_length("z", z, count)?;
-        if let RadiusSource::Given(Radii::PerPoint(radii)) = &self.radii {
+        if let Some(radii) = &self.radii {
             check_length("radii", radii.len(), count)?;
         }
-        if let Some(normals) = &self.normals {
-            check_length("normals", normals.len(), count)?;
+        if let Some(given) = &self.normals {
+            check_length("normals", given.normals.len(), count)?;
         }
         if let Some(colors) = &self.colors {
             check_length("colors", colors.len(), count)?;

@@ -9,3 +9,4 @@ pub(crate) mod point_cloud;
 pub(crate) mod point_normals;
 pub(crate) mod radii;
 pub(crate) mod reach;
+pub(crate) mod recipe;

@@ -3,11 +3,12 @@
 use crate::cloud::builder::{check_count, check_dropped, check_length, merged};
 use crate::cloud::gather::{Gathered, extend_without};
 use crate::cloud::morton::permuted;
-use crate::cloud::point_normals::{fill_from_nearest, normalize};
-use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
-use crate::{Aabb, CloudBuilder, CloudError, NonFinite, Positions};
+use crate::cloud::point_normals::{fill_from_nearest, normalize, pca_normals};
+use crate::cloud::radii::{check_coordinates, check_radii, knn_radii, mean_and_max};
+use crate::{Aabb, CloudBuilder, CloudError, CloudRecipe, KdTree, Positions, RadiusRule};
 use glamx::Vec3;
 use std::borrow::Cow;
+use std::cell::LazyCell;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Points per block: [`PointCloud::blocks`] bounds that many consecutive points each.
@@ -43,16 +44,19 @@ pub struct PointCloud<'a> {
     pub(crate) y: Cow<'a, [f32]>,
     pub(crate) z: Cow<'a, [f32]>,
     pub(crate) radii: Radii<'a>,
+    /// Whether the caller gave a radius for each point.
+    pub(crate) radii_given: bool,
     pub(crate) normals: Option<Cow<'a, [Vec3]>>,
     pub(crate) normals_oriented: bool,
+    /// Whether they are the caller's.
+    pub(crate) normals_given: bool,
     pub(crate) colors: Option<Cow<'a, [[u8; 4]]>>,
     pub(crate) bounds: Aabb,
     pub(crate) blocks: Vec<Aabb>,
     pub(crate) mean_radius: f32,
     pub(crate) max_radius: f32,
-    pub(crate) noise: f32,
     pub(crate) dropped: usize,
-    pub(crate) non_finite: NonFinite,
+    pub(crate) recipe: CloudRecipe,
     pub(crate) order: Option<Vec<u32>>,
     pub(crate) content: u64,
     pub(crate) spare: Spare,
@@ -144,7 +148,12 @@ impl<'a> PointCloud<'a> {
     /// Standard deviation of the points along the surface's normal in metres, as
     /// [told](CloudBuilder::noise); 0 where it was not.
     pub fn noise(&self) -> f32 {
-        self.noise
+        self.recipe.noise
+    }
+
+    /// What is made of new points ([`set_points`](Self::set_points)).
+    pub fn recipe(&self) -> &CloudRecipe {
+        &self.recipe
     }
 
     /// Unit normals, one for each point, where given or computed.
@@ -207,7 +216,7 @@ impl<'a> PointCloud<'a> {
     pub fn consists_of(&self, points: &[Vec3], normals: Option<&[Vec3]>) -> bool {
         let given = |i: usize| self.order.as_ref().map_or(i, |order| order[i] as usize);
         let same_normals = match (self.normals(), normals) {
-            (None, None) => true,
+            (_, None) => !self.normals_given,
             (Some(own), Some(new)) => {
                 new.len() == own.len() && (0..own.len()).all(|i| own[i] == new[given(i)])
             }
@@ -219,20 +228,24 @@ impl<'a> PointCloud<'a> {
             && same_normals
     }
 
-    /// Replaces all points, as a deforming or streaming cloud does in every frame.
+    /// Replaces all points, as a streaming cloud does in every frame: with what the builder was told to
+    /// make of points (its [recipe](CloudRecipe)).
     ///
-    /// - A global radius is kept. So are radii and colours for each point, if as many points as the
-    ///   cloud has are given, all finite: they are taken to be the same points, moved. Otherwise
-    ///   colours are removed, and radii for each point are an error
-    ///   ([`CloudError::LengthMismatch`]): [set](Self::set_radii) a global radius first, or build
-    ///   another cloud.
+    /// - A global radius is kept; radii from neighbours are made anew. Radii given for each point are
+    ///   kept if as many points as the cloud has are given, all finite: they are taken to be the
+    ///   same points, moved. Otherwise they are an error ([`CloudError::LengthMismatch`]):
+    ///   [set](Self::set_radii) a global radius first, or build another cloud. Colours are kept under the
+    ///   same condition, else removed.
     /// - Normals are replaced by those given, which must be outward (see
-    ///   [`CloudBuilder::normals`]), or removed: the former ones would be wrong.
+    ///   [`CloudBuilder::normals`]). Without any they are estimated as
+    ///   [`CloudBuilder::pca_normals`] and [`viewpoint`](CloudBuilder::viewpoint) told the builder, or
+    ///   removed where it was not told: the former ones would be wrong.
     /// - A cloud built with [`CloudBuilder::spatial_order`] takes the points in the order in which
     ///   they were given to the builder and puts them into its own; if the number changes, or some
     ///   are dropped, it keeps them as they come and [`order`](Self::order) becomes `None`.
     ///
-    /// On an error the cloud is unchanged. Cost: one pass over the points. Memory is reused: after
+    /// On an error the cloud is unchanged. Cost: one pass over the points, and what radii and normals
+    /// from neighbours cost. Without these memory is reused: after
     /// two calls with as many points nothing is allocated, unless normals must be replaced.
     ///
     /// ```
@@ -248,6 +261,40 @@ impl<'a> PointCloud<'a> {
         &mut self,
         points: &[Vec3],
         normals: Option<&[Vec3]>,
+    ) -> Result<(), CloudError> {
+        self.replace(points, normals, false)
+    }
+
+    /// [`set_points`](Self::set_points) for a surface that deforms: the same points, elsewhere. Radii from
+    /// neighbours stay as well, where all points are there and finite, which saves their cost.
+    ///
+    /// ```
+    /// use tldi::{PointCloud, glamx::Vec3};
+    /// let points = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    /// let mut cloud = PointCloud::builder(&points[..]).knn_radii(1, 0.5).build()?.into_owned();
+    /// cloud.move_points(&points.map(|p| 3.0 * p), None)?;
+    /// assert_eq!(cloud.mean_radius(), 0.5);
+    /// cloud.set_points(&points.map(|p| 3.0 * p), None)?;
+    /// assert_eq!(cloud.mean_radius(), 1.5);
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Those of `set_points`.
+    pub fn move_points(
+        &mut self,
+        points: &[Vec3],
+        normals: Option<&[Vec3]>,
+    ) -> Result<(), CloudError> {
+        self.replace(points, normals, true)
+    }
+
+    /// `moved`: they are the same points.
+    fn replace(
+        &mut self,
+        points: &[Vec3],
+        normals: Option<&[Vec3]>,
+        moved: bool,
     ) -> Result<(), CloudError> {
         check_count(points.len())?;
         if let Some(normals) = normals {
@@ -268,19 +315,26 @@ impl<'a> PointCloud<'a> {
         if order.is_none() {
             gathered.refill(points, None);
         }
-        check_dropped(self.non_finite, points.len(), &gathered.dropped)?;
+        check_dropped(self.recipe.non_finite, points.len(), &gathered.dropped)?;
         let same_points = points.len() == self.x.len() && gathered.dropped.is_empty();
-        if let Radii::PerPoint(radii) = &self.radii
-            && !same_points
-        {
-            let kept = points.len() - gathered.dropped.len();
-            let same_count = points.len() == radii.len();
-            let expected = if same_count { kept } else { points.len() };
-            check_length("radii", radii.len(), expected)?;
-        }
         let bounds = merged(&gathered.blocks);
         let coordinates = [&*gathered.x, &*gathered.y, &*gathered.z];
-        check_coordinates(coordinates, bounds, &self.radii, |i| {
+        let tree = LazyCell::new(|| KdTree::from_coordinates(coordinates));
+        let new_radii = match (&self.radii, self.recipe.radii) {
+            (Radii::PerPoint(_), _) if same_points && (moved || self.radii_given) => None,
+            (Radii::PerPoint(radii), _) if self.radii_given => {
+                let kept = points.len() - gathered.dropped.len();
+                let same_count = points.len() == radii.len();
+                let expected = if same_count { kept } else { points.len() };
+                return check_length("radii", radii.len(), expected);
+            }
+            (Radii::PerPoint(_), RadiusRule::NearestNeighbors { k, scale }) => {
+                Some(Radii::PerPoint(Cow::Owned(knn_radii(&tree, k, scale)?)))
+            }
+            (_, _) => None,
+        };
+        let radii = new_radii.as_ref().unwrap_or(&self.radii);
+        check_coordinates(coordinates, bounds, radii, |i| {
             order.map_or(i, |order| order[i] as usize)
         })?;
         if let Some(normals) = normals {
@@ -292,7 +346,10 @@ impl<'a> PointCloud<'a> {
             if !normalize(new_normals) {
                 fill_from_nearest(new_normals, coordinates)?;
             }
+        } else if let Some(k) = self.recipe.pca_neighbors {
+            *new_normals = pca_normals(&tree, k, self.recipe.viewpoint);
         }
+        drop(tree);
 
         // Nothing fails from here on.
         if order.is_none() {
@@ -302,16 +359,25 @@ impl<'a> PointCloud<'a> {
         swap(&mut self.y, &mut gathered.y);
         swap(&mut self.z, &mut gathered.z);
         std::mem::swap(&mut self.blocks, &mut gathered.blocks);
-        match (&mut self.normals, normals) {
-            (Some(current), Some(_)) => swap(current, new_normals),
-            (current @ None, Some(_)) => *current = Some(Cow::Owned(std::mem::take(new_normals))),
-            (current, None) => {
+        let estimated = normals.is_none() && self.recipe.pca_neighbors.is_some();
+        match &mut self.normals {
+            Some(current) if normals.is_some() || estimated => swap(current, new_normals),
+            current @ None if normals.is_some() || estimated => {
+                *current = Some(Cow::Owned(std::mem::take(new_normals)));
+            }
+            current => {
                 if let Some(Cow::Owned(unused)) = current.take() {
                     *new_normals = unused;
                 }
             }
         }
-        self.normals_oriented = normals.is_some();
+        self.normals_given = normals.is_some();
+        self.normals_oriented =
+            self.normals_given || (estimated && self.recipe.viewpoint.is_some());
+        if let Some(radii) = new_radii {
+            (self.mean_radius, self.max_radius) = mean_and_max(&radii);
+            self.radii = radii;
+        }
         self.colors.take_if(|_| !same_points);
         self.bounds = bounds;
         self.dropped = gathered.dropped.len();
@@ -320,8 +386,8 @@ impl<'a> PointCloud<'a> {
     }
 
     /// Replaces the radii; those for each point come in the order in which
-    /// [`set_points`](Self::set_points) takes the points, without dropped ones. On an error the
-    /// cloud is unchanged.
+    /// [`set_points`](Self::set_points) takes the points, without dropped ones. A global radius is
+    /// that of new points, too. On an error the cloud is unchanged.
     pub fn set_radii(&mut self, radii: Radii<'a>) -> Result<(), CloudError> {
         let mut radii = radii;
         if let Radii::PerPoint(radii) = &mut radii {
@@ -334,6 +400,10 @@ impl<'a> PointCloud<'a> {
         check_radii(&radii, given_index)?;
         check_coordinates(self.coordinates(), self.bounds, &radii, given_index)?;
         (self.mean_radius, self.max_radius) = mean_and_max(&radii);
+        self.radii_given = matches!(radii, Radii::PerPoint(_));
+        if let Radii::Global(radius) = radii {
+            self.recipe.radii = RadiusRule::Global(radius);
+        }
         self.radii = radii;
         self.content = next_content_id();
         Ok(())
@@ -349,16 +419,17 @@ impl<'a> PointCloud<'a> {
                 Radii::Global(r) => Radii::Global(r),
                 Radii::PerPoint(r) => Radii::PerPoint(Cow::Owned(r.into_owned())),
             },
+            radii_given: self.radii_given,
             normals: self.normals.map(|n| Cow::Owned(n.into_owned())),
             normals_oriented: self.normals_oriented,
+            normals_given: self.normals_given,
             colors: self.colors.map(|c| Cow::Owned(c.into_owned())),
             bounds: self.bounds,
             blocks: self.blocks,
             mean_radius: self.mean_radius,
             max_radius: self.max_radius,
-            noise: self.noise,
             dropped: self.dropped,
-            non_finite: self.non_finite,
+            recipe: self.recipe,
             order: self.order,
             content: self.content,
             spare: self.spare,

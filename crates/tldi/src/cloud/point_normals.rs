@@ -80,6 +80,16 @@ pub(crate) fn normalize(normals: &mut [Vec3]) -> bool {
     usable
 }
 
+/// Turns the normals of the points at `coordinates` to the side of `viewpoint`.
+pub(crate) fn turn_towards(viewpoint: Vec3, coordinates: [&[f32]; 3], normals: &mut [Vec3]) {
+    let [x, y, z] = coordinates;
+    for (i, normal) in normals.iter_mut().enumerate() {
+        if (viewpoint - Vec3::new(x[i], y[i], z[i])).dot(*normal) < 0.0 {
+            *normal = -*normal;
+        }
+    }
+}
+
 /// Replaces the zero normals by that of the nearest point which has one.
 pub(crate) fn fill_from_nearest(
     normals: &mut [Vec3],

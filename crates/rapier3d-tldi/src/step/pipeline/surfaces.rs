@@ -10,8 +10,9 @@ use tldi::{CloudError, PointCloud};
 impl TldiPipeline {
     /// Replaces the points and, where given, the normals (one for each point) of a cloud's
     /// collider, and tells rapier, which wakes the body and what it touches; see
-    /// [`PointCloud::set_points`] for the radii. The mass of a body whose collider has a density is
-    /// computed anew.
+    /// [`PointCloud::set_points`] for radii, and normals that are not given. The mass of a body whose
+    /// collider has a density is computed anew. For the frames of a sensor there is
+    /// [`CloudStream`](crate::CloudStream).
     ///
     /// Called with other points in every step, it keeps what touches the collider awake for ever;
     /// with the points that the cloud has it does nothing. Bodies that share the points keep the
@@ -41,15 +42,27 @@ impl TldiPipeline {
         points: &[Vector],
         normals: Option<&[Vector]>,
     ) -> Result<(), TldiError> {
+        self.replace_points(colliders, collider, points, normals, |shape| {
+            shape.set_points(points, normals)
+        })
+    }
+
+    /// Lets `change` give the collider these points and normals, unless it has them.
+    fn replace_points(
+        &mut self,
+        colliders: &mut ColliderSet,
+        collider: ColliderHandle,
+        points: &[Vector],
+        normals: Option<&[Vector]>,
+        change: impl FnOnce(&mut PointCloudShape) -> Result<(), CloudError>,
+    ) -> Result<(), TldiError> {
         let shape = cloud_of(colliders, collider)?;
         if shape.cloud().consists_of(points, normals) {
             self.motions.forget(collider);
             return Ok(());
         }
         let before = self.motions.snapshot(shape.cloud());
-        self.change_shape(colliders, collider, |shape| {
-            shape.set_points(points, normals)
-        })?;
+        self.change_shape(colliders, collider, change)?;
         self.motions.record_sampled(collider, before);
         Ok(())
     }
@@ -179,7 +192,9 @@ impl TldiPipeline {
                 found: points.len(),
             });
         }
-        self.set_collider_points(colliders, collider, points, normals)?;
+        self.replace_points(colliders, collider, points, normals, |shape| {
+            shape.move_points(points, normals)
+        })?;
         let after = cloud_of(colliders, collider)?.clone();
         // Without a time there is no velocity, and dropped points leave none to compare with.
         if dt > 0.0 && after.cloud().len() == before.len() {

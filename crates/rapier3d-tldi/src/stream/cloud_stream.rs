@@ -1,0 +1,267 @@
+//! The frames of a sensor as a collider.
+
+use crate::{PointCloudShape, TldiError, TldiPipeline, cloud_collider, points_on};
+use rapier3d::geometry::{ColliderHandle, ColliderSet};
+use rapier3d::math::{Pose, Vector};
+use rapier3d::parry::shape::Shape;
+use tldi::{CloudError, CloudRecipe, PointCloud};
+
+/// Radius in metres of the point that stands for no points in a collider that is disabled.
+const STAND_IN_RADIUS: f32 = 1.0;
+
+/// A collider that a sensor fills with new points in every frame, as many as it sees: 300,000, or none.
+///
+/// The [recipe](CloudRecipe) says once how radii and normals are found. Normals, found or given, are turned to
+/// where the sensor was in the frame. A frame without points disables the collider: there are no
+/// contacts, what rested on it wakes, and no point is kept.
+///
+/// The collider has no body and is at the origin of the world. It may be moved, to a place near the sensor
+/// where coordinates are large (see [`CloudError::CoordinateTooLarge`]); its friction and
+/// groups are set as those of any other.
+///
+/// ```
+/// use rapier3d::prelude::*;
+/// use rapier3d_tldi::{CloudRecipe, CloudStream, prelude::*};
+/// let mut world = PhysicsWorld::default();
+/// let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// tldi.attach(&mut world);
+/// let recipe = CloudRecipe { pca_neighbors: Some(8), ..CloudRecipe::default() };
+/// let mut stream = CloudStream::new(&mut world.colliders, recipe)?;
+/// world.colliders[stream.collider()].set_friction(0.8);
+///
+/// let ball = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.15);
+/// let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.1));
+/// let world_from_sensor = Pose::from_translation(Vector::Y * 2.0); // it looks down
+/// for frame in 0..30 {
+///     let n = 15 + frame % 3; // points a row: another number in every frame
+///     let seen: Vec<Vector> = (0..n * n)
+///         .map(|i| Vector::new((i % n) as f32 / n as f32 - 0.5, -2.0, (i / n) as f32 / n as f32 - 0.5))
+///         .collect();
+///     let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, None, &world_from_sensor)?;
+///     assert_eq!(taken.points, seen.len());
+///     tldi.step(&mut world)?;
+/// }
+/// assert!((world.bodies[ball].translation().y - 0.1).abs() < 0.02);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct CloudStream {
+    recipe: CloudRecipe,
+    collider: ColliderHandle,
+    own: Vec<ColliderHandle>,
+    own_margin: f32,
+    /// Of the frame, in the frame of the collider; kept for their memory.
+    points: Vec<Vector>,
+    normals: Vec<Vector>,
+    last_radius: Option<f32>,
+}
+
+/// What became of the points of a frame. Together they are those given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StreamFrame {
+    /// Points of the collider.
+    pub points: usize,
+    /// Points that were dropped since they are not finite.
+    pub dropped: usize,
+    /// Points that were left out since they are on [what carries the sensor](CloudStream::without).
+    pub own: usize,
+}
+
+impl CloudStream {
+    /// A stream whose collider is among `colliders`, disabled until the first frame.
+    ///
+    /// # Errors
+    /// [`CloudError::BadParameter`] for a recipe that cannot be followed.
+    pub fn new(colliders: &mut ColliderSet, recipe: CloudRecipe) -> Result<Self, CloudError> {
+        recipe.check()?;
+        let collider = cloud_collider(stand_in()?).enabled(false);
+        Ok(Self {
+            recipe,
+            collider: colliders.insert(collider),
+            own: Vec::new(),
+            own_margin: 0.0,
+            points: Vec::new(),
+            normals: Vec::new(),
+            last_radius: None,
+        })
+    }
+
+    /// Leaves out points on these colliders, where they are when a frame is taken: the links of the robot that
+    /// carries the sensor. `margin` is in metres, see [`points_on`].
+    pub fn without(mut self, own: impl IntoIterator<Item = ColliderHandle>, margin: f32) -> Self {
+        self.own = own.into_iter().collect();
+        self.own_margin = margin;
+        self
+    }
+
+    /// The collider; the same one in all frames.
+    pub fn collider(&self) -> ColliderHandle {
+        self.collider
+    }
+
+    /// Replaces the points by those of a frame, in the frame of the sensor, in metres; call it before
+    /// the step. Normals, where given, are one for each point, in the same frame; of which sign does not
+    /// matter.
+    ///
+    /// Where all points are in one place and neighbours tell no radius, it is the mean one of
+    /// the frame before.
+    ///
+    /// Cost: a pass over the points, and what the recipe asks for. Radii and normals from neighbours take a tree
+    /// over all points: give a global radius, and no normals, where time is short. What the step
+    /// models of it is estimated there anyway, but does not know its side.
+    ///
+    /// # Errors
+    /// [`TldiError::Cloud`] where the points are refused, or the pose is not finite;
+    /// [`TldiError::NoSuchCollider`] if the collider, or one of those [without](Self::without) which
+    /// the frame is taken, was removed. The collider then keeps the points of the frame before.
+    pub fn frame(
+        &mut self,
+        tldi: &mut TldiPipeline,
+        colliders: &mut ColliderSet,
+        points: &[Vector],
+        normals: Option<&[Vector]>,
+        world_from_sensor: &Pose,
+    ) -> Result<StreamFrame, TldiError> {
+        let collider = self.collider;
+        let refused = |source| TldiError::Cloud { collider, source };
+        check(points, normals, world_from_sensor).map_err(refused)?;
+        let world_from_collider = get(colliders, collider)?.position();
+        let collider_from_world = world_from_collider.inverse();
+        let collider_from_sensor = collider_from_world * *world_from_sensor;
+        self.points.clear();
+        self.points
+            .extend(points.iter().map(|p| collider_from_sensor * *p));
+        self.normals.clear();
+        let turn = collider_from_sensor.rotation;
+        self.normals
+            .extend(normals.unwrap_or_default().iter().map(|n| turn * *n));
+        self.remove_own(colliders, &collider_from_world)?;
+
+        let own = points.len() - self.points.len();
+        self.recipe.viewpoint = Some(collider_from_sensor.translation);
+        let built = match self.build(normals.is_some(), self.recipe) {
+            Err(CloudError::Empty { dropped }) => {
+                self.clear(tldi, colliders)?;
+                return Ok(StreamFrame {
+                    points: 0,
+                    dropped,
+                    own,
+                });
+            }
+            Err(CloudError::NoSpacing { .. }) if self.last_radius.is_some() => {
+                let radii = self
+                    .last_radius
+                    .map_or(self.recipe.radii, tldi::RadiusRule::Global);
+                self.build(
+                    normals.is_some(),
+                    CloudRecipe {
+                        radii,
+                        ..self.recipe
+                    },
+                )
+            }
+            built => built,
+        };
+        let cloud = built.map_err(refused)?;
+        let taken = StreamFrame {
+            points: cloud.len(),
+            dropped: cloud.dropped(),
+            own,
+        };
+        self.last_radius = Some(cloud.mean_radius());
+        tldi.set_collider_cloud(colliders, collider, cloud)?;
+        if let Some(collider) = colliders.get_mut(collider).filter(|c| !c.is_enabled()) {
+            collider.set_enabled(true);
+        }
+        Ok(taken)
+    }
+
+    /// Takes what is on the own colliders out of the points and normals.
+    fn remove_own(
+        &mut self,
+        colliders: &ColliderSet,
+        collider_from_world: &Pose,
+    ) -> Result<(), TldiError> {
+        let shapes = (self.own.iter())
+            .map(|own| {
+                let own = get(colliders, *own)?;
+                Ok((*collider_from_world * *own.position(), own.shape()))
+            })
+            .collect::<Result<Vec<(Pose, &dyn Shape)>, TldiError>>()?;
+        if shapes.is_empty() {
+            return Ok(());
+        }
+        let on = points_on(&self.points, &shapes, self.own_margin);
+        for list in [&mut self.points, &mut self.normals] {
+            let mut on = on.iter();
+            list.retain(|_| !on.next().is_some_and(|on| *on));
+        }
+        Ok(())
+    }
+
+    /// The cloud of the points.
+    fn build(
+        &self,
+        with_normals: bool,
+        recipe: CloudRecipe,
+    ) -> Result<PointCloud<'static>, CloudError> {
+        let mut builder = PointCloud::builder(&self.points[..]).recipe(recipe);
+        if with_normals {
+            builder = builder.unoriented_normals(&self.normals[..]);
+        }
+        Ok(builder.build()?.into_owned())
+    }
+
+    /// Disables the collider, without its points.
+    fn clear(&self, tldi: &mut TldiPipeline, colliders: &mut ColliderSet) -> Result<(), TldiError> {
+        let collider = self.collider;
+        let empty = stand_in().map_err(|source| TldiError::Cloud { collider, source })?;
+        tldi.set_collider_cloud(colliders, collider, empty.cloud().clone())?;
+        if let Some(collider) = colliders.get_mut(collider) {
+            collider.set_enabled(false);
+        }
+        Ok(())
+    }
+}
+
+/// What a collider without points consists of: rapier has no empty shape.
+fn stand_in() -> Result<PointCloudShape, CloudError> {
+    let point = PointCloud::builder(vec![Vector::ZERO]).radius(STAND_IN_RADIUS);
+    Ok(PointCloudShape::new(point.build()?))
+}
+
+fn get(
+    colliders: &ColliderSet,
+    handle: ColliderHandle,
+) -> Result<&rapier3d::geometry::Collider, TldiError> {
+    colliders
+        .get(handle)
+        .ok_or(TldiError::NoSuchCollider(handle))
+}
+
+/// Checks what must hold before points are transformed.
+fn check(
+    points: &[Vector],
+    normals: Option<&[Vector]>,
+    world_from_sensor: &Pose,
+) -> Result<(), CloudError> {
+    if let Some(normals) = normals.filter(|normals| normals.len() != points.len()) {
+        return Err(CloudError::LengthMismatch {
+            attribute: "normals",
+            expected: points.len(),
+            actual: normals.len(),
+        });
+    }
+    let translation = world_from_sensor.translation.to_array();
+    let pose = translation
+        .into_iter()
+        .chain(world_from_sensor.rotation.to_array());
+    match pose.into_iter().find(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(value) => Err(CloudError::BadParameter {
+            parameter: "world_from_sensor",
+            value,
+            expected: "translation and rotation must be finite",
+        }),
+    }
+}

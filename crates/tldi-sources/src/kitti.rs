@@ -1,0 +1,40 @@
+//! Sweeps of KITTI's laser scanner: x, y, z and intensity as little-endian `f32`, without a header.
+
+use crate::collector::{Collector, Layout, Sample};
+use crate::error::Result;
+use crate::input::Input;
+use crate::scalar::{Endian, Scalar};
+use crate::{RawCloud, ReadOptions, SourceError};
+
+/// Bytes of a point.
+const RECORD: usize = 16;
+
+const LAYOUT: Layout = Layout {
+    normals: false,
+    colors: None,
+    radii: false,
+    splats: None,
+    wide: false,
+};
+
+pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawCloud> {
+    let mut collector = Collector::new(LAYOUT, 0, options);
+    while !input.peek(1)?.is_empty() {
+        let position = input.byte_position();
+        let records = input.records(RECORD, u64::MAX, "a point")?;
+        for record in records.chunks_exact(RECORD) {
+            let mut sample = Sample::EMPTY;
+            for (axis, bytes) in record[..12].chunks_exact(4).enumerate() {
+                sample.position[axis] = Scalar::F32.decode(bytes, Endian::Little);
+            }
+            collector
+                .push(&sample)
+                .map_err(|kind| SourceError::new(kind, position))?;
+        }
+        input.points_read = collector.count();
+    }
+    let mut cloud = collector.finish()?;
+    // The frame of the points is the scanner's.
+    cloud.viewpoint = Some(-cloud.origin.as_vec3());
+    Ok(cloud)
+}

@@ -1,0 +1,196 @@
+//! Sweeps of a laser scanner become a collider that is new ten times a second, and bodies land on it.
+
+use anyhow::{Context, bail};
+use clap::Parser;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{KdTree, PointCloud};
+use tldi_examples::cli::{Common, UpChoice};
+use tldi_examples::lidar::{
+    LidarReport, LidarScene, LidarSimulation, Scanner, Sweep, SweepSource, recipe, within,
+};
+use tldi_examples::render::{BODY_COLORS, Item, Paint, Scene};
+use tldi_examples::scan::positive;
+use tldi_examples::scene::BodyShape;
+use tldi_examples::simulation::NamedCloud;
+use tldi_examples::spots::{Demand, find_spots};
+use tldi_examples::{load, output, viewpoint};
+
+/// Turns sweeps of a laser scanner into a collider that is new ten times a second, and drops bodies on it
+///
+/// Without a folder, a scanner drives through a generated street. Ends with 0 if every step was taken and
+/// no body fell through, with 1 if not, with 2 if the options cannot be used.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// Folder of KITTI's .bin sweeps with a poses.txt; a generated street if left out
+    #[arg(long, value_name = "DIR")]
+    sweeps: Option<PathBuf>,
+    /// Most sweeps to take
+    #[arg(long, value_name = "N", default_value_t = 30)]
+    count: usize,
+    /// Direction against gravity in the frame of the poses; auto takes the z axis of the first sweep
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        default_value = "auto",
+        allow_hyphen_values = true
+    )]
+    up: UpChoice,
+    /// Points farther from the scanner are left out, metres
+    #[arg(long, value_name = "M", default_value_t = 12.0, value_parser = positive)]
+    range: f32,
+    /// Number of bodies
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
+    bodies: u16,
+    /// Largest extent of a body in metres
+    #[arg(long, value_name = "M", default_value_t = 0.8, value_parser = positive)]
+    size: f32,
+    /// Folder for the picture final.png
+    #[arg(long, value_name = "DIR", default_value = "out/lidar_stream")]
+    out: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Distance between the points of a body, as a share of its width.
+const BODY_SPACING: f32 = 0.03;
+/// Bodies are dropped where rings are close to each other, up to this part of the range.
+const NEAR: f32 = 0.6;
+const PICTURE_SIZE: [u32; 2] = [1280, 720];
+
+fn main() -> ExitCode {
+    match run(&Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args) -> anyhow::Result<()> {
+    let source = match &args.sweeps {
+        Some(folder) => SweepSource::open(folder)?,
+        None => SweepSource::Generated(Scanner::new(args.count, args.common.seed)),
+    };
+    let count = source.len().min(args.count);
+    if count == 0 {
+        bail!("there is no sweep to take: give --count of at least 1");
+    }
+    let scene = scene(args, [&source.sweep(0)?, &source.sweep(count - 1)?])?;
+    let mut simulation = LidarSimulation::new(scene, args.common.backend.open()?)?;
+    let bar = output::progress_bar(count, "sweeps");
+    for index in 0..count {
+        let sweep = source.sweep(index)?;
+        (simulation.take(&sweep)).with_context(|| format!("sweep {} failed", sweep.name))?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let report = simulation.report();
+    draw(args, &simulation, &report)?;
+    if let Some(path) = &args.common.json {
+        output::write_json(path, &report)?;
+    }
+    let mut out = io::stdout().lock();
+    report.write_table(&mut out)?;
+    out.flush()?;
+    let lost = report.bodies.iter().filter(|body| body.lost);
+    let lost: Vec<&str> = lost.map(|body| body.name.as_str()).collect();
+    if !lost.is_empty() {
+        bail!("fell through the sweeps: {}", lost.join(", "));
+    }
+    Ok(())
+}
+
+/// Bodies, and places for them that the first and the last sweep see: where the scanner drives, it loses
+/// sight of the ground.
+fn scene(args: &Args, [first, last]: [&Sweep; 2]) -> anyhow::Result<LidarScene> {
+    let up = match args.up {
+        UpChoice::Given(up) => up,
+        UpChoice::Auto => first.world_from_scanner.rotation * Vec3::Z,
+    };
+    let [first, last] = [first, last].map(|sweep| near(args, sweep));
+    let (first, last) = (first?, last?);
+    let in_last = KdTree::new(&last);
+    let stays = |i: &usize| {
+        let nearest = in_last.nearest(first.point(*i), f32::INFINITY);
+        nearest.is_some_and(|nearest| nearest.distance() <= last.radius(nearest.index))
+    };
+    let seen: Vec<usize> = (0..first.len()).filter(stays).collect();
+    let seen = load::subset(&first, &seen, |p| p, |radius| radius)
+        .context("the first and the last sweep have no place in common")?;
+    let bodies = BodyShape::ALL
+        .iter()
+        .cycle()
+        .take(args.bodies.into())
+        .enumerate();
+    let bodies = bodies
+        .map(|(k, shape)| {
+            let cloud = load::body_from_surface(shape.sample(BODY_SPACING, args.common.seed))?;
+            Ok(NamedCloud {
+                name: format!("{} {}", shape.name(), k + 1),
+                cloud: load::resized(&cloud, args.size)?,
+            })
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let demand = Demand {
+        count: bodies.len(),
+        body_radius: 0.5 * args.size,
+        seed: args.common.seed,
+    };
+    Ok(LidarScene {
+        bodies,
+        spots: find_spots(&seen, up, &demand)?,
+        up,
+        range: args.range,
+    })
+}
+
+/// What a sweep sees near the scanner, in the frame of the world.
+fn near(args: &Args, sweep: &Sweep) -> anyhow::Result<PointCloud<'static>> {
+    let pose = sweep.world_from_scanner;
+    let points = within(&sweep.points, NEAR * args.range);
+    let points: Vec<Vec3> = points.iter().map(|p| pose * *p).collect();
+    PointCloud::builder(points)
+        .recipe(recipe())
+        .viewpoint(pose.translation)
+        .build()
+        .with_context(|| format!("sweep {} has no place for a body", sweep.name))
+}
+
+fn draw(args: &Args, simulation: &LidarSimulation, report: &LidarReport) -> anyhow::Result<()> {
+    let Some(sweep) = simulation.cloud() else {
+        return Ok(());
+    };
+    let scan = Item {
+        cloud: sweep,
+        scene_from_cloud: Pose3::IDENTITY,
+        paint: Paint::Scan,
+    };
+    let bodies = simulation.bodies().zip(BODY_COLORS.iter().cycle());
+    let bodies = bodies.map(|((cloud, pose), color)| Item {
+        cloud,
+        scene_from_cloud: pose,
+        paint: Paint::Body(*color),
+    });
+    let scene = Scene {
+        items: std::iter::once(scan).chain(bodies).collect(),
+        up: Vec3::from_array(report.up),
+        detail: args.size,
+    };
+    let places: Vec<Vec3> = report
+        .bodies
+        .iter()
+        .map(|body| body.translation.into())
+        .collect();
+    let camera = viewpoint::choose(&scene, &places, PICTURE_SIZE);
+    let contacts: Vec<Vec3> = simulation.contacts().collect();
+    output::make_folder(&args.out)?;
+    let path: &Path = &args.out.join("final.png");
+    output::write_file(path, &scene.draw(&camera, &contacts).to_png()?)?;
+    eprintln!("the picture is {}", path.display());
+    Ok(())
+}

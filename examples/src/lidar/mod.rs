@@ -1,0 +1,11 @@
+//! Sweeps of a laser scanner as a streaming collider.
+
+mod generated;
+mod report;
+mod simulation;
+mod source;
+
+pub use generated::Scanner;
+pub use report::{LidarBodyReport, LidarReport, SweepReport};
+pub use simulation::{LidarScene, LidarSimulation, recipe, within};
+pub use source::{Sweep, SweepSource};

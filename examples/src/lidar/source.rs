@@ -1,0 +1,152 @@
+//! Where sweeps come from: a folder, or a generated street.
+
+use super::Scanner;
+use anyhow::{Context, bail, ensure};
+use std::path::{Path, PathBuf};
+use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
+use tldi_sources::{ReadOptions, read};
+
+/// Largest deviation of a pose's rotation from an orthonormal matrix: files round.
+const ROUNDING: f32 = 0.01;
+
+/// One turn of a scanner.
+pub struct Sweep {
+    /// What it is called.
+    pub name: String,
+    /// Points in the frame of the scanner, metres.
+    pub points: Vec<Vec3>,
+    /// From the frame of the scanner into that of the world.
+    pub world_from_scanner: Pose3,
+}
+
+/// Sweeps in order.
+pub enum SweepSource {
+    /// Files of a folder, with the pose of the scanner.
+    Folder(Vec<(PathBuf, Pose3)>),
+    /// Computed.
+    Generated(Scanner),
+}
+
+impl SweepSource {
+    /// Opens a folder: `.bin` files in the order of their names, and `poses.txt` with a line for each, twelve
+    /// numbers: the upper rows of the matrix from the scanner's frame into that of the world. Where there is a
+    /// `calib.txt` with a line `Tr:`, poses are those of a camera, and `Tr` goes from the scanner to it: KITTI's
+    /// odometry data.
+    ///
+    /// # Errors
+    /// What is missing or cannot be understood, with the file and the line.
+    pub fn open(folder: &Path) -> anyhow::Result<Self> {
+        let read_text = |name: &str| {
+            let path = folder.join(name);
+            std::fs::read_to_string(&path)
+                .with_context(|| format!("cannot read {}", path.display()))
+        };
+        let entries = std::fs::read_dir(folder)
+            .with_context(|| format!("cannot read the folder {}", folder.display()))?;
+        let mut files = Vec::new();
+        for entry in entries {
+            let path = entry?.path();
+            if path.extension().is_some_and(|extension| extension == "bin") {
+                files.push(path);
+            }
+        }
+        files.sort();
+        let camera_from_scanner = if folder.join("calib.txt").is_file() {
+            let text = read_text("calib.txt")?;
+            let line = (text.lines()).find_map(|line| line.strip_prefix("Tr:"));
+            let line = line.context("calib.txt has no line `Tr:`")?;
+            pose(line).context("calib.txt, the line `Tr:`")?
+        } else {
+            Pose3::IDENTITY
+        };
+        let text = read_text("poses.txt")?;
+        let lines = text
+            .lines()
+            .enumerate()
+            .filter(|(_, line)| !line.trim().is_empty());
+        let poses = lines
+            .map(|(k, line)| {
+                let pose = pose(line).with_context(|| format!("poses.txt, line {}", k + 1))?;
+                Ok(pose * camera_from_scanner)
+            })
+            .collect::<anyhow::Result<Vec<_>>>()?;
+        ensure!(
+            !files.is_empty(),
+            "there are no .bin files in {}",
+            folder.display()
+        );
+        ensure!(
+            files.len() == poses.len(),
+            "{} has {} .bin files, but poses.txt has {} poses: it needs one for each",
+            folder.display(),
+            files.len(),
+            poses.len()
+        );
+        Ok(Self::Folder(files.into_iter().zip(poses).collect()))
+    }
+
+    /// Number of sweeps.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Folder(sweeps) => sweeps.len(),
+            Self::Generated(scanner) => scanner.len(),
+        }
+    }
+
+    /// Whether there are no sweeps.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Gets a sweep.
+    ///
+    /// # Errors
+    /// Those of reading its file.
+    pub fn sweep(&self, index: usize) -> anyhow::Result<Sweep> {
+        match self {
+            Self::Folder(sweeps) => {
+                let (path, world_from_scanner) = &sweeps[index];
+                Ok(Sweep {
+                    name: crate::load::stem(path),
+                    points: read(path, &ReadOptions::default())?.points,
+                    world_from_scanner: *world_from_scanner,
+                })
+            }
+            Self::Generated(scanner) => Ok(Sweep {
+                name: format!("{index:06}"),
+                points: scanner.points(index),
+                world_from_scanner: scanner.world_from_scanner(index),
+            }),
+        }
+    }
+}
+
+/// A pose from the upper three rows of its matrix.
+fn pose(text: &str) -> anyhow::Result<Pose3> {
+    let numbers = (text.split_whitespace())
+        .map(|word| match word.parse::<f32>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            _ => bail!("`{word}` is not a finite number"),
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let count = numbers.len();
+    let Ok(m) = <[f32; 12]>::try_from(numbers) else {
+        bail!("{count} numbers where 12 belong");
+    };
+    let column = |k: usize| Vec3::new(m[k], m[4 + k], m[8 + k]);
+    let rotation = Mat3::from_cols(column(0), column(1), column(2));
+    let skew = rotation.transpose() * rotation - Mat3::IDENTITY;
+    let is_rotation = skew
+        .to_cols_array()
+        .iter()
+        .all(|value| value.abs() < ROUNDING)
+        && rotation.determinant() > 0.0;
+    ensure!(
+        is_rotation,
+        "the matrix is no pose: its left part must be a rotation"
+    );
+    Ok(Pose3::from_parts(
+        column(3),
+        Quat::from_mat3(&rotation).normalize(),
+    ))
+}

@@ -1,0 +1,113 @@
+//! Runs the binary `lidar_stream` as a user would.
+
+mod common;
+
+use common::{assert_refused, folder, number, report, run};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_lidar_stream");
+
+/// Asserts that the bodies lie on the ground, up to `slack` metres.
+fn assert_on_ground(report: &Value, slack: f64) {
+    for body in report["bodies"].as_array().unwrap() {
+        assert_eq!(body["lost"], false, "{body}");
+        assert!(number(&body["height"]).abs() < slack, "{body}");
+        assert!(number(&body["linear_speed"]) < 0.2, "{body}");
+    }
+}
+
+#[test]
+fn bodies_rest_on_a_generated_street() {
+    let folder = folder("lidar_generated");
+    let report = report(
+        BINARY,
+        &folder,
+        &["--count", "15", "--seed", "4", "--bodies", "3"],
+    );
+    assert_eq!(report["up"], serde_json::json!([0.0, 0.0, 1.0]));
+    assert_eq!(
+        (report["steps"].clone(), report["pairs_missed"].clone()),
+        (90.into(), 0.into())
+    );
+    let sweeps = report["sweeps"].as_array().unwrap();
+    assert_eq!(sweeps.len(), 15);
+    assert!(
+        sweeps
+            .iter()
+            .all(|sweep| number(&sweep["points"]) > 50_000.0)
+    );
+    // Errors of ranges are up to 17 mm, of heights a third of it; the place is the highest point of all
+    // under a body.
+    assert_on_ground(&report, 0.03);
+    assert!(folder.join("out/lidar_stream/final.png").exists());
+}
+
+/// Sweeps in KITTI's layout: the scanner looks along x with z up, poses are those of a camera that looks along
+/// z with y down. The ground is a grid 1.5 m below, and one point of each sweep is NaN.
+fn write_sweeps(folder: &Path, count: usize) {
+    let mut poses = String::new();
+    for k in 0..count {
+        let ahead = 0.1 * k as f32;
+        poses += &format!("1 0 0 0  0 1 0 0  0 0 1 {ahead}\n");
+        let mut bytes = Vec::new();
+        let mut push = |p: [f32; 3]| {
+            for value in [p[0], p[1], p[2], 0.5] {
+                bytes.extend(value.to_le_bytes());
+            }
+        };
+        for i in -60..=60 {
+            for j in -60..=60 {
+                push([0.05 * i as f32 - ahead, 0.05 * j as f32, -1.5]);
+            }
+        }
+        push([f32::NAN, 0.0, 0.0]);
+        fs::write(folder.join(format!("{k:06}.bin")), bytes).unwrap();
+    }
+    fs::write(folder.join("poses.txt"), poses).unwrap();
+    let calib = "P0: 1 0 0 0 0 1 0 0 0 0 1 0\nTr: 0 -1 0 0  0 0 -1 0  1 0 0 0\n";
+    fs::write(folder.join("calib.txt"), calib).unwrap();
+}
+
+#[test]
+fn a_folder_of_sweeps_is_read_with_its_poses() {
+    let folder = folder("lidar_folder");
+    write_sweeps(&folder, 12);
+    let options = ["--sweeps", ".", "--bodies", "2", "--size", "0.6"];
+    let report = report(BINARY, &folder, &options);
+    assert_eq!(report["up"], serde_json::json!([0.0, -1.0, 0.0]));
+    let sweeps = report["sweeps"].as_array().unwrap();
+    assert_eq!(sweeps.len(), 12);
+    for sweep in sweeps {
+        assert_eq!(
+            (&sweep["points"], &sweep["dropped"]),
+            (&(121 * 121).into(), &1.into())
+        );
+    }
+    // The grid is exact; contacts scatter by a tenth of its radius.
+    assert_on_ground(&report, 0.02);
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let folder = folder("lidar_refused");
+    let refused = |message: &str| {
+        assert_refused(BINARY, &folder, &[(&["--sweeps", "data"], 1, message)]);
+    };
+    refused("data");
+    let data = folder.join("data");
+    fs::create_dir(&data).unwrap();
+    refused("poses.txt");
+    write_sweeps(&data, 2);
+    fs::write(data.join("poses.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
+    refused("2 .bin files, but poses.txt has 1 poses");
+    fs::write(data.join("poses.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n1 2 3\n").unwrap();
+    refused("poses.txt, line 2: 3 numbers where 12 belong");
+    fs::write(data.join("poses.txt"), "2 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
+    refused("poses.txt, line 1: the matrix is no pose");
+    fs::write(data.join("calib.txt"), "P0: 1\n").unwrap();
+    refused("no line `Tr:`");
+    let output = run(BINARY, &folder, &["--count", "0"]);
+    assert_eq!(output.status.code(), Some(1));
+}
