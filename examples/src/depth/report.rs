@@ -1,5 +1,6 @@
 //! What a run of `depth_camera` found.
 
+use crate::contact_kinds::ContactKinds;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -16,6 +17,8 @@ pub struct DepthReport {
     pub up: [f32; 3],
     /// Deepest penetration in metres over all steps.
     pub max_penetration: f32,
+    /// The deepest contacts after a step, by kind.
+    pub deepest: ContactKinds,
     /// Frames that are listed but not there.
     pub missing_frames: Vec<String>,
     /// Median of the frames' `latency_ms`.
@@ -129,12 +132,8 @@ impl DepthReport {
                 number(body.displacement)
             )?;
         }
-        writeln!(
-            out,
-            "{} frames; contacts at most {:.2} mm deep",
-            self.frames.len(),
-            1e3 * self.max_penetration
-        )?;
+        writeln!(out, "{} frames", self.frames.len())?;
+        self.deepest.write_lines(out)?;
         self.totals.write_line(out)
     }
 }

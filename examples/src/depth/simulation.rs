@@ -2,6 +2,7 @@
 
 use super::report::{DepthBodyReport, DepthReport, FrameReport};
 use super::source::TimedFrame;
+use crate::contact_kinds::ContactKinds;
 use crate::load;
 use crate::simulation::NamedCloud;
 use crate::spots::Spot;
@@ -70,6 +71,7 @@ pub struct DepthSimulation {
     frames: Vec<FrameReport>,
     totals: StepTotals,
     max_penetration: f32,
+    deepest: ContactKinds,
 }
 
 struct Body {
@@ -144,6 +146,7 @@ impl DepthSimulation {
             frames: Vec::new(),
             totals: StepTotals::new(DT),
             max_penetration: 0.0,
+            deepest: ContactKinds::default(),
         })
     }
 
@@ -246,6 +249,10 @@ impl DepthSimulation {
         let report = self.tldi.step(&mut self.world)?;
         self.totals.count(&report, report.pairs_in_contact > 0);
         self.max_penetration = self.max_penetration.max(report.max_penetration);
+        let (bodies, colliders) = (&self.world.bodies, &self.world.colliders);
+        let contacts = self.tldi.contacts(&self.world.narrow_phase, colliders);
+        let contacts: Vec<_> = contacts.collect();
+        (self.deepest).count(self.totals.steps, &contacts, bodies, colliders);
         Ok(report.pairs_in_contact)
     }
 
@@ -290,6 +297,7 @@ impl DepthSimulation {
             frame_rate: 1.0 / (DT * STEPS_PER_FRAME as f32),
             up: self.up.to_array(),
             max_penetration: self.max_penetration,
+            deepest: self.deepest,
             missing_frames,
             median_latency_ms: latency(last / 2),
             max_latency_ms: latency(last),
