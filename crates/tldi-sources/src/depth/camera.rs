@@ -144,7 +144,7 @@ impl DepthCamera {
     /// `world_from_camera` leads into. 0 and 65535 mean no measurement. Of a frame that is too short
     /// the missing pixels have none either.
     ///
-    /// Cost: some 35 ns a pixel on one core, shared by all cores; a third of it is new memory.
+    /// Cost: some 230 ns a pixel on one core, shared by all cores; nearly all of it are the normals.
     pub fn points(&mut self, frame: &[u16], world_from_camera: &Pose3) -> DepthCloud {
         self.take_depths(frame);
         let Intrinsics {
@@ -237,8 +237,8 @@ impl DepthCamera {
         };
         compute(&window, columns, row, optics, pixels);
         let depth = window.depth();
-        for k in 0..TILE {
-            if depth[k] > 0.0 {
+        for (k, z) in depth.iter().enumerate() {
+            if *z > 0.0 {
                 if pixels.flies[k] {
                     cloud.flying += 1;
                 } else {
