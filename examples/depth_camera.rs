@@ -203,8 +203,10 @@ fn place_bodies(
         }
     }
     let frame = source.frame(source.len() - 1)?;
+    let mut camera = camera.clone();
+    camera.points(&frame.depths, &frame.world_from_camera);
     let view = LastView {
-        camera,
+        camera: &camera,
         camera_from_world: frame.world_from_camera.inverse(),
     };
     let distance = view.median_depth(first);
@@ -271,10 +273,17 @@ impl LastView<'_> {
         };
         let (u, v) = up.any_orthonormal_pair();
         let room = ROOM_IN_VIEW * demand.body_radius;
+        // Some pixels are empty: half of those on the way to the sides must show the surface.
         let is_in_view = |place: Vec3| {
-            [u, -u, v, -v]
+            let at = |k: f32| [u, -u, v, -v].map(|side| place + k * side);
+            let is_inside = |p: &Vec3| self.camera.is_in_view(*p, &self.camera_from_world);
+            let disc: Vec<Vec3> = (1..=4)
+                .flat_map(|k| at(0.25 * k as f32 * demand.body_radius))
+                .collect();
+            let seen = disc
                 .iter()
-                .all(|side| (self.camera).is_in_view(place + room * *side, &self.camera_from_world))
+                .filter(|p| self.camera.sees(**p, &self.camera_from_world));
+            at(room).iter().all(is_inside) && 2 * seen.count() >= disc.len()
         };
         let near = find_spots_where(first, up, &demand, |place| {
             is_in_view(place) && self.depth(place) <= distance
