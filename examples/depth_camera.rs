@@ -256,7 +256,7 @@ impl LastView<'_> {
     }
 
     /// Places in view, with the room around them; nearer than `distance` metres if there are enough,
-    /// where depths are sharper.
+    /// where depths are sharper, and anywhere if there are none.
     fn spots(
         &self,
         first: &PointCloud<'_>,
@@ -290,7 +290,9 @@ impl LastView<'_> {
         });
         match near {
             Ok(spots) if spots.iter().all(|spot| spot.level == 0) => Ok(spots),
-            _ => find_spots_where(first, up, &demand, is_in_view),
+            // What holds bodies now may all be gone in the end.
+            _ => find_spots_where(first, up, &demand, is_in_view)
+                .or_else(|_| find_spots_where(first, up, &demand, |_| true)),
         }
     }
 }
