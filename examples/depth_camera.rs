@@ -16,7 +16,7 @@ use tldi_examples::render::{BODY_COLORS, Item, Paint, Picture, Scene};
 use tldi_examples::scan::positive;
 use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::NamedCloud;
-use tldi_examples::spots::{Demand, Spot, find_spots};
+use tldi_examples::spots::{Demand, NoSpot, Spot, find_spots_where};
 use tldi_examples::{animation, load, output, viewpoint};
 use tldi_sources::depth::{DepthCamera, DepthSequence, SensorModel};
 
@@ -73,10 +73,15 @@ struct Args {
 /// Frames of the generated sequence.
 const GENERATED_FRAMES: usize = 150;
 const FRAME_SECONDS: f32 = 1.0 / 30.0;
-/// Width of a body in metres, and at least this many mean radii of a frame.
-const BODY_SIZE: f32 = 0.08;
+/// Width in metres of a body of the generated sequence.
 const GENERATED_BODY_SIZE: f32 = 0.14;
+/// Width of a body that is not given one: a share of the median distance, smaller by a factor until there is
+/// place, and at least this many mean radii of a frame.
+const SIZE_SHARE: f32 = 0.08;
+const SHRINKING: f32 = 0.8;
 const BODY_RADII: f32 = 8.0;
+/// Room around a place that must be in view in the last frame, in body radii.
+const ROOM_IN_VIEW: f32 = 2.5;
 const BODY_SPACING: f32 = 0.03;
 const PICTURE_SIZE: [u32; 2] = [1280, 720];
 const ANIMATION_SIZE: [u32; 2] = [640, 360];
@@ -121,20 +126,18 @@ fn run(args: &Args) -> anyhow::Result<()> {
         UpChoice::Given(up) => up,
         UpChoice::Auto => {
             let normals = cloud.normals().unwrap_or_default();
-            let up = camera_up(normals, &first.world_from_camera);
-            let [x, y, z] = up.to_array();
-            eprintln!("up is {x:.3},{y:.3},{z:.3}; --up X,Y,Z sets it");
-            up
+            let up = camera_up(normals, &first.world_from_camera)?;
+            let [x, y, z] = up.direction.to_array();
+            eprintln!(
+                "up is {x:.3},{y:.3},{z:.3}: {:.0} % of the normals say so, and at most {:.0} % as much speaks for \
+                 another; --up X,Y,Z sets it",
+                100.0 * up.share,
+                100.0 * up.rival
+            );
+            up.direction
         }
     };
-    let bodies = make_bodies(args, cloud.mean_radius())?;
-    let spots = match &source {
-        _ if bodies.is_empty() => Vec::new(),
-        FrameSource::Generated(_) if bodies.len() <= GeneratedCamera::spots().len() => {
-            GeneratedCamera::spots()
-        }
-        _ => spots_in_view(&source, &camera, &cloud, up, &bodies, args.common.seed)?,
-    };
+    let (bodies, spots) = place_bodies(&source, &camera, &cloud, up, args)?;
     let scene = DepthScene {
         camera,
         up,
@@ -179,13 +182,48 @@ fn open(args: &Args) -> anyhow::Result<(FrameSource, Vec<String>)> {
     Ok((FrameSource::Folder(sequence), missing))
 }
 
-fn make_bodies(args: &Args, frame_radius: f32) -> anyhow::Result<Vec<NamedCloud>> {
-    let least = if args.frames.is_some() {
-        BODY_SIZE
-    } else {
-        GENERATED_BODY_SIZE
+/// Bodies, and where they are dropped. Where their size is not given, it is as large as the distance of
+/// what is seen suggests, or smaller until each has a place of its own.
+fn place_bodies(
+    source: &FrameSource,
+    camera: &DepthCamera,
+    first: &PointCloud<'_>,
+    up: Vec3,
+    args: &Args,
+) -> anyhow::Result<(Vec<NamedCloud>, Vec<Spot>)> {
+    if args.count == 0 {
+        return Ok((Vec::new(), Vec::new()));
+    }
+    let least = BODY_RADII * first.mean_radius();
+    if matches!(source, FrameSource::Generated(_)) {
+        let size = args.size.unwrap_or(GENERATED_BODY_SIZE.max(least));
+        let spots = GeneratedCamera::spots();
+        if usize::from(args.count) <= spots.len() {
+            return Ok((make_bodies(args, size)?, spots));
+        }
+    }
+    let frame = source.frame(source.len() - 1)?;
+    let mut camera = camera.clone();
+    camera.points(&frame.depths, &frame.world_from_camera);
+    let view = LastView {
+        camera: &camera,
+        camera_from_world: frame.world_from_camera.inverse(),
     };
-    let size = args.size.unwrap_or(least.max(BODY_RADII * frame_radius));
+    let distance = view.median_depth(first);
+    let mut size = args.size.unwrap_or(least.max(SIZE_SHARE * distance));
+    loop {
+        let bodies = make_bodies(args, size)?;
+        let spots = view.spots(first, up, &bodies, distance, args.common.seed);
+        let each_has_its_own = |spots: &Vec<Spot>| spots.iter().all(|spot| spot.level == 0);
+        let smaller = SHRINKING * size;
+        if args.size.is_some() || smaller < least || spots.as_ref().is_ok_and(each_has_its_own) {
+            return Ok((bodies, spots?));
+        }
+        size = smaller;
+    }
+}
+
+fn make_bodies(args: &Args, size: f32) -> anyhow::Result<Vec<NamedCloud>> {
     let shapes = [BodyShape::RoundedBox, BodyShape::Pebble, BodyShape::Star];
     (0..usize::from(args.count))
         .map(|k| {
@@ -199,48 +237,64 @@ fn make_bodies(args: &Args, frame_radius: f32) -> anyhow::Result<Vec<NamedCloud>
         .collect()
 }
 
-/// Places that the first frame and the last one see, on near surfaces if there are any, which are
-/// sharper.
-fn spots_in_view(
-    source: &FrameSource,
-    camera: &DepthCamera,
-    first: &PointCloud<'_>,
-    up: Vec3,
-    bodies: &[NamedCloud],
-    seed: u64,
-) -> anyhow::Result<Vec<Spot>> {
-    let radius = |body: &NamedCloud| body.cloud.points().map(Vec3::length).fold(0.0, f32::max);
-    let demand = Demand {
-        count: bodies.len(),
-        body_radius: bodies.iter().map(radius).fold(0.0, f32::max),
-        seed,
-    };
-    let frame = source.frame(source.len() - 1)?;
-    let mut last = camera.clone();
-    last.points(&frame.depths, &frame.world_from_camera);
-    let camera_from_world = frame.world_from_camera.inverse();
-    let depth = |i: usize| (camera_from_world * first.point(i)).z;
-    let seen: Vec<usize> = (0..first.len())
-        .filter(|i| last.sees(first.point(*i), &camera_from_world))
-        .collect();
-    let mut depths: Vec<f32> = seen.iter().map(|i| depth(*i)).collect();
-    depths.sort_unstable_by(f32::total_cmp);
-    let median = depths.get(depths.len() / 2).copied().unwrap_or(0.0);
-    let near: Vec<usize> = seen
-        .iter()
-        .copied()
-        .filter(|i| depth(*i) <= median)
-        .collect();
-    for indices in [near, seen] {
-        if indices.is_empty() {
-            continue;
-        }
-        let part = load::subset(first, &indices, |p| p, |r| r)?;
-        if let Ok(spots) = find_spots(&part, up, &demand) {
-            return Ok(spots);
+/// Where the camera is in the last frame: what it does not see there cannot hold a body.
+struct LastView<'a> {
+    camera: &'a DepthCamera,
+    camera_from_world: Pose3,
+}
+
+impl LastView<'_> {
+    fn depth(&self, point: Vec3) -> f32 {
+        (self.camera_from_world * point).z
+    }
+
+    /// Median depth in metres of the points.
+    fn median_depth(&self, cloud: &PointCloud<'_>) -> f32 {
+        let mut depths: Vec<f32> = cloud.points().map(|point| self.depth(point)).collect();
+        let middle = depths.len() / 2;
+        *(depths.select_nth_unstable_by(middle, f32::total_cmp).1)
+    }
+
+    /// Places in view, with the room around them; nearer than `distance` metres if there are enough,
+    /// where depths are sharper, and anywhere if there are none.
+    fn spots(
+        &self,
+        first: &PointCloud<'_>,
+        up: Vec3,
+        bodies: &[NamedCloud],
+        distance: f32,
+        seed: u64,
+    ) -> Result<Vec<Spot>, NoSpot> {
+        let radius = |body: &NamedCloud| body.cloud.points().map(Vec3::length).fold(0.0, f32::max);
+        let demand = Demand {
+            count: bodies.len(),
+            body_radius: bodies.iter().map(radius).fold(0.0, f32::max),
+            seed,
+        };
+        let (u, v) = up.any_orthonormal_pair();
+        let room = ROOM_IN_VIEW * demand.body_radius;
+        // Some pixels are empty: half of those on the way to the sides must show the surface.
+        let is_in_view = |place: Vec3| {
+            let at = |k: f32| [u, -u, v, -v].map(|side| place + k * side);
+            let is_inside = |p: &Vec3| self.camera.is_in_view(*p, &self.camera_from_world);
+            let disc: Vec<Vec3> = (1..=4)
+                .flat_map(|k| at(0.25 * k as f32 * demand.body_radius))
+                .collect();
+            let seen = disc
+                .iter()
+                .filter(|p| self.camera.sees(**p, &self.camera_from_world));
+            at(room).iter().all(is_inside) && 2 * seen.count() >= disc.len()
+        };
+        let near = find_spots_where(first, up, &demand, |place| {
+            is_in_view(place) && self.depth(place) <= distance
+        });
+        match near {
+            Ok(spots) if spots.iter().all(|spot| spot.level == 0) => Ok(spots),
+            // What holds bodies now may all be gone in the end.
+            _ => find_spots_where(first, up, &demand, is_in_view)
+                .or_else(|_| find_spots_where(first, up, &demand, |_| true)),
         }
     }
-    Ok(find_spots(first, up, &demand)?)
 }
 
 /// Shows all frames; snapshots before the first, at three fifths and after the last or, for an

@@ -3,6 +3,7 @@
 
 pub mod animation;
 pub mod cli;
+pub mod contact_kinds;
 pub mod depth;
 pub mod devices;
 pub mod gallop;

@@ -59,15 +59,43 @@ const GROUPS: usize = 256;
 /// # Errors
 /// [`NoSpot`] if not even one place is level and without holes.
 pub fn find_spots(scan: &PointCloud<'_>, up: Vec3, demand: &Demand) -> Result<Vec<Spot>, NoSpot> {
+    find_spots_where(scan, up, demand, |_| true)
+}
+
+/// The same among the places, metres in the frame of the scan, that `is_usable`. All of the scan counts
+/// as an obstacle.
+///
+/// # Errors
+/// Those of [`find_spots`].
+pub fn find_spots_where(
+    scan: &PointCloud<'_>,
+    up: Vec3,
+    demand: &Demand,
+    is_usable: impl Fn(Vec3) -> bool,
+) -> Result<Vec<Spot>, NoSpot> {
     let map = HeightMap::of(scan, up, demand.body_radius);
-    let candidates = ROOM
-        .iter()
-        .map(|room| map.level_places(room * demand.body_radius))
-        .find(|places| !places.is_empty())
-        .ok_or(NoSpot {
+    let mut places: Vec<Vec3> = Vec::new();
+    // The best that give all bodies a place of their own; else those that give the most.
+    let qualities = (LEVEL_TOLERANCES.iter())
+        .flat_map(|tolerance| ROOM.map(|room| (*tolerance, room * demand.body_radius)));
+    for (tolerance, radius) in qualities {
+        let mut candidates = map.places_within(radius, tolerance * radius);
+        candidates.retain(|place| is_usable(*place));
+        if !candidates.is_empty() {
+            let group = best_group(&candidates, up, demand);
+            if group.len() > places.len() {
+                places = group;
+            }
+        }
+        if places.len() >= demand.count.max(1) {
+            break;
+        }
+    }
+    if places.is_empty() {
+        return Err(NoSpot {
             diameter: 2.0 * demand.body_radius,
-        })?;
-    let places = best_group(&candidates, up, demand);
+        });
+    }
     Ok((0..demand.count)
         .map(|k| Spot {
             surface: places[k % places.len()],
@@ -146,6 +174,15 @@ impl HeightMap {
     /// Middles of discs of `radius` metres that are seen without holes and level, with the best
     /// tolerance for which there are any; each is as high as the disc's highest point.
     fn level_places(&self, radius: f32) -> Vec<Vec3> {
+        (LEVEL_TOLERANCES.iter())
+            .map(|share| self.places_within(radius, share * radius))
+            .find(|places| !places.is_empty())
+            .unwrap_or_default()
+    }
+
+    /// Middles of discs of `radius` metres that are seen without holes and whose heights differ from
+    /// that of the middle by `tolerance` metres at most.
+    fn places_within(&self, radius: f32, tolerance: f32) -> Vec<Vec3> {
         let reach = (radius / self.pixel_size).ceil() as i32;
         let disc: Vec<[i32; 2]> = (-reach..=reach)
             .flat_map(|y| (-reach..=reach).map(move |x| [x, y]))
@@ -153,16 +190,10 @@ impl HeightMap {
             .collect();
         let [width, height] = self.image.size.map(|n| n as i32);
         let inner = |n: i32| (reach..n - reach).step_by((reach / 3).max(1) as usize);
-        for tolerance in LEVEL_TOLERANCES.map(|share| share * radius) {
-            let places: Vec<Vec3> = inner(height)
-                .flat_map(|j| inner(width).map(move |i| [i, j]))
-                .filter_map(|middle| self.level_place(middle, &disc, tolerance))
-                .collect();
-            if !places.is_empty() {
-                return places;
-            }
-        }
-        Vec::new()
+        inner(height)
+            .flat_map(|j| inner(width).map(move |i| [i, j]))
+            .filter_map(|middle| self.level_place(middle, &disc, tolerance))
+            .collect()
     }
 
     /// The highest point of a disc around pixel `[i, j]`, moved to its middle, if the disc is

@@ -131,13 +131,19 @@ fn what_is_wrong_is_said() {
     let folder = folder("depth_errors");
     write_frames(&folder.join("frames"), &[false; 3]);
     fs::create_dir_all(folder.join("empty")).unwrap();
-    let cases: [(&[&str], i32, &str); 6] = [
-        (&["--frames", "empty"][..], 1, "holds intrinsics.txt"),
+    let cases: [(&[&str], i32, &str); 7] = [
+        // The floor is straight ahead: nothing in view tells how the camera is held.
+        (
+            &["--frames", "frames"][..],
+            1,
+            "pass it by hand (--up X,Y,Z",
+        ),
+        (&["--frames", "empty"], 1, "holds intrinsics.txt"),
         (&["--frames", "missing"], 1, "missing"),
         (&["--backend", "fast"], 2, "is no backend"),
         (&["--sensor-noise", "-1"], 2, "greater than 0"),
         (
-            &["--frames", "frames", "--size", "9"],
+            &["--frames", "frames", "--size", "9", "--up", "0,0,1"],
             1,
             "no level surface",
         ),
@@ -156,6 +162,8 @@ fn what_is_wrong_is_said() {
             "--hold",
             "0",
             "--animate",
+            "--up",
+            "0,0,1",
         ],
     );
     assert_eq!(report["missing_frames"][0], "001.png");

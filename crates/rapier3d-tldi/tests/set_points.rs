@@ -129,6 +129,16 @@ fn the_same_points_leave_sleepers_asleep() -> TestResult {
 /// Moves a floor at `velocity` m/s for a second under a cube and returns the cube's position and
 /// velocity relative to the floor; as a deforming surface, or as new points.
 fn carried(velocity: Vector, floor_first: bool, deforms: bool) -> Result<[Vector; 2], TldiError> {
+    carried_every(1, velocity, floor_first, deforms)
+}
+
+/// The same where the points are new in one of `every` steps only.
+fn carried_every(
+    every: usize,
+    velocity: Vector,
+    floor_first: bool,
+    deforms: bool,
+) -> Result<[Vector; 2], TldiError> {
     let (mut world, mut tldi) = attached();
     let cube = tldi.collider(cloud(&cube(HALF)));
     let (floor, body) = if floor_first {
@@ -141,8 +151,8 @@ fn carried(velocity: Vector, floor_first: bool, deforms: bool) -> Result<[Vector
     let dt = world.integration_parameters.dt;
     let mut moved = Vector::ZERO;
     for step in 0..90 {
-        if step >= 30 {
-            moved += velocity * dt;
+        if step >= 30 && step % every == 0 {
+            moved += velocity * (every as f32 * dt);
             let points: Vec<Vector> = square(1.6).into_iter().map(|p| p + moved).collect();
             if deforms {
                 tldi.deform(&mut world, floor, &points, None)?;
@@ -152,8 +162,8 @@ fn carried(velocity: Vector, floor_first: bool, deforms: bool) -> Result<[Vector
         }
         tldi.step(&mut world)?;
     }
-    // In its last step the surface went on from the last points.
-    moved += velocity * dt;
+    // In its last steps the surface went on from the last points.
+    moved += velocity * (every as f32 * dt);
     let body = &world.bodies[body];
     let start = Vector::Y * HALF;
     Ok([body.translation() - start - moved, body.linvel() - velocity])
@@ -220,6 +230,22 @@ fn fast_floors_push_what_stands_on_them() -> TestResult {
             );
             assert!((-0.5..0.5).contains(&slower.y), "{case}");
         }
+    }
+    Ok(())
+}
+
+/// So does one that a sensor sees in every second step only: it is not taken to be twice as fast, nor
+/// for one that stands still in between.
+#[test]
+fn fast_floors_push_between_their_frames() -> TestResult {
+    for floor_first in [true, false] {
+        let [behind, slower] = carried_every(2, Vector::Y * 4.0, floor_first, false)?;
+        let case = format!("floor first {floor_first}: {behind}, {slower}");
+        assert!(
+            (-0.5 * SPACING..2.0 * SPACING).contains(&behind.y),
+            "{case}"
+        );
+        assert!((-0.5..0.5).contains(&slower.y), "{case}");
     }
     Ok(())
 }

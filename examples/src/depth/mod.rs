@@ -2,12 +2,14 @@
 
 mod camera_up;
 mod generated;
+mod registered;
 mod report;
 mod simulation;
 mod source;
 
-pub use camera_up::camera_up;
+pub use camera_up::{CameraUp, UnclearUp, camera_up};
 pub use generated::GeneratedCamera;
+pub use registered::{RegisteredFrames, TruePixel};
 pub use report::{DepthReport, FrameReport};
 pub use simulation::{DepthScene, DepthSimulation, DepthSnapshot};
 pub use source::{FrameSource, TimedFrame};

@@ -1,5 +1,6 @@
 //! What a run of `depth_camera` found.
 
+use crate::contact_kinds::ContactKinds;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -16,6 +17,8 @@ pub struct DepthReport {
     pub up: [f32; 3],
     /// Deepest penetration in metres over all steps.
     pub max_penetration: f32,
+    /// The deepest contacts after a step, by kind.
+    pub deepest: ContactKinds,
     /// Frames that are listed but not there.
     pub missing_frames: Vec<String>,
     /// Median of the frames' `latency_ms`.
@@ -64,14 +67,19 @@ pub struct DepthBodyReport {
     pub points: usize,
     /// Position in the frame of the world, metres.
     pub translation: [f32; 3],
-    /// How far it is from where it first came to rest or, if it never did, from its start, metres.
-    pub displacement: f32,
-    /// Speed in m/s.
+    /// How far it is from where it first came to rest or, if it never did, from its start, metres: its
+    /// height is that over the surface below, which drifts with the poses of the frames. Null where no
+    /// surface is below.
+    pub displacement: Option<f32>,
+    /// Speed in the world, m/s.
     pub linear_speed: f32,
+    /// Mean speed over the last quarter of a second relative to the surface below, m/s; null where none
+    /// is below.
+    pub speed_over_surface: Option<f32>,
     /// Whether it sleeps.
     pub sleeping: bool,
-    /// Simulated seconds after which it was first slower than 3 cm/s for a quarter of a second; null
-    /// if it never was.
+    /// Simulated seconds after which it was first slower than 3 cm/s, over a quarter of a second and
+    /// relative to the surface below; null if it never was.
     pub first_rested_at_seconds: Option<f32>,
 }
 
@@ -114,18 +122,18 @@ impl DepthReport {
         for body in &self.bodies {
             let rested =
                 (body.first_rested_at_seconds).map_or("never".to_owned(), |s| format!("{s:.2} s"));
+            let number =
+                |value: Option<f32>| value.map_or("none below".to_owned(), |n| format!("{n:.3}"));
             writeln!(
                 out,
-                "{:<22} {rested:>10} {:>10.3} {:>12.3}",
-                body.name, body.linear_speed, body.displacement
+                "{:<22} {rested:>10} {:>10} {:>12}",
+                body.name,
+                number(body.speed_over_surface),
+                number(body.displacement)
             )?;
         }
-        writeln!(
-            out,
-            "{} frames; contacts at most {:.2} mm deep",
-            self.frames.len(),
-            1e3 * self.max_penetration
-        )?;
+        writeln!(out, "{} frames", self.frames.len())?;
+        self.deepest.write_lines(out)?;
         self.totals.write_line(out)
     }
 }

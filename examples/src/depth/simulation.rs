@@ -2,6 +2,7 @@
 
 use super::report::{DepthBodyReport, DepthReport, FrameReport};
 use super::source::TimedFrame;
+use crate::contact_kinds::ContactKinds;
 use crate::load;
 use crate::simulation::NamedCloud;
 use crate::spots::Spot;
@@ -25,10 +26,10 @@ const DENSITY: f32 = 300.0;
 /// Height of a body over its spot at the start, metres.
 const DROP: f32 = 0.08;
 
-/// Speed in m/s below which a body rests, and for how many steps: a surface that is new in every
-/// frame does not let it sleep.
+/// Mean speed in m/s, relative to the surface below, below which a body rests, and over how many frames:
+/// a surface that is new in every frame does not let it sleep.
 const REST_SPEED: f32 = 0.03;
-const REST_STEPS: usize = 15;
+const REST_FRAMES: usize = 8;
 
 /// What a simulation is made of.
 pub struct DepthScene {
@@ -70,15 +71,18 @@ pub struct DepthSimulation {
     frames: Vec<FrameReport>,
     totals: StepTotals,
     max_penetration: f32,
+    deepest: ContactKinds,
 }
 
 struct Body {
     named: NamedCloud,
     handle: RigidBodyHandle,
-    /// Where it started or, once it has come to rest, where it first did.
+    /// Radius in metres of a ball around it.
+    radius: f32,
+    /// Where it started or, once it has come to rest, where it first did; see `places`.
     home: Vec3,
-    /// Steps in a row in which it was slow.
-    slow_steps: usize,
+    /// Where it was after the last frames, the newest last, its height over the surface below.
+    places: VecDeque<Vec3>,
     first_rested_at_step: Option<usize>,
 }
 
@@ -94,6 +98,7 @@ impl DepthSimulation {
     ) -> anyhow::Result<Self> {
         let mut camera = scene.camera;
         let points = camera.points(&first.depths, &first.world_from_camera);
+        let seen = points.points.clone();
         let cloud = points.into_builder().build()?.into_owned();
         let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
         let mut world = PhysicsWorld {
@@ -117,11 +122,14 @@ impl DepthSimulation {
                     RigidBodyBuilder::dynamic().pose(pose).angular_damping(1.0),
                     tldi.collider(named.cloud.clone()).density(DENSITY),
                 );
+                let radius = named.cloud.points().map(Vec3::length).fold(0.0, f32::max);
+                let below = height_below(&seen, pose.translation, radius, scene.up);
                 Body {
                     named,
                     handle,
-                    home: pose.translation,
-                    slow_steps: 0,
+                    radius,
+                    home: pose.translation - below.unwrap_or(0.0) * scene.up,
+                    places: VecDeque::new(),
                     first_rested_at_step: None,
                 }
             })
@@ -138,6 +146,7 @@ impl DepthSimulation {
             frames: Vec::new(),
             totals: StepTotals::new(DT),
             max_penetration: 0.0,
+            deepest: ContactKinds::default(),
         })
     }
 
@@ -168,6 +177,7 @@ impl DepthSimulation {
             points
         };
         report.remembered_points = whole.points.len() - report.points;
+        let seen = whole.points.clone();
         let cloud = whole.into_builder().build()?.into_owned();
         (self.tldi).set_cloud(&mut self.world, self.surface, cloud)?;
         let updated = start.elapsed();
@@ -181,6 +191,7 @@ impl DepthSimulation {
             self.step()?;
         }
         self.totals.add_wall_seconds(start.elapsed().as_secs_f64());
+        self.follow(&seen);
         Ok(())
     }
 
@@ -210,20 +221,38 @@ impl DepthSimulation {
         whole
     }
 
+    /// Notes where the bodies are relative to the surface below them, which drifts with the poses of the
+    /// frames, and which of them rest.
+    fn follow(&mut self, surface: &[Vec3]) {
+        for body in &mut self.bodies {
+            let place = self.world.bodies[body.handle].translation();
+            let Some(below) = height_below(surface, place, body.radius, self.up) else {
+                body.places.clear();
+                continue;
+            };
+            body.places.push_back(place - below * self.up);
+            if body.places.len() <= REST_FRAMES {
+                continue;
+            }
+            if body.places.len() > REST_FRAMES + 1 {
+                body.places.pop_front();
+            }
+            if body.first_rested_at_step.is_none() && body.speed() < REST_SPEED {
+                body.first_rested_at_step = Some(self.totals.steps);
+                body.home = place - below * self.up;
+            }
+        }
+    }
+
     /// One step; gives the pairs in contact.
     fn step(&mut self) -> Result<usize, TldiError> {
         let report = self.tldi.step(&mut self.world)?;
         self.totals.count(&report, report.pairs_in_contact > 0);
         self.max_penetration = self.max_penetration.max(report.max_penetration);
-        for body in &mut self.bodies {
-            let rigid_body = &self.world.bodies[body.handle];
-            let is_slow = rigid_body.linvel().length() < REST_SPEED;
-            body.slow_steps = if is_slow { body.slow_steps + 1 } else { 0 };
-            if body.slow_steps == REST_STEPS && body.first_rested_at_step.is_none() {
-                body.first_rested_at_step = Some(self.totals.steps);
-                body.home = rigid_body.translation();
-            }
-        }
+        let (bodies, colliders) = (&self.world.bodies, &self.world.colliders);
+        let contacts = self.tldi.contacts(&self.world.narrow_phase, colliders);
+        let contacts: Vec<_> = contacts.collect();
+        (self.deepest).count(self.totals.steps, &contacts, bodies, colliders);
         Ok(report.pairs_in_contact)
     }
 
@@ -268,6 +297,7 @@ impl DepthSimulation {
             frame_rate: 1.0 / (DT * STEPS_PER_FRAME as f32),
             up: self.up.to_array(),
             max_penetration: self.max_penetration,
+            deepest: self.deepest,
             missing_frames,
             median_latency_ms: latency(last / 2),
             max_latency_ms: latency(last),
@@ -286,12 +316,42 @@ impl DepthSimulation {
             name: body.named.name.clone(),
             points: body.named.cloud.len(),
             translation: rigid_body.translation().to_array(),
-            displacement: rigid_body.translation().distance(body.home),
+            displacement: (body.places.back()).map(|place| place.distance(body.home)),
             linear_speed: rigid_body.linvel().length(),
+            speed_over_surface: (!body.places.is_empty()).then(|| body.speed()),
             sleeping: rigid_body.is_sleeping(),
             first_rested_at_seconds: body.first_rested_at_step.map(|step| step as f32 * DT),
         }
     }
+}
+
+impl Body {
+    /// Mean speed, m/s, over the last frames, relative to the surface below.
+    fn speed(&self) -> f32 {
+        let ways = self.places.front().zip(self.places.back());
+        let frames = self.places.len().saturating_sub(1).max(1);
+        let way = ways.map_or(0.0, |(first, last)| first.distance(*last));
+        way / (frames * STEPS_PER_FRAME) as f32 / DT
+    }
+}
+
+/// Median height along `up`, metres, of the surface in a column below a body; `None` where there is none.
+fn height_below(surface: &[Vec3], body: Vec3, radius: f32, up: Vec3) -> Option<f32> {
+    let mut heights: Vec<f32> = (surface.iter())
+        .map(|point| *point - body)
+        .filter(|from| {
+            let height = from.dot(up);
+            (-2.0 * radius..0.0).contains(&height)
+                && from.length_squared() - height * height < 0.25 * radius * radius
+        })
+        .map(|from| from.dot(up))
+        .collect();
+    if heights.is_empty() {
+        return None;
+    }
+    let middle = heights.len() / 2;
+    let median = *(heights.select_nth_unstable_by(middle, f32::total_cmp).1);
+    Some(body.dot(up) + median)
 }
 
 fn kept<T: Copy>(values: &[T], keeps: &[bool]) -> Vec<T> {

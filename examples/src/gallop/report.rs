@@ -1,5 +1,6 @@
 //! What a run of `gallop` found.
 
+use crate::contact_kinds::ContactKinds;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -22,6 +23,8 @@ pub struct GallopReport {
     pub speed: f32,
     /// Deepest penetration in metres over all steps.
     pub max_penetration: f32,
+    /// The deepest contacts after a step, by kind.
+    pub deepest: ContactKinds,
     /// Every step.
     pub frames: Vec<GallopFrame>,
     /// Loose bodies.
@@ -85,12 +88,11 @@ impl GallopReport {
         let contacts: usize = self.frames.iter().map(|frame| frame.contacts).sum();
         writeln!(
             out,
-            "median step: {:.2} ms for new points, {:.2} ms for contacts and solver; {contacts} contact \
-             points, at most {:.2} mm deep",
+            "median step: {:.2} ms for new points, {:.2} ms for contacts and solver; {contacts} contact points",
             median(|frame| frame.deform_ms),
-            median(|frame| frame.step_ms),
-            1e3 * self.max_penetration
+            median(|frame| frame.step_ms)
         )?;
+        self.deepest.write_lines(out)?;
         self.totals.write_line(out)
     }
 }

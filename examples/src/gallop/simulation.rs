@@ -3,6 +3,7 @@
 use super::ground::Ground;
 use super::report::{GallopBody, GallopFrame, GallopReport};
 use super::runner::Runner;
+use crate::contact_kinds::ContactKinds;
 use crate::load;
 use crate::scene::BodyShape;
 use crate::step_totals::StepTotals;
@@ -68,6 +69,7 @@ pub struct GallopSimulation {
     ground_points: usize,
     totals: StepTotals,
     max_penetration: f32,
+    deepest: ContactKinds,
 }
 
 struct Body {
@@ -131,6 +133,7 @@ impl GallopSimulation {
             ground_points,
             totals: StepTotals::new(DT),
             max_penetration: 0.0,
+            deepest: ContactKinds::default(),
         })
     }
 
@@ -157,6 +160,10 @@ impl GallopSimulation {
         self.max_penetration = self.max_penetration.max(report.max_penetration);
         let contacts = self.runner_contacts();
         self.totals.count(&report, !contacts.is_empty());
+        let (bodies, colliders) = (&self.world.bodies, &self.world.colliders);
+        let all = self.tldi.contacts(&self.world.narrow_phase, colliders);
+        let all: Vec<_> = all.collect();
+        (self.deepest).count(self.totals.steps, &all, bodies, colliders);
         self.totals.add_wall_seconds(stepped.as_secs_f64());
         for body in &mut self.bodies {
             body.kicked |= contacts
@@ -228,6 +235,7 @@ impl GallopSimulation {
             mean_radius: self.mean_radius,
             speed: self.scene.speed,
             max_penetration: self.max_penetration,
+            deepest: self.deepest,
             frames: self.frames.clone(),
             bodies: (self.bodies.iter())
                 .map(|body| {

@@ -1,8 +1,8 @@
 //! How fast a surface moves that is sampled anew in every frame.
 //!
 //! New points say nothing of where the old ones went, but a surface that comes nearer stands higher
-//! along the normal of a contact than it did. What is told apart from the noise of the samples, in two
-//! steps in a row, is taken for its speed; a surface that is replaced by another one, or that stands
+//! along the normal of a contact than it did. What is told apart from the noise of the samples, twice
+//! in a row, is taken for its speed; a surface that is replaced by another one, or that stands
 //! still, has none.
 
 use nalgebra::{SMatrix, SVector};
@@ -20,10 +20,10 @@ const POINTS_PER_TERM: usize = 3;
 const PLANE: usize = 3;
 const PARABOLOID: usize = 6;
 
-/// Farthest that a surface moves in a step, in mean radii: beyond, the points of others are as near.
+/// Farthest that a surface moves from one sampling to the next, in mean radii: beyond, the points of others are as near.
 const FARTHEST: f32 = 8.0;
 
-/// Shortest way in a step, in mean radii, that counts as a motion: twice what measured depths
+/// Shortest way from one sampling to the next, in mean radii, that counts as a motion: twice what measured depths
 /// scatter by.
 const SHORTEST: f32 = 0.2;
 
@@ -119,9 +119,9 @@ fn height<const N: usize>(points: &[Vec3]) -> Option<Height> {
     (height.value.is_finite() && height.standard_error.is_finite()).then_some(height)
 }
 
-/// How far the surface of `cloud` moved along the unit `normal` at `point` in the last step, metres,
-/// from the points that it had before the step and before the one before; 0 where that cannot be
-/// told apart from noise.
+/// How far the surface of `cloud` moved along the unit `normal` at `point` from one sampling to the
+/// last, metres, from the points that it had at the two samplings before; 0 where that cannot be told
+/// apart from noise.
 pub(crate) fn way_along(
     cloud: &PointCloud<'_>,
     [earlier, before]: [&Snapshot; 2],
@@ -158,7 +158,7 @@ pub(crate) fn way_along(
     .unwrap_or(0.0)
 }
 
-/// The way of the last step, metres, where the heights of three tell two in the same direction: the shorter.
+/// The last way, metres, where the heights of three tell two in the same direction: the shorter.
 fn steady_way(heights: [Option<Height>; 3], radius: f32) -> Option<f32> {
     let [Some(earlier), Some(before), Some(now)] = heights else {
         return None;

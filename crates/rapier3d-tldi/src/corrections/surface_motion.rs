@@ -42,12 +42,25 @@ struct SurfaceMotion {
 /// Of a cloud that was sampled anew.
 struct SampledMotion {
     collider: ColliderHandle,
-    /// Its points before that, and, if it was sampled anew in the step before as well, those that it
-    /// had before that.
+    /// Its points before that, and, if it was sampled anew shortly before as well, those that it had
+    /// before that.
     before: Snapshot,
     earlier: Option<Snapshot>,
-    /// Since the last step, or in it.
-    is_new: bool,
+    /// Steps that ended since.
+    age: u32,
+    /// Steps from the sampling before to the last one; 1 where there was none.
+    interval: u32,
+}
+
+/// Most steps from one sampling to the next that say how fast a surface moves: a camera's 15 frames a
+/// second in 120 steps. What comes later is another surface.
+const LONGEST_INTERVAL: u32 = 8;
+
+impl SampledMotion {
+    /// Whether the next sampling is not due yet.
+    fn is_moving(&self) -> bool {
+        self.age < self.interval
+    }
 }
 
 /// Share of rapier's fastest correction up to which that is left to do it: its contacts rub.
@@ -93,17 +106,19 @@ impl SurfaceMotions {
         self.forget_velocities(collider);
         match self.sampled.iter_mut().find(|m| m.collider == collider) {
             // Twice since the last step: what lay before the first time counts.
-            Some(motion) if motion.is_new => self.spare_snapshots.push(before),
+            Some(motion) if motion.age == 0 => self.spare_snapshots.push(before),
             Some(motion) => {
                 let earlier = std::mem::replace(&mut motion.before, before);
                 self.spare_snapshots.extend(motion.earlier.replace(earlier));
-                motion.is_new = true;
+                motion.interval = motion.age;
+                motion.age = 0;
             }
             None => self.sampled.push(SampledMotion {
                 collider,
                 before,
                 earlier: None,
-                is_new: true,
+                age: 0,
+                interval: 1,
             }),
         }
     }
@@ -143,24 +158,27 @@ impl SurfaceMotions {
         self.least_push
     }
 
-    /// After a step, surfaces stand still until they are moved again.
+    /// After a step, surfaces that deformed stand still until they are moved again. Those that are
+    /// sampled anew every few steps go on until the next sampling is due.
     pub(crate) fn clear(&mut self) {
         self.spare
             .extend(self.motions.drain(..).map(|motion| motion.velocities));
-        let stopped = self.sampled.extract_if(.., |motion| !motion.is_new);
+        for motion in &mut self.sampled {
+            motion.age += 1;
+        }
+        let stopped = self
+            .sampled
+            .extract_if(.., |motion| motion.age > LONGEST_INTERVAL);
         for motion in stopped {
             self.spare_snapshots.push(motion.before);
             self.spare_snapshots.extend(motion.earlier);
-        }
-        for motion in &mut self.sampled {
-            motion.is_new = false;
         }
     }
 
     /// Whether one of these colliders has a motion.
     pub(crate) fn have(&self, colliders: [ColliderHandle; 2]) -> bool {
         let deformed = self.motions.iter().map(|motion| motion.collider);
-        let sampled = self.sampled.iter().filter(|motion| motion.is_new);
+        let sampled = self.sampled.iter().filter(|motion| motion.is_moving());
         deformed
             .chain(sampled.map(|motion| motion.collider))
             .any(|collider| colliders.contains(&collider))
@@ -186,12 +204,12 @@ impl SurfaceMotions {
         if let Some(motion) = self.motions.iter().find(|m| m.collider == collider) {
             return pose.rotation * mean_near(shape.cloud(), &motion.velocities, local);
         }
-        let sampled = self.sampled.iter().find(|m| m.collider == collider);
-        match sampled.and_then(|m| Some([m.earlier.as_ref()?, &m.before])) {
-            Some(old) if self.dt > 0.0 => {
+        let sampled = (self.sampled.iter()).find(|m| m.collider == collider && m.is_moving());
+        match sampled.and_then(|m| Some(([m.earlier.as_ref()?, &m.before], m.interval))) {
+            Some((old, interval)) if self.dt > 0.0 => {
                 let normal_in_cloud = pose.rotation.inverse() * normal;
                 let way = way_along(shape.cloud(), old, local, normal_in_cloud);
-                way / self.dt * normal
+                way / (interval as f32 * self.dt) * normal
             }
             _ => Vector::ZERO,
         }

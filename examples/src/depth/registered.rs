@@ -1,0 +1,206 @@
+//! Generated depth frames with all that is wrong with real ones, and the truth: a room with a table and
+//! boxes, seen by a camera whose frames are registered to another one.
+
+use fastrand::Rng;
+use tldi::VirtualCamera;
+use tldi::glamx::{Pose3, Vec3};
+use tldi_sources::depth::{Intrinsics, SensorModel};
+
+/// Columns and rows, focal length in pixels.
+const SIZE: [usize; 2] = [640, 480];
+const FOCAL: f32 = 560.0;
+/// Half the width and depth of the room, its height, metres; z is up.
+const ROOM: Vec3 = Vec3::new(2.2, 1.9, 2.5);
+/// Difference of depth, metres, from which on a pixel may mix what is before and behind.
+const JUMP: f32 = 0.05;
+/// Radius of a hole, pixels, and how many there are.
+const HOLE: i32 = 12;
+const HOLES: usize = 60;
+
+/// A box along the axes.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    min: Vec3,
+    max: Vec3,
+}
+
+/// What a pixel really sees.
+#[derive(Clone, Copy, Debug)]
+pub struct TruePixel {
+    /// Depth along the optical axis, metres.
+    pub depth: f32,
+    /// Unit normal of the surface, towards the camera, in the world.
+    pub normal: Vec3,
+}
+
+/// The frames of one scene. The camera and all things stand still; the noise is new in every frame.
+#[derive(Clone, Debug)]
+pub struct RegisteredFrames {
+    /// From the frame of the camera into that of the world, whose z is up.
+    pub world_from_camera: Pose3,
+    /// How the sensor errs.
+    pub model: SensorModel,
+    seed: u64,
+    /// Columns and rows that are empty: every so manieth.
+    periods: [usize; 2],
+    /// Share of the pixels that are empty at random, on top of grid and holes.
+    dropped: f32,
+    truth: Vec<TruePixel>,
+}
+
+impl RegisteredFrames {
+    /// A scene of its own for every seed.
+    pub fn new(seed: u64) -> Self {
+        let mut rng = Rng::with_seed(seed);
+        let mut within = |low: f32, high: f32| low + (high - low) * rng.f32();
+        let table = {
+            let middle = Vec3::new(within(-0.3, 0.3), within(0.1, 0.6), 0.0);
+            let half = Vec3::new(within(0.5, 0.8), within(0.35, 0.5), 0.0);
+            let height = within(0.4, 0.75);
+            Block {
+                min: middle - half,
+                max: middle + half + height * Vec3::Z,
+            }
+        };
+        let mut blocks = vec![table];
+        for (x, floor) in [(-1.6, 0.0), (1.6, 0.0), (-0.3, table.max.z)] {
+            let half = Vec3::new(within(0.08, 0.2), within(0.08, 0.2), 0.0);
+            let base = if floor > 0.0 {
+                let place = within(0.1, 0.35);
+                Vec3::new(table.max.x - place, table.max.y - half.y, floor)
+            } else {
+                Vec3::new(x, within(-0.2, 0.8), floor)
+            };
+            blocks.push(Block {
+                min: base - half,
+                max: base + half + within(0.1, 0.4) * Vec3::Z,
+            });
+        }
+        let eye = Vec3::new(
+            within(-0.6, 0.6),
+            within(-1.7, -1.2),
+            table.max.z + within(0.5, 0.9),
+        );
+        let target = Vec3::new(0.0, table.min.y + 0.3, table.max.z - within(0.0, 0.2));
+        // Held by hand: a few degrees of roll.
+        let roll = within(-0.08, 0.08);
+        let upper = (Vec3::Z + roll * Vec3::X).normalize();
+        let size = SIZE.map(|n| n as u32);
+        let camera = VirtualCamera::perspective(eye, target, upper, 1.0, size, 0.1, 10.0);
+        let world_from_camera = camera.view_from_frame.inverse();
+        let periods = [rng.usize(4..9), rng.usize(4..9)];
+        let dropped = 0.3 * rng.f32();
+        let truth = (0..SIZE[0] * SIZE[1])
+            .map(|k| {
+                let [x, y] = [0, 1].map(|axis| {
+                    let at = if axis == 0 { k % SIZE[0] } else { k / SIZE[0] };
+                    (at as f32 - (0.5 * SIZE[axis] as f32 - 0.5)) / FOCAL
+                });
+                // The ray's parameter is the depth: its direction is 1 along the camera's z.
+                let direction = world_from_camera.rotation * Vec3::new(x, y, 1.0);
+                nearest(&blocks, eye, direction)
+            })
+            .collect();
+        Self {
+            world_from_camera,
+            model: SensorModel::default(),
+            seed,
+            periods,
+            dropped,
+            truth,
+        }
+    }
+
+    /// Geometry of the camera.
+    pub fn intrinsics(&self) -> Intrinsics {
+        Intrinsics {
+            size: SIZE,
+            focal: [FOCAL; 2],
+            center: SIZE.map(|n| 0.5 * n as f32 - 0.5),
+            depth_unit: self.model.step,
+        }
+    }
+
+    /// What the pixels really see, row by row.
+    pub fn truth(&self) -> &[TruePixel] {
+        &self.truth
+    }
+
+    /// A frame as the sensor gives it, row by row, in units of
+    /// [`Intrinsics::depth_unit`]; 0 is no measurement.
+    pub fn depths(&self, frame: usize) -> Vec<u16> {
+        let mut rng = Rng::with_seed(self.seed ^ (frame as u64 + 1) << 16);
+        let [width, height] = SIZE;
+        let mut depths: Vec<u16> = (0..width * height)
+            .map(|k| {
+                let (u, v) = (k % width, k / width);
+                let [every_column, every_row] = self.periods;
+                // All numbers are drawn for every pixel, so that none changes those of the next.
+                let draws = [rng.f32(), rng.f32(), rng.f32()];
+                let gauss: f32 = (0..12).map(|_| rng.f32()).sum::<f32>() - 6.0;
+                if u % every_column == 1 || v % every_row == 2 || draws[0] < self.dropped {
+                    return 0;
+                }
+                let mut depth = self.truth[k].depth;
+                let behind = [k + 1, k + width].into_iter().find_map(|other| {
+                    let other = self.truth.get(other)?.depth;
+                    ((other - depth).abs() > JUMP).then_some(other)
+                });
+                if let Some(behind) = behind.filter(|_| draws[1] < 0.5) {
+                    depth += draws[2] * (behind - depth);
+                }
+                // Rounding is a part of the model of its own.
+                let z2 = self.model.noise * depth * depth;
+                let seen = depth + gauss * z2.hypot(self.model.floor);
+                (seen / self.model.step).round() as u16
+            })
+            .collect();
+        for _ in 0..HOLES {
+            let [u, v] = SIZE.map(|n| rng.i32(..n as i32));
+            for y in (v - HOLE).max(0)..(v + HOLE).min(height as i32) {
+                for x in (u - HOLE).max(0)..(u + HOLE).min(width as i32) {
+                    if (x - u).pow(2) + (y - v).pow(2) < HOLE * HOLE {
+                        depths[y as usize * width + x as usize] = 0;
+                    }
+                }
+            }
+        }
+        depths
+    }
+}
+
+/// Where a ray first meets a block or the room from within.
+fn nearest(blocks: &[Block], origin: Vec3, direction: Vec3) -> TruePixel {
+    let room = Block {
+        min: ROOM.with_z(0.0) * Vec3::new(-1.0, -1.0, 0.0),
+        max: ROOM,
+    };
+    let (_, depth, axis) = crossings(&room, origin, direction);
+    let mut best = (depth, axis[1]);
+    for block in blocks {
+        let (near, far, axis) = crossings(block, origin, direction);
+        if near <= far && near > 0.0 && near < best.0 {
+            best = (near, axis[0]);
+        }
+    }
+    let axis = [Vec3::X, Vec3::Y, Vec3::Z][best.1];
+    TruePixel {
+        depth: best.0,
+        normal: -axis * axis.dot(direction).signum(),
+    }
+}
+
+/// Where a ray's line enters a box and leaves it, and through sides across which axes.
+fn crossings(block: &Block, origin: Vec3, direction: Vec3) -> (f32, f32, [usize; 2]) {
+    let (mut near, mut far, mut axes) = (f32::NEG_INFINITY, f32::INFINITY, [0; 2]);
+    for k in 0..3 {
+        let [a, b] = [block.min[k], block.max[k]].map(|side| (side - origin[k]) / direction[k]);
+        if a.min(b) > near {
+            (near, axes[0]) = (a.min(b), k);
+        }
+        if a.max(b) < far {
+            (far, axes[1]) = (a.max(b), k);
+        }
+    }
+    (near, far, axes)
+}
