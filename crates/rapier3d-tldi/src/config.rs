@@ -3,7 +3,7 @@
 use crate::narrow_phase::parts::cloud_of;
 use crate::{Resolution, TldiError};
 use rapier3d::parry::shape::Shape;
-use tldi::plan::largest_pixel;
+use tldi::plan::{largest_pixel, least_pixel};
 use tldi::{CameraPolicy, Params, Variant};
 
 /// Contacts are searched up to this many standard deviations of given noise. So the fit at a light
@@ -118,10 +118,12 @@ impl TldiConfig {
         };
         let noise = |part| cloud_of(part).map_or(0.0, |shape| shape.cloud().noise());
         let fitted = FITTED * parts.into_iter().map(noise).fold(0.0, f32::max);
+        let least = |part| cloud_of(part).map_or(0.0, |shape| least_pixel(shape.cloud()));
+        let least = parts.into_iter().map(least).fold(0.0, f32::max);
         let pixel_size = self.resolution.pixel_size(coarsest).min(to_resolve);
         Some(
             params
-                .with_pixel_size(pixel_size)
+                .with_pixel_size(pixel_size.max(least))
                 .with_prediction(prediction.max(fitted)),
         )
     }

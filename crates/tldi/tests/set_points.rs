@@ -281,6 +281,21 @@ fn points_that_move_keep_radii_from_neighbours() {
 }
 
 /// One place has no spacing: the cloud stays as it was.
+/// Radii that neighbours tell are held to the limits that given ones are.
+#[test]
+fn points_too_far_apart_for_a_radius_are_refused() {
+    let mut cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X])
+        .knn_radii(1, 0.65)
+        .build()
+        .expect("valid");
+    let refused = cloud.set_points(&[Vec3::ZERO, 1e14 * Vec3::X], None);
+    assert!(
+        matches!(refused, Err(CloudError::BadRadius { index: 0, .. })),
+        "{refused:?}"
+    );
+    assert_eq!(cloud.mean_radius(), 0.65);
+}
+
 #[test]
 fn points_without_a_spacing_are_refused() {
     let mut cloud = PointCloud::builder(grid(9, 1.0)).build().expect("valid");

@@ -334,9 +334,9 @@ impl<'a> PointCloud<'a> {
             (_, _) => None,
         };
         let radii = new_radii.as_ref().unwrap_or(&self.radii);
-        check_coordinates(coordinates, bounds, radii, |i| {
-            order.map_or(i, |order| order[i] as usize)
-        })?;
+        let given_index = |i: usize| order.map_or(i, |order| order[i] as usize);
+        check_radii(radii, given_index)?;
+        check_coordinates(coordinates, bounds, radii, given_index)?;
         if let Some(normals) = normals {
             new_normals.clear();
             match order {

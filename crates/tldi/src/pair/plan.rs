@@ -4,7 +4,7 @@
 use crate::cloud::reach::{Ring, farthest};
 use crate::cpu::{columns, compare, normals, normals_sharpen, planes, splat, sweep};
 use crate::view::{approach, camera_policy};
-use crate::{Aabb, BLOCK, PairQuery, Params, Surface, View};
+use crate::{Aabb, BLOCK, PairQuery, Params, PointCloud, Surface, View};
 use glamx::{Pose3, Vec3};
 
 pub use crate::cpu::compare::CROSSED;
@@ -190,6 +190,24 @@ pub fn largest_pixel(extents: Vec3, radius: f32) -> f32 {
     let mut extents = extents.to_array();
     extents.sort_by(f32::total_cmp);
     (extents[1] / LEAST_PIXELS).max(radius)
+}
+
+/// Most pixels from a cloud's origin to a point: an `i32` holds eight times as many. Only pixels far smaller than radii
+/// have more, since coordinates have no more than 2¹⁹ radii.
+const MOST_PIXELS: f32 = (1 << 28) as f32;
+
+/// The smallest pixels, metres, that can be counted from the cloud's origin to its points. Cost: O(1).
+///
+/// ```
+/// use tldi::{PointCloud, glamx::Vec3, plan::least_pixel};
+/// let cloud = PointCloud::builder(vec![127.0 * Vec3::X]).radius(1.0).build()?;
+/// assert_eq!(least_pixel(&cloud), 128.0 / 2f32.powi(28));
+/// # Ok::<(), tldi::CloudError>(())
+/// ```
+pub fn least_pixel(cloud: &PointCloud) -> f32 {
+    let bounds = cloud.bounds();
+    let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
+    (farthest + cloud.max_radius()) / MOST_PIXELS
 }
 
 /// Every how many points of a cloud of this mean radius are enough for pixels of this size, metres.

@@ -1,5 +1,6 @@
 //! Which pairs can be compared, and why others cannot.
 
+use crate::pair::plan::least_pixel;
 use crate::{ImpactQuery, PairQuery, Params, Projection, Surface, Variant, View, paper};
 use glamx::Vec3;
 use std::ops::RangeInclusive;
@@ -24,7 +25,7 @@ impl PairQuery<'_> {
             return Err("a_from_b, motion and last_axis must be finite");
         }
         if matches!(self.view, View::Aim { .. }) {
-            has_few_pixels([self.a, self.b], self.params.pixel_size)?;
+            is_countable([self.a, self.b], self.params.pixel_size)?;
         }
         let exact = matches!(self.a, Surface::Exact(_)) || matches!(self.b, Surface::Exact(_));
         if exact && self.params.variant() == Variant::Paper {
@@ -62,23 +63,16 @@ pub(crate) fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static 
     }
 }
 
-/// Most pixels from a cloud's origin to a point: an `i32` holds eight times as many. Only pixels far smaller than radii
-/// have more, since coordinates have no more than 2¹⁹ radii.
-const MOST_PIXELS: f32 = (1 << 28) as f32;
-
-fn has_few_pixels(surfaces: [Surface; 2], pixel_size: f32) -> Result<(), &'static str> {
-    let farthest = |surface: Surface| match surface {
-        Surface::Cloud(cloud) => {
-            let bounds = cloud.bounds();
-            bounds.min.abs().max(bounds.max.abs()).max_element() + cloud.max_radius()
-        }
-        Surface::Exact(_) | Surface::Device(_) => 0.0,
+fn is_countable(surfaces: [Surface; 2], pixel_size: f32) -> Result<(), &'static str> {
+    let is_less = |surface| match surface {
+        Surface::Cloud(cloud) => pixel_size < least_pixel(cloud),
+        Surface::Exact(_) | Surface::Device(_) => false,
     };
-    match surfaces.into_iter().map(farthest).fold(0.0, f32::max) <= MOST_PIXELS * pixel_size {
-        true => Ok(()),
-        false => {
+    match surfaces.into_iter().any(is_less) {
+        true => {
             Err("pixel_size is less than 2^-28 of the farthest coordinate: choose a larger one")
         }
+        false => Ok(()),
     }
 }
 
@@ -90,7 +84,7 @@ impl ImpactQuery<'_> {
         if !(self.a_from_b.is_finite() && self.motion.is_finite() && self.touching.is_finite()) {
             return Err("a_from_b, motion and touching must be finite");
         }
-        has_few_pixels([self.a, self.b], self.params.pixel_size)
+        is_countable([self.a, self.b], self.params.pixel_size)
     }
 }
 
