@@ -1,17 +1,18 @@
 //! Points, normals and radii of the pixels of a tile's line, all at once.
 
 use super::camera::{Intrinsics, SensorModel};
+use multiversion::multiversion;
 use tldi::glamx::{Mat3, Pose3, Vec3};
 
 /// Edge in pixels of the tiles in which points come: their bounds are tight, so that what is out of
 /// reach is passed over.
 pub(super) const TILE: usize = 16;
-/// Pixels of a window to each side of its middle, in its spacing.
-const ARM: isize = 2;
+/// Columns of a window, and its rows, from its middle, in its spacing.
+const WINDOW: [i8; 5] = [-2, -1, 0, 1, 2];
 /// Widest spacing of a window in pixels.
 const WIDEST: usize = 10;
 /// Pixels that a window reaches to each side at most.
-pub(super) const REACH: usize = ARM as usize * WIDEST;
+pub(super) const REACH: usize = WINDOW.len() / 2 * WIDEST;
 /// Standard error of a slope, in radians, that a full window is made wide enough for. Half of its
 /// pixels leave 4°, of which nine in ten directions are within 9°.
 const SLOPE_ERROR: f32 = 0.05;
@@ -19,6 +20,9 @@ const SLOPE_ERROR: f32 = 0.05;
 const FEWEST: f32 = 6.0;
 /// Least variance of those pixels across their main direction, in squares of the spacing: fewer are a row.
 const LEAST_WIDTH: f32 = 0.1;
+/// Three standard errors of the slope of a first plane, of half of the window's pixels, over a spacing,
+/// as a part of what a single pixel may differ by.
+const ERROR_STEP: f32 = 0.2;
 /// Standard deviations of the difference of two pixels that a surface may show.
 pub(super) const DEVIATIONS: f32 = 3.0 * std::f32::consts::SQRT_2;
 /// Steepest surface, as the tangent of the angle between it and the image plane, that is not taken
@@ -29,6 +33,12 @@ const STEEPEST: f32 = 5.67;
 const STEEPEST_IN_WINDOW: f32 = 2.75;
 /// Radius that covers a square grid, in its spacing, with a little overlap.
 const COVER: f32 = 0.75;
+
+/// √(x² + y²), without the care for overflow that makes `f32::hypot` slow.
+#[inline(always)]
+fn length(x: f32, y: f32) -> f32 {
+    (x * x + y * y).sqrt()
+}
 
 /// What is the same for all pixels of a frame.
 pub(super) struct Optics {
@@ -84,13 +94,14 @@ pub(super) struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    fn line(&self, list: &'a [f32], right: isize, down: isize) -> &'a [f32] {
+    #[inline(always)]
+    fn line(&self, list: &'a [f32], right: isize, down: isize) -> &'a [f32; TILE] {
         let at = (self.first as isize + down * self.stride as isize + right) as usize;
-        &list[at..at + TILE]
+        &list[at..].as_chunks().0[0]
     }
 
     /// Depths of the line.
-    pub(super) fn depth(&self) -> &'a [f32] {
+    pub(super) fn depth(&self) -> &'a [f32; TILE] {
         self.line(self.depths, 0, 0)
     }
 }
@@ -108,25 +119,26 @@ pub(super) struct Pixels {
 
 /// Planes through the windows of a line's pixels: inverse depth, which on a plane is linear in the
 /// image, over columns and rows.
-#[derive(Clone, Copy)]
 struct Planes {
-    /// Change of inverse depth from one pixel to the next, to the right and downwards.
-    slopes: [[f32; 2]; TILE],
+    /// Change of inverse depth over a spacing of the windows, to the right and downwards.
+    slopes: [[f32; TILE]; 2],
     /// Inverse depth in the middle, beside that of the pixel itself.
     offsets: [f32; TILE],
     /// Whether there are pixels enough.
-    is_told: [bool; TILE],
+    are_told: [bool; TILE],
 }
 
 impl Planes {
+    /// Through the pixels themselves, parallel to the image.
     const LEVEL: Self = Self {
-        slopes: [[0.0; 2]; TILE],
+        slopes: [[0.0; TILE]; 2],
         offsets: [0.0; TILE],
-        is_told: [false; TILE],
+        are_told: [false; TILE],
     };
 
     /// Fits planes to the pixels of the windows that differ from these planes through the pixel itself
-    /// by `slack` and `slack_step` a pixel of distance at most, in inverse depth.
+    /// by `slack` and `slack_step` a spacing of distance at most, in inverse depth.
+    #[inline(always)]
     fn fitted(
         &self,
         window: &Window<'_>,
@@ -137,57 +149,71 @@ impl Planes {
         // Sums over the pixels of 1, x, y, d, xx, xy, yy, xd, yd.
         let mut sums = [[0.0_f32; TILE]; 9];
         let middle = window.line(window.inverses, 0, 0);
-        for row in -ARM..=ARM {
-            for column in -ARM..=ARM {
-                let [x, y] = [column, row].map(|k| (k * spacing as isize) as f32);
-                let away = x.hypot(y);
-                let line = window.line(
-                    window.inverses,
-                    column * spacing as isize,
-                    row * spacing as isize,
-                );
-                for k in 0..TILE {
+        for down in WINDOW {
+            let y = f32::from(down);
+            let lines = WINDOW.map(|right| {
+                let [right, down] = [right, down].map(|k| isize::from(k) * spacing as isize);
+                window.line(window.inverses, right, down)
+            });
+            for k in 0..TILE {
+                // The row's sums without y, which is the same for all of it: they stay in registers.
+                let [mut n, mut x, mut d, mut xx, mut xd] = [0.0_f32; 5];
+                for (right, line) in WINDOW.into_iter().zip(lines) {
+                    let right = f32::from(right);
                     let difference = line[k] - middle[k];
-                    let off = difference - (self.slopes[k][0] * x + self.slopes[k][1] * y);
-                    let is_on = (line[k] > 0.0) & (off.abs() <= slack[k] + away * slack_step[k]);
+                    let off = difference - (self.slopes[0][k] * right + self.slopes[1][k] * y);
+                    let most = slack[k] + length(right, y) * slack_step[k];
+                    let is_on = (line[k] > 0.0) & (off.abs() <= most);
                     let one = if is_on { 1.0 } else { 0.0 };
-                    let d = if is_on { difference } else { 0.0 };
-                    let terms = [
-                        one,
-                        one * x,
-                        one * y,
-                        d,
-                        one * x * x,
-                        one * x * y,
-                        one * y * y,
-                        x * d,
-                        y * d,
-                    ];
-                    for (sum, term) in sums.iter_mut().zip(terms) {
-                        sum[k] += term;
-                    }
+                    let difference = if is_on { difference } else { 0.0 };
+                    n += one;
+                    x += right * one;
+                    d += difference;
+                    xx += right * right * one;
+                    xd += right * difference;
+                }
+                let terms = [n, x, y * n, d, xx, y * x, y * y * n, xd, y * d];
+                for (sum, term) in sums.iter_mut().zip(terms) {
+                    sum[k] += term;
                 }
             }
         }
+        let [ones, xs, ys, ds, xxs, xys, yys, xds, yds] = &sums;
         let mut planes = Self::LEVEL;
         for k in 0..TILE {
-            let [n, x, y, d, xx, xy, yy, xd, yd] = sums.map(|sum| sum[k]);
-            let n = n.max(1.0);
-            let [xx, xy, yy] = [xx - x * x / n, xy - x * y / n, yy - y * y / n];
-            let [xd, yd] = [xd - x * d / n, yd - y * d / n];
+            let [n, x, y, d] = [ones[k].max(1.0), xs[k], ys[k], ds[k]];
+            let [xx, xy] = [xxs[k] - x * x / n, xys[k] - x * y / n];
+            let yy = yys[k] - y * y / n;
+            let [xd, yd] = [xds[k] - x * d / n, yds[k] - y * d / n];
             let determinant = xx * yy - xy * xy;
             // The smaller of the two variances is at least the determinant by the trace.
-            let width = determinant / ((xx + yy).max(f32::MIN_POSITIVE) * n);
-            let least = LEAST_WIDTH * (spacing * spacing) as f32;
-            planes.is_told[k] = (n >= FEWEST) & (width >= least);
-            if planes.is_told[k] {
-                let slopes =
-                    [yy * xd - xy * yd, xx * yd - xy * xd].map(|slope| slope / determinant);
-                planes.slopes[k] = slopes;
-                planes.offsets[k] = (d - slopes[0] * x - slopes[1] * y) / n;
-            }
+            let is_told = (n >= FEWEST) & (determinant >= LEAST_WIDTH * (xx + yy) * n);
+            let if_told = |value: f32| if is_told { value } else { 0.0 };
+            let right = if_told((yy * xd - xy * yd) / determinant);
+            let down = if_told((xx * yd - xy * xd) / determinant);
+            planes.slopes[0][k] = right;
+            planes.slopes[1][k] = down;
+            planes.offsets[k] = if_told((d - right * x - down * y) / n);
+            planes.are_told[k] = is_told;
         }
         planes
+    }
+
+    /// Through windows of a spacing: first through the pixels that differ from their middle by no more
+    /// than `slack` and `slope_step` a pixel, then through those that differ from that plane by no more
+    /// than `slack` and its own error, all in inverse depth.
+    #[inline(always)]
+    fn over(
+        window: &Window<'_>,
+        spacing: usize,
+        slack: &[f32; TILE],
+        slope_step: &[f32; TILE],
+    ) -> Self {
+        let slope_step = slope_step.map(|step| spacing as f32 * step);
+        let error_step = slack.map(|slack| ERROR_STEP * slack);
+        Self::LEVEL
+            .fitted(window, spacing, slack, &slope_step)
+            .fitted(window, spacing, slack, &error_step)
     }
 }
 
@@ -198,9 +224,12 @@ impl Planes {
 /// those that differ by no more than noise and slope allow, then those that differ from the plane so
 /// found by no more than noise and that plane's own error. The noisier the depth, the wider the
 /// window. Where it holds too few, a small one takes its place, as on what is thin, or else a larger one.
-#[inline]
-pub(super) fn compute(
-    window: &Window<'_>,
+///
+/// It is compiled for several instruction sets, of which the machine's is chosen. Results are the same: no
+/// fused multiply-add is made of two operations. What it calls must be inlined, or else is not among them.
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+pub(super) fn compute<'a>(
+    window: &Window<'a>,
     columns: &[f32],
     row: f32,
     optics: &Optics,
@@ -214,31 +243,28 @@ pub(super) fn compute(
     }
     let spacing = optics.spacing(farthest);
     let mut deviations = [0.0; TILE];
-    let (mut slack, mut slope_step, mut error_step) = ([0.0; TILE], [0.0; TILE], [0.0; TILE]);
+    let (mut slack, mut slope_step) = ([0.0; TILE], [0.0; TILE]);
     for k in 0..TILE {
         let (z, w) = (depth[k], inverse[k]);
         deviations[k] = optics.model.deviation(z);
         slack[k] = DEVIATIONS * deviations[k] * w * w;
         slope_step[k] = STEEPEST_IN_WINDOW / STEEPEST * optics.slope_step * w;
-        // Three standard errors of the slope of the first plane, of half of the pixels.
-        error_step[k] = slack[k] / (5.0 * spacing as f32);
     }
-    let plane_over = |spacing: usize| {
-        let first = Planes::LEVEL.fitted(window, spacing, &slack, &slope_step);
-        first.fitted(window, spacing, &slack, &error_step)
-    };
-    let mut planes = plane_over(spacing);
-    for other in [1, (2 * spacing).min(WIDEST)] {
-        let is_untold = (0..TILE).any(|k| depth[k] > 0.0 && !planes.is_told[k]);
-        if other == spacing || !is_untold {
+    let mut planes = Planes::LEVEL;
+    let spacings = [spacing, 1, (2 * spacing).min(WIDEST)];
+    for (attempt, other) in spacings.into_iter().enumerate() {
+        let are_all_told = (0..TILE).all(|k| planes.are_told[k] | (depth[k] == 0.0));
+        if are_all_told || (attempt > 0 && other == spacing) {
             continue;
         }
-        let others = plane_over(other);
-        for k in (0..TILE).filter(|k| others.is_told[*k]) {
-            if !planes.is_told[k] {
-                planes.slopes[k] = others.slopes[k];
+        let others = Planes::over(window, other, &slack, &slope_step);
+        for k in 0..TILE {
+            if !planes.are_told[k] {
+                for axis in 0..2 {
+                    planes.slopes[axis][k] = others.slopes[axis][k] / other as f32;
+                }
                 planes.offsets[k] = others.offsets[k];
-                planes.is_told[k] = true;
+                planes.are_told[k] = others.are_told[k];
             }
         }
     }
@@ -249,18 +275,136 @@ pub(super) fn compute(
         // Largest difference of depth from one pixel to the next on a surface.
         let limit = DEVIATIONS * deviations[k] + optics.slope_step * z;
         let is_off = |other: f32| (other > 0.0) & ((other - z).abs() > limit);
-        let jumps = around.iter().any(|line| is_off(line[k]));
+        let jumps = (around.iter()).fold(false, |jumps, line| jumps | is_off(line[k]));
         let is_off_plane = planes.offsets[k].abs() > slack[k];
-        pixels.flies[k] = jumps | !planes.is_told[k] | is_off_plane;
+        pixels.flies[k] = jumps | !planes.are_told[k] | is_off_plane;
         let ray = Vec3::new(columns[k], row, 1.0);
         // On the plane n · p = 1: n.x x / z + n.y y / z + n.z = 1 / z.
-        let [x, y] = [0, 1].map(|axis| planes.slopes[k][axis] * optics.focal[axis]);
+        let [x, y] = [0, 1].map(|axis| planes.slopes[axis][k] * optics.focal[axis]);
         let w = w + planes.offsets[k];
         let normal = Vec3::new(x, y, w - (x * ray.x + y * ray.y));
         let towards = if normal.dot(ray) > 0.0 { -1.0 } else { 1.0 };
         let normal = normal * (towards / normal.length());
         pixels.points[k] = (optics.origin + optics.rotation * (z * ray)).to_array();
         pixels.normals[k] = (optics.rotation * normal).to_array();
-        pixels.radii[k] = (optics.footprint * z).hypot(deviations[k]);
+        pixels.radii[k] = length(optics.footprint * z, deviations[k]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fastrand::Rng;
+
+    /// A window's pixels: column and row in pixels from its middle, and inverse depth.
+    type Seen = Vec<[f64; 3]>;
+
+    /// Slopes a pixel and inverse depth in the middle of the least-squares plane, by Cramer's rule on
+    /// plain sums; nothing where there are too few pixels, or no more than a row of them.
+    fn least_squares(seen: &Seen, spacing: f64) -> Option<[f64; 3]> {
+        let sum = |term: &dyn Fn(&[f64; 3]) -> f64| seen.iter().map(term).sum::<f64>();
+        let columns = [
+            [sum(&|p| p[0] * p[0]), sum(&|p| p[0] * p[1]), sum(&|p| p[0])],
+            [sum(&|p| p[0] * p[1]), sum(&|p| p[1] * p[1]), sum(&|p| p[1])],
+            [sum(&|p| p[0]), sum(&|p| p[1]), seen.len() as f64],
+        ];
+        let right_side = [sum(&|p| p[0] * p[2]), sum(&|p| p[1] * p[2]), sum(&|p| p[2])];
+        let determinant = |m: [[f64; 3]; 3]| {
+            let minor = |i: usize, j: usize| m[1][i] * m[2][j] - m[1][j] * m[2][i];
+            m[0][0] * minor(1, 2) - m[0][1] * minor(0, 2) + m[0][2] * minor(0, 1)
+        };
+        let whole = determinant(columns);
+        let n = seen.len() as f64;
+        let [mean_x, mean_y] = [0, 1].map(|axis| sum(&|p| p[axis]) / n);
+        let squares = sum(&|p| (p[0] - mean_x).powi(2) + (p[1] - mean_y).powi(2));
+        let width = whole / n / squares / n;
+        let is_told = n >= f64::from(FEWEST) && width >= f64::from(LEAST_WIDTH) * spacing * spacing;
+        is_told.then(|| {
+            std::array::from_fn(|k| {
+                let mut replaced = columns;
+                replaced[k] = right_side;
+                determinant(replaced) / whole
+            })
+        })
+    }
+
+    /// Planes with noise, a step beyond some column and a third to two thirds empty, at all spacings
+    /// that matter.
+    #[test]
+    fn planes_are_those_of_least_squares() {
+        const STRIDE: usize = TILE + 2 * REACH;
+        const NOISE: f32 = 2e-3;
+        const FEW: f32 = 1.5 * NOISE;
+        let mut rng = Rng::with_seed(7);
+        let [mut told, mut untold] = [0, 0];
+        for spacing in [1, 2, 3, 7, WIDEST] {
+            // The slack is what few pixels exceed. The last one is so large that only empty pixels are off.
+            for (share, slack) in [(0.0, FEW), (0.33, FEW), (0.67, FEW), (0.67, 2.0)] {
+                let slope = [rng.f32() - 0.5, rng.f32() - 0.5].map(|s| 5e-3 * s);
+                let edge = REACH + rng.usize(..TILE);
+                let inverses: Vec<f32> = (0..STRIDE * (2 * REACH + 1))
+                    .map(|at| {
+                        let [u, v] = [at % STRIDE, at / STRIDE];
+                        let plane = 1.0 + slope[0] * u as f32 + slope[1] * v as f32;
+                        let step = if u > edge { 0.3 } else { 0.0 };
+                        let noise = NOISE * (rng.f32() + rng.f32() + rng.f32() - 1.5);
+                        let is_empty = rng.f32() < share;
+                        if is_empty { 0.0 } else { plane + step + noise }
+                    })
+                    .collect();
+                let first = REACH * STRIDE + REACH;
+                let window = Window {
+                    depths: &[],
+                    inverses: &inverses,
+                    first,
+                    stride: STRIDE,
+                };
+                // As steep surfaces need.
+                let slope_step = 4e-3;
+                let planes = Planes::over(&window, spacing, &[slack; TILE], &[slope_step; TILE]);
+                for k in 0..TILE {
+                    let middle = f64::from(inverses[first + k]);
+                    let seen = |plane: [f64; 2], step: f64| -> Seen {
+                        let mut seen = Vec::new();
+                        for place in 0..25 {
+                            let [x, y] = [place % 5, place / 5].map(|p| (p - 2) * spacing as isize);
+                            let at = (first + k) as isize + y * STRIDE as isize + x;
+                            let inverse = f64::from(inverses[at as usize]);
+                            let [x, y] = [x as f64, y as f64];
+                            let off = inverse - middle - plane[0] * x - plane[1] * y;
+                            let most = f64::from(slack) + step * x.hypot(y);
+                            if inverse > 0.0 && off.abs() <= most {
+                                seen.push([x, y, inverse]);
+                            }
+                        }
+                        seen
+                    };
+                    if middle == 0.0 {
+                        continue;
+                    }
+                    let spacing = spacing as f64;
+                    let level = seen([0.0; 2], f64::from(slope_step));
+                    let [x, y, _] = least_squares(&level, spacing).unwrap_or_default();
+                    // Three standard errors over a spacing are a fifth of what a pixel may differ by.
+                    let on_plane = seen([x, y], 0.2 * f64::from(slack) / spacing);
+                    let truth = least_squares(&on_plane, spacing);
+                    assert_eq!(planes.are_told[k], truth.is_some(), "{spacing} {share} {k}");
+                    let Some([x, y, inverse]) = truth else {
+                        untold += 1;
+                        continue;
+                    };
+                    told += 1;
+                    let found = [planes.slopes[0][k], planes.slopes[1][k], planes.offsets[k]];
+                    let truth = [x * spacing, y * spacing, inverse - middle];
+                    // Inverse depths about 1 are rounded to 1e-7; a pixel more or less moves a plane
+                    // by a tenth of the noise, 2e-4.
+                    for (found, truth) in found.into_iter().zip(truth) {
+                        let error = (f64::from(found) - truth).abs();
+                        assert!(error < 2e-6, "{spacing} {share} {k}: {found}, not {truth}");
+                    }
+                }
+            }
+        }
+        assert!(told > 100 && untold > 5, "{told} {untold}");
     }
 }
