@@ -11,6 +11,7 @@ mod bandwidth;
 mod batch_buffers;
 mod buffers;
 mod choice;
+mod counters;
 mod device;
 mod error;
 mod layout;
@@ -18,6 +19,8 @@ mod pipelines;
 mod readback;
 mod resident;
 mod sources;
+#[cfg(test)]
+mod testing;
 mod timer;
 mod upload;
 
