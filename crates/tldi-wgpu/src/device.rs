@@ -141,6 +141,12 @@ impl Gpu {
             .get_or_init(|| pipelines(self, &stage_constants()))
     }
 
+    /// Sets the stages, before they are asked for.
+    #[cfg(test)]
+    pub(crate) fn set_pipelines(&self, stages: Vec<Pipeline>) {
+        self.pipelines.set(stages).expect("they were not asked for");
+    }
+
     /// An error that says what went wrong on this device.
     pub(crate) fn failed(&self, reason: String) -> GpuError {
         GpuError::Failed {

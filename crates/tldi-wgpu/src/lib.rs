@@ -12,6 +12,7 @@ mod batch_buffers;
 mod buffers;
 mod choice;
 mod counters;
+mod crossover;
 mod device;
 mod error;
 mod layout;
