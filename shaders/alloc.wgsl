@@ -21,7 +21,11 @@ fn alloc(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
     let own = atomicAdd(&total, count);
     workgroupBarrier();
     if lane == 0u {
-        base = atomicAdd(&work[FRAGMENTS], atomicLoad(&total));
+        let count_of_group = atomicLoad(&total);
+        base = atomicAdd(&work[FRAGMENTS], count_of_group);
+        if base > NONE - count_of_group {
+            atomicStore(&work[FRAGMENTS_WRAPPED], 1u);
+        }
     }
     workgroupBarrier();
     if exists {

@@ -74,11 +74,11 @@ fn is_same_layer(key: u32, next: u32, merge_steps: u32) -> bool {
 }
 
 fn weight_of(f: vec2u) -> u32 {
-    return f.y & 0xffu;
+    return f.y & ((1u << WEIGHT_BITS) - 1u);
 }
 
 fn splat_of(f: vec2u) -> u32 {
-    return f.y >> 8u;
+    return f.y >> WEIGHT_BITS;
 }
 
 // In steps.

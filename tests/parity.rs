@@ -432,41 +432,90 @@ fn views_along_the_axes_have_the_frames_of_the_cpu() {
     }
 }
 
-/// A device that has no room for a batch says so; under `AutoBackend` the CPU compares it.
+/// What the CPU refuses, the GPU does, by the same words and the place in the batch.
 #[test]
-fn a_device_without_room_loses_nothing() {
-    let Some(gpu) = gpu_backend() else {
+fn bad_queries_are_refused_as_by_the_cpu() {
+    let Some(mut gpu) = gpu_backend() else {
         return;
     };
-    drop(gpu);
-    // One megabyte a buffer: less than the fragments of any batch take.
+    let pairs = random_pairs(700..702);
+    let good = queries(&pairs);
+    let moving = |motion| View::Aim {
+        policy: CameraPolicy::ContactZone,
+        motion,
+        last_axis: None,
+    };
+    for bad in [
+        PairQuery {
+            view: moving(Vec3::splat(f32::NAN)),
+            ..good[1]
+        },
+        PairQuery {
+            a_from_b: Pose3::translation(f32::INFINITY, 0.0, 0.0),
+            ..good[1]
+        },
+    ] {
+        let refused = |backend: &mut dyn Backend| {
+            let outcome = backend.compare(&[good[0], bad], &mut Vec::new());
+            outcome.expect_err("it is no query").to_string()
+        };
+        assert_eq!(refused(&mut CpuBackend::new()), refused(&mut gpu));
+    }
+}
+
+/// A backend on a device that allows so many bytes in a buffer.
+fn small_device(bytes: u64) -> WgpuBackend {
     let limits = wgpu::Limits {
-        max_storage_buffer_binding_size: 1 << 20,
+        max_storage_buffer_binding_size: bytes,
         ..wgpu::Limits::default()
     };
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
     let instance = wgpu::Instance::new(descriptor);
-    let open = || {
-        let adapter = pollster::block_on(instance.request_adapter(&Default::default()))
-            .expect("there is an adapter");
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-            required_limits: limits.clone(),
-            ..Default::default()
-        }))
-        .expect("there is a device");
-        WgpuBackend::new(Gpu::shared(device, queue)).expect("the stages fit")
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default()))
+        .expect("there is an adapter");
+    let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+        required_limits: limits,
+        ..Default::default()
+    }))
+    .expect("there is a device");
+    WgpuBackend::new(Gpu::shared(device, queue)).expect("the stages fit")
+}
+
+/// A device that has no room for a batch takes it in parts, down to a pair; a pair that is too large
+/// by itself is the CPU's in that batch only.
+#[test]
+fn a_device_without_room_for_a_batch_takes_it_in_parts() {
+    let Some(mut large) = gpu_backend() else {
+        return;
     };
-    let pairs = random_pairs(600..602);
-    let batch = queries(&pairs);
-    let error = open()
-        .compare(&batch, &mut Vec::new())
-        .expect_err("there is no room");
-    assert!(error.to_string().contains("1048576 are allowed"), "{error}");
-    let mut auto = AutoBackend::with_gpu(open(), 0);
-    assert_eq!(by_default(&batch), compare_on(&mut auto, &batch));
-    assert!(
-        auto.fallback()
-            .is_some_and(|reason| reason.contains("allowed"))
+    let pairs = random_pairs(600..648);
+    let mut batch = queries(&pairs);
+    let whole = compare_on(&mut large, &batch);
+    assert_eq!(large.pairs_on_cpu(), 0);
+    // Four megabytes a buffer: enough for any of these pairs, and less than all of them need.
+    let mut auto = AutoBackend::with_gpu(small_device(1 << 22), 0);
+    assert_eq!(whole, compare_on(&mut auto, &batch));
+    assert_eq!((auto.name(), auto.fallback()), ("gpu", None));
+    let mut small = small_device(1 << 22);
+    assert_eq!(whole, compare_on(&mut small, &batch));
+    assert_eq!(small.pairs_on_cpu(), 0);
+
+    // 90,000 points a side, all in reach, of 32 bytes each: more than four megabytes.
+    let mut rng = fastrand::Rng::with_seed(8);
+    let sheet = sampled_plane(1.2, 0.004, &mut rng).cloud(0.004);
+    let too_large = aimed(
+        Surface::Cloud(&sheet),
+        Surface::Cloud(&sheet),
+        Pose3::translation(0.0, 0.002, 0.0),
+        Params::for_radius(0.004),
     );
+    batch.push(too_large);
+    let results = compare_on(&mut small, &batch);
+    assert_eq!(small.pairs_on_cpu(), 1);
+    assert_eq!(results[48], by_default(&[too_large])[0]);
+    assert_eq!(results[..48], whole);
+    batch.pop();
+    assert_eq!(whole, compare_on(&mut small, &batch));
+    assert_eq!(small.pairs_on_cpu(), 0);
 }

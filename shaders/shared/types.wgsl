@@ -1,7 +1,7 @@
 // What all stages share: the batch, its pairs and sides, their views, and the arena of counters.
 // Layouts are those of `tldi::Params` and of `tldi-wgpu`'s `batch` module.
 
-// Numbers of the stages, filled from `tldi::plan::stage_constants`.
+// Numbers of the stages, filled from `tldi-wgpu`'s `layout::stage_constants`.
 override BLOCK: u32;
 override AIM_SAMPLES: u32;
 override SUPPORT: f32;
@@ -20,6 +20,8 @@ override MOST_ASIDE: f32;
 override BEND_SHIFT: u32;
 override SAME_FACE: f32;
 override MAX_WEIGHT: f32;
+// Bits of a fragment's weight; the number of its splat takes the others.
+override WEIGHT_BITS: u32;
 override DEPTH_BITS: u32;
 override MAX_DEPTH: f32;
 override DEPTH_STEPS: u32;
@@ -270,6 +272,8 @@ const FRAGMENTS: u32 = 4u;
 const LAYERS: u32 = 5u;
 const CONTACTS: u32 = 6u;
 const ENTRIES: u32 = 7u;
+// 1 where there are more fragments than a word counts.
+const FRAGMENTS_WRAPPED: u32 = 8u;
 
 // Words of a side in the arena.
 const SIDE_WORDS: u32 = 16u;

@@ -1,18 +1,17 @@
 //! The GPU where it gains, else the CPU; and the CPU where the GPU fails.
 
+use crate::crossover::crossover;
 use crate::{AdapterChoice, Gpu, GpuError, WgpuBackend};
 use std::sync::OnceLock;
-use std::time::Instant;
-use tldi::glamx::{Pose3, Vec3};
-use tldi::{
-    Backend, BackendError, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View,
-};
+use tldi::{Backend, BackendError, CpuBackend, PairQuery, PairResult};
 
 /// Compares large batches on a hardware GPU, where there is one, and the others on the CPU. From
-/// which size on the GPU gains is measured when the backend is made.
+/// which size on the GPU gains is measured when the backend is made. A GPU whose answers are not those
+/// of the CPU, in what is measured, is not used.
 ///
 /// A GPU that fails is given up: its batch, and all further ones, are compared on the CPU, and
-/// [`fallback`](Backend::fallback) tells why.
+/// [`fallback`](Backend::fallback) tells why. A batch that only has too much for the GPU is no failure:
+/// see [`WgpuBackend`].
 #[derive(Debug)]
 pub struct AutoBackend {
     gpu: Option<WgpuBackend>,
@@ -23,12 +22,22 @@ pub struct AutoBackend {
 }
 
 impl AutoBackend {
-    /// On the hardware GPU of this process; from which size on it gains is measured once, which takes
-    /// some tenths of a second where there is one.
+    /// On the hardware GPU of this process; from which size on it gains, and whether its answers are
+    /// those of the CPU, is measured once, which takes some tenths of a second where there is one.
     pub fn new() -> Self {
-        let opened = Gpu::of_process(AdapterChoice::Hardware);
-        let measured = opened.and_then(WgpuBackend::new).and_then(|mut gpu| {
-            let least_points = crossover_of_process(&mut gpu)?;
+        static MEASURED: OnceLock<Result<usize, GpuError>> = OnceLock::new();
+        let opened = Gpu::of_process(AdapterChoice::Hardware).and_then(WgpuBackend::new);
+        Self::measured(opened, |gpu| {
+            MEASURED.get_or_init(|| crossover(gpu)).clone()
+        })
+    }
+
+    fn measured(
+        opened: Result<WgpuBackend, GpuError>,
+        measure: impl FnOnce(&mut WgpuBackend) -> Result<usize, GpuError>,
+    ) -> Self {
+        let measured = opened.and_then(|mut gpu| {
+            let least_points = measure(&mut gpu)?;
             Ok((gpu, least_points))
         });
         match measured {
@@ -104,74 +113,42 @@ impl Backend for AutoBackend {
     }
 }
 
-/// Points of the sheets that are timed.
-const TIMED: [usize; 2] = [1 << 13, 1 << 16];
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::stage_constants;
+    use crate::pipelines::pipelines;
+    use crate::testing;
 
-/// [`crossover`], measured by the first who asks.
-fn crossover_of_process(gpu: &mut WgpuBackend) -> Result<usize, GpuError> {
-    static MEASURED: OnceLock<usize> = OnceLock::new();
-    if let Some(points) = MEASURED.get() {
-        return Ok(*points);
-    }
-    let points = crossover(gpu)?;
-    Ok(*MEASURED.get_or_init(|| points))
-}
-
-/// Points from which on the GPU is faster than the CPU, by two sheets that touch, of two sizes:
-/// what the GPU needs for a batch of any size, and what both need for a point more.
-fn crossover(gpu: &mut WgpuBackend) -> Result<usize, GpuError> {
-    let mut cpu = CpuBackend::new();
-    let mut seconds = [[0.0; 2]; 2];
-    for (k, points) in TIMED.into_iter().enumerate() {
-        for (backend, seconds) in [gpu as &mut dyn Backend, &mut cpu]
-            .into_iter()
-            .zip(&mut seconds)
-        {
-            seconds[k] = time(backend, points).map_err(|source| GpuError::NotMeasured {
-                reason: source.to_string(),
-            })?;
+    /// A device that agrees with the CPU is used; one whose stages compute something else is refused,
+    /// with an error that says what differs.
+    #[test]
+    fn a_device_that_disagrees_is_refused() {
+        let Some(gpu) = testing::open() else {
+            return;
+        };
+        let agreeing = AutoBackend::measured(WgpuBackend::new(gpu), crossover);
+        assert_eq!(agreeing.fallback(), None);
+        // Fewer neighbours for a normal; no surface that is seen face on.
+        for (constant, factor) in [("MAX_CANDIDATES", 0.02), ("EDGE_ON", 100.0)] {
+            let Some(gpu) = testing::open() else {
+                return;
+            };
+            let mut constants = stage_constants();
+            let value = constants.iter_mut().find(|(name, _)| *name == constant);
+            value.expect("there is such a constant").1 *= factor;
+            let wrong = pipelines(&gpu, &constants);
+            gpu.set_pipelines(wrong);
+            let refused = AutoBackend::measured(WgpuBackend::new(gpu), crossover);
+            let reason = refused.fallback().unwrap_or("it is used");
+            assert!(
+                reason.contains("not those of the CPU"),
+                "{constant}: {reason}"
+            );
+            assert_eq!(
+                (refused.name(), refused.least_points()),
+                ("cpu", usize::MAX)
+            );
         }
     }
-    let step = (TIMED[1] - TIMED[0]) as f64;
-    let [on_gpu, on_cpu] = seconds.map(|[small, large]| {
-        let a_point = (large - small).max(0.0) / step;
-        (small - a_point * TIMED[0] as f64, a_point)
-    });
-    let gain = on_cpu.1 - on_gpu.1;
-    Ok(match gain > 0.0 {
-        // Both sheets are in reach of each other.
-        true => (2.0 * (on_gpu.0 - on_cpu.0).max(0.0) / gain) as usize,
-        false => usize::MAX,
-    })
-}
-
-/// Seconds for two sheets of `points` points each that touch, new in every frame: the least of
-/// three.
-fn time(backend: &mut dyn Backend, points: usize) -> Result<f64, BackendError> {
-    let edge = (points as f32).sqrt() as usize;
-    let radius = 1.0 / edge as f32;
-    let position = |i: usize| Vec3::new((i % edge) as f32, 0.0, (i / edge) as f32) * radius;
-    let positions: Vec<Vec3> = (0..edge * edge).map(position).collect();
-    let mut results = Vec::new();
-    let mut least = f64::INFINITY;
-    for _ in 0..4 {
-        let sheet = || {
-            let cloud = PointCloud::builder(&positions).radius(radius);
-            cloud
-                .build()
-                .map_err(|e| BackendError::Device(e.to_string()))
-        };
-        let (a, b) = (sheet()?, sheet()?);
-        let query = PairQuery {
-            a: Surface::Cloud(&a),
-            b: Surface::Cloud(&b),
-            a_from_b: Pose3::translation(0.0, radius, 0.0),
-            view: View::aimed(),
-            params: Params::for_radius(radius),
-        };
-        let start = Instant::now();
-        backend.compare(&[query], &mut results)?;
-        least = least.min(start.elapsed().as_secs_f64());
-    }
-    Ok(least)
 }

@@ -1,27 +1,23 @@
-//! One batch: upload, dispatch, read back; grown and redone where a buffer was too small.
+//! One submission: upload, dispatch, read back.
+
+mod parts;
 
 use crate::batch_buffers::BatchBuffers;
-use crate::buffers::Growable;
-use crate::layout::{CONTACT_WORDS, COUNTERS, GROUP, PAIR_WORDS, VIEW_BYTES, is_for_device};
+use crate::buffers::{Growable, most_bytes};
+use crate::counters::Counters;
+use crate::layout::{
+    CONTACT_WORDS, COUNTERS, GROUP, MAX_VIEWS, PAIR_WORDS, VIEW_BYTES, is_for_device,
+    lives_on_device,
+};
 use crate::pipelines::Pipeline;
-use crate::readback::{Counters, Readback};
+use crate::readback::Readback;
 use crate::resident::Resident;
 use crate::sources::{DepthCamera, Sources};
 use crate::timer::Timer;
 use crate::upload::Upload;
 use crate::{Gpu, GpuError, StageTime};
 use std::sync::mpsc;
-use std::time::Duration;
-use tldi::{
-    Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult, PatchScratch, Surface,
-};
-
-/// Times that a batch is redone with larger buffers before that counts as a fault: every time at
-/// least one of seven has doubled.
-const MOST_TRIES: usize = 64;
-
-/// Time after the end of a batch within which its readback must be there.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
+use tldi::{Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult, PatchScratch};
 
 /// Workgroups along x of a dispatch.
 const MAX_GROUPS: u32 = 65_535;
@@ -30,9 +26,11 @@ const MAX_GROUPS: u32 = 65_535;
 ///
 /// What it does not take is compared on the CPU meanwhile, with the same results: pairs with an
 /// exact surface, [uneven clouds](tldi::PointCloud::is_uneven), [`Variant::Paper`](tldi::Variant::Paper), perspective
-/// cameras; and pairs of which a pixel has more than 1024 fragments. An uneven cloud and one that only the device holds
+/// cameras; pairs of which a pixel has more than 1024 fragments, and pairs that need larger buffers than the device
+/// allows. An uneven cloud and one that only the device holds
 /// are compared by their mean radii: a body smaller than the points are apart may pass where these are coarse. A batch costs one submission and one readback,
-/// whatever the number of pairs, and uploads of clouds with new content.
+/// whatever the number of pairs, and uploads of clouds with new content. A batch that needs larger buffers than the
+/// device allows is halved until it does not.
 ///
 /// ```
 /// use tldi::{Backend, PairQuery, Params, PointCloud, Surface, View};
@@ -68,6 +66,9 @@ pub struct WgpuBackend {
     buffers: BatchBuffers,
     /// Elements that the buffers hold: what batches have needed so far.
     capacities: Counters,
+    /// Elements that the buffers begin with, and the most that the device takes.
+    least: Counters,
+    most: Counters,
     /// What the bind groups were made of.
     bound: Vec<Option<wgpu::Buffer>>,
     bind_groups: Vec<wgpu::BindGroup>,
@@ -75,7 +76,7 @@ pub struct WgpuBackend {
     patches: PatchScratch,
     cpu: CpuBackend,
     pairs_on_cpu: usize,
-    /// What the last batch needed.
+    /// What the last batch, or its last part, needed.
     last: Counters,
     timer: Option<Timer>,
     times: Vec<StageTime>,
@@ -91,12 +92,16 @@ impl WgpuBackend {
         gpu.pipelines();
         let resident = Resident::new(&gpu)?;
         gpu.check()?;
+        let most = Counters::most(most_bytes(&gpu));
+        let least = Counters::LEAST.min(&most);
         Ok(Self {
             gpu,
             resident,
             sources: Sources::default(),
             buffers: BatchBuffers::default(),
-            capacities: Counters::LEAST,
+            capacities: least,
+            least,
+            most,
             bound: Vec::new(),
             bind_groups: Vec::new(),
             upload: Upload::default(),
@@ -121,7 +126,7 @@ impl WgpuBackend {
         self.timer.is_some()
     }
 
-    /// Time of each stage in the last batch; empty where none is measured.
+    /// Time of each stage in the last batch, or in its last part where it was halved; empty where none is measured.
     pub fn stage_times(&self) -> &[StageTime] {
         &self.times
     }
@@ -170,7 +175,8 @@ impl WgpuBackend {
         self.pairs_on_cpu
     }
 
-    /// What the stages of the last batch had to read and write at least, each element once, bytes.
+    /// What the stages of the last batch, or of its last part where it was halved, had to read and
+    /// write at least, each element once, bytes.
     pub fn needed_bytes(&self) -> Vec<(&'static str, u64)> {
         self.last.bytes(&self.upload)
     }
@@ -185,14 +191,18 @@ impl WgpuBackend {
     ) -> Result<bool, BackendError> {
         let mut left_to_cpu = Vec::new();
         for (pair, query) in batch.iter().enumerate() {
-            if !is_for_device(query) {
+            let is_for_device = is_for_device(query);
+            // The check refuses points that only the device has.
+            if !is_for_device || !lives_on_device(query) {
                 query
                     .check()
                     .map_err(|reason| BackendError::Unsupported { pair, reason })?;
+            }
+            if !is_for_device {
                 left_to_cpu.push(pair);
             }
         }
-        self.upload.select(batch);
+        self.upload.select(batch, 0..batch.len());
         if self.upload.points() < least_points {
             return Ok(false);
         }
@@ -202,66 +212,9 @@ impl WgpuBackend {
         Ok(true)
     }
 
-    /// Compares the selected pairs on the device, and the others on the CPU meanwhile.
-    fn compare_on_device(
-        &mut self,
-        batch: &[PairQuery<'_>],
-        results: &mut [PairResult],
-        left_to_cpu: &mut Vec<usize>,
-    ) -> Result<(), BackendError> {
-        self.gpu.check()?;
-        self.pairs_on_cpu = 0;
-        if self.upload.points() == 0 {
-            return self.compare_on_cpu(batch, results, left_to_cpu);
-        }
-        let (resident, sources) = (&mut self.resident, &mut self.sources);
-        self.upload.place(batch, &self.gpu, resident, sources)?;
-        for _ in 0..MOST_TRIES {
-            self.submit()?;
-            self.compare_on_cpu(batch, results, left_to_cpu)?;
-            let needed = self.read_back(batch, results, left_to_cpu)?;
-            let lives_on_device = |pair: &&usize| {
-                let is_device = |surface| matches!(surface, Surface::Device(_));
-                is_device(batch[**pair].a) || is_device(batch[**pair].b)
-            };
-            if let Some(&pair) = left_to_cpu.iter().find(lives_on_device) {
-                return Err(BackendError::Unsupported {
-                    pair,
-                    reason: "a pixel has more than 1024 fragments, and points that live on the \
-                             device cannot be left to the CPU: use smaller pixels or fewer points",
-                });
-            }
-            if self.capacities.holds(&needed) {
-                return self.compare_on_cpu(batch, results, left_to_cpu);
-            }
-            self.capacities.grow(&needed);
-        }
-        Err(self
-            .gpu
-            .failed("its counters never settled".to_owned())
-            .into())
-    }
-
-    /// Compares what is left to the CPU, and leaves nothing.
-    fn compare_on_cpu(
-        &mut self,
-        batch: &[PairQuery<'_>],
-        results: &mut [PairResult],
-        left_to_cpu: &mut Vec<usize>,
-    ) -> Result<(), BackendError> {
-        self.pairs_on_cpu += left_to_cpu.len();
-        let queries: Vec<PairQuery> = left_to_cpu.iter().map(|&pair| batch[pair]).collect();
-        let mut compared = Vec::new();
-        self.cpu.compare(&queries, &mut compared)?;
-        for (pair, result) in left_to_cpu.drain(..).zip(compared) {
-            results[pair] = result;
-        }
-        Ok(())
-    }
-
     /// Uploads and submits the batch.
     fn submit(&mut self) -> Result<(), GpuError> {
-        let data = self.upload.batch_data(&self.capacities);
+        let data = self.upload.batch_data(&self.capacities)?;
         self.buffers.fit(&self.gpu, &data, &self.upload)?;
         self.bind();
         let Self {
@@ -277,11 +230,14 @@ impl WgpuBackend {
         sources.encode(gpu, &mut encoder, resident.points())?;
         // Only what is counted must be zero: the counters up to the ends of pixels, the views, and
         // what is read back of the pairs.
-        let counted = 4 * u64::from(data.pixels_at + 2 * data.pixels);
-        let pairs_found = 4 * u64::from(data.pairs * PAIR_WORDS);
+        let counted = 4 * (u64::from(data.pixels_at) + 2 * u64::from(data.pixels));
+        let pairs_found = 4 * u64::from(data.pairs) * u64::from(PAIR_WORDS);
         for (buffer, bytes) in [
             (&buffers.work, counted),
-            (&buffers.views, 3 * u64::from(data.pairs) * VIEW_BYTES),
+            (
+                &buffers.views,
+                u64::from(MAX_VIEWS) * u64::from(data.pairs) * VIEW_BYTES,
+            ),
             (&buffers.found, pairs_found),
         ] {
             if let Some(buffer) = buffer.get() {
@@ -337,7 +293,7 @@ impl WgpuBackend {
                 timer.resolve(&mut encoder);
             }
         }
-        let contacts = 4 * u64::from(data.contacts * CONTACT_WORDS);
+        let contacts = 4 * u64::from(data.contacts) * u64::from(CONTACT_WORDS);
         if let (Some(work), Some(found), Some(readback)) = (
             buffers.work.get(),
             buffers.found.get(),
@@ -397,34 +353,23 @@ impl WgpuBackend {
             // Nobody listens any more after an error, which is told already.
             mapped.send(result).unwrap_or_default();
         });
-        self.gpu
-            .device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| failed(e.to_string()))?;
+        self.gpu.wait()?;
         // Whoever shares the device may have been the one to see the end of the work.
         let outcome = answer
-            .recv_timeout(ANSWER_TIMEOUT)
-            .map_err(|_| failed("the readback was not answered".to_owned()))?;
+            .recv_timeout(self.gpu.patience)
+            .map_err(|_| self.gpu.give_up())?;
         self.gpu.check()?;
         outcome.map_err(|e| failed(e.to_string()))?;
         let view = slice
             .get_mapped_range()
             .map_err(|e| failed(e.to_string()))?;
-        let words: &[u32] = bytemuck::cast_slice(&view);
-        let readback = Readback::new(words, self.upload.pairs.len());
-        let needed = readback.counters();
-        if self.capacities.holds(&needed) {
-            for (k, &pair) in self.upload.pairs_of.iter().enumerate() {
-                if readback.is_crowded(k) {
-                    left_to_cpu.push(pair);
-                } else {
-                    readback.fill(k, &batch[pair], &mut results[pair]);
-                }
-            }
-            readback.fill_contacts(&self.upload.pairs_of, batch, results);
-        }
+        let taken = self.take(bytemuck::cast_slice(&view), batch, results, left_to_cpu);
         drop(view);
         buffer.unmap();
+        let needed = taken.map_err(|reason| GpuError::BadAnswer {
+            adapter: self.gpu.adapter().to_owned(),
+            reason,
+        })?;
         if self.capacities.holds(&needed) {
             for &pair in &self.upload.pairs_of {
                 self.patches.reduce_pair(&mut results[pair], &batch[pair]);
@@ -434,6 +379,31 @@ impl WgpuBackend {
         self.times.clear();
         if let Some(timer) = &mut self.timer {
             timer.read(&self.gpu, &mut self.times)?;
+        }
+        Ok(needed)
+    }
+
+    /// Fills the results from the words that came back, if the buffers held the batch; what it
+    /// needed, or what of the words makes no sense.
+    fn take(
+        &self,
+        words: &[u32],
+        batch: &[PairQuery<'_>],
+        results: &mut [PairResult],
+        left_to_cpu: &mut Vec<usize>,
+    ) -> Result<Counters, String> {
+        let pairs_of = &self.upload.pairs_of;
+        let readback = Readback::new(words, pairs_of.len())?;
+        let needed = readback.counters();
+        if self.capacities.holds(&needed) {
+            for (k, &pair) in pairs_of.iter().enumerate() {
+                if readback.is_crowded(k) {
+                    left_to_cpu.push(pair);
+                } else {
+                    readback.fill(k, &batch[pair], &mut results[pair])?;
+                }
+            }
+            readback.fill_contacts(pairs_of, batch, results)?;
         }
         Ok(needed)
     }

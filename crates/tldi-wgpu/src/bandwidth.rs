@@ -27,11 +27,8 @@ pub fn copy_bandwidth(gpu: &Gpu) -> Result<f64, GpuError> {
         }
         let start = Instant::now();
         gpu.queue.submit([encoder.finish()]);
-        gpu.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| gpu.failed(e.to_string()))?;
+        gpu.wait()?;
         least = least.min(start.elapsed().as_secs_f64());
     }
-    gpu.check()?;
     Ok(2.0 * BYTES as f64 * f64::from(COPIES) / least)
 }

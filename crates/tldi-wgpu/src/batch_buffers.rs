@@ -2,8 +2,8 @@
 
 use crate::buffers::Growable;
 use crate::layout::{
-    BatchData, CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, PAIR_WORDS,
-    PLANE_BYTES, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, VIEW_BYTES,
+    BatchData, CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, MAX_VIEWS,
+    PAIR_WORDS, PIXEL_BYTES, PLANE_BYTES, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, VIEW_BYTES,
 };
 use crate::resident::Resident;
 use crate::upload::Upload;
@@ -73,17 +73,18 @@ impl BatchBuffers {
         self.sides.write(gpu, &upload.sides)?;
         self.items.write(gpu, &upload.items)?;
         let pairs = u64::from(data.pairs);
-        let found = 4 * (u64::from(PAIR_WORDS) * pairs + u64::from(CONTACT_WORDS * data.contacts));
+        let contact_words = u64::from(CONTACT_WORDS) * u64::from(data.contacts);
+        let found = 4 * (u64::from(PAIR_WORDS) * pairs + contact_words);
         let bare = if data.cells > 0 { data.survivors } else { 1 };
         for (buffer, bytes) in [
             (
                 &mut self.survivors,
                 SURVIVOR_BYTES * u64::from(data.survivors),
             ),
-            (&mut self.views, 3 * VIEW_BYTES * pairs),
+            (&mut self.views, u64::from(MAX_VIEWS) * VIEW_BYTES * pairs),
             (
                 &mut self.work,
-                4 * u64::from(data.pixels_at) + 16 * u64::from(data.pixels),
+                4 * u64::from(data.pixels_at) + PIXEL_BYTES * u64::from(data.pixels),
             ),
             (&mut self.entries, ENTRY_BYTES * u64::from(bare)),
             (&mut self.planes, PLANE_BYTES * u64::from(bare)),

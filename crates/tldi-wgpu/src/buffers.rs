@@ -51,6 +51,12 @@ impl Growable {
     }
 }
 
+/// Bytes of the largest buffer that the stages can use.
+pub(crate) fn most_bytes(gpu: &Gpu) -> u64 {
+    let limits = gpu.device.limits();
+    (limits.max_buffer_size).min(limits.max_storage_buffer_binding_size)
+}
+
 /// A new buffer of at least `bytes` bytes, rounded up to a power of two.
 pub(crate) fn create(
     gpu: &Gpu,
@@ -58,10 +64,7 @@ pub(crate) fn create(
     usage: BufferUsages,
     bytes: u64,
 ) -> Result<wgpu::Buffer, GpuError> {
-    let limits = gpu.device.limits();
-    let allowed = limits
-        .max_buffer_size
-        .min(limits.max_storage_buffer_binding_size);
+    let allowed = most_bytes(gpu);
     let size = bytes.next_power_of_two().clamp(256, allowed.max(256));
     if size < bytes {
         return Err(GpuError::TooLarge {

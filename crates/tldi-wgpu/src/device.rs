@@ -1,8 +1,14 @@
 //! The device: chosen once, shared with whoever brings their own.
 
 use crate::GpuError;
+use crate::layout::stage_constants;
 use crate::pipelines::{Pipeline, pipelines};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+
+/// How long the device may take for what it was given. Batches take milliseconds; a driver that
+/// imitates a GPU takes seconds for large ones.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Which adapters will do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
@@ -20,7 +26,8 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     adapter: Arc<str>,
-    failure: Arc<Mutex<Option<String>>>,
+    failure: Arc<Mutex<Option<GpuError>>>,
+    pub(crate) patience: Duration,
     pipelines: Arc<OnceLock<Vec<Pipeline>>>,
 }
 
@@ -86,28 +93,29 @@ impl Gpu {
     /// Takes a device that the caller has: clouds that already live in its buffers need no copy to
     /// the host. Errors of the device that nothing else catches are handled here from now on.
     pub fn shared(device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        let adapter = device.adapter_info().name.into();
+        let adapter: Arc<str> = device.adapter_info().name.into();
         let failure = Arc::new(Mutex::new(None));
-        let note = |failure: &Arc<Mutex<Option<String>>>, what: String| {
-            let mut failure = failure.lock().unwrap_or_else(PoisonError::into_inner);
-            failure.get_or_insert(what);
+        let noting = |what: Arc<Mutex<Option<GpuError>>>| {
+            let adapter = Arc::clone(&adapter);
+            move |reason: String| {
+                let adapter = adapter.to_string();
+                note(&what, GpuError::Failed { adapter, reason });
+            }
         };
-        let of_error = Arc::clone(&failure);
+        let note_error = noting(Arc::clone(&failure));
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            note(&of_error, error.to_string());
+            note_error(error.to_string());
         }));
-        let of_loss = Arc::clone(&failure);
+        let note_loss = noting(Arc::clone(&failure));
         device.set_device_lost_callback(move |reason, message| {
-            note(
-                &of_loss,
-                format!("the device was lost ({reason:?}): {message}"),
-            );
+            note_loss(format!("the device was lost ({reason:?}): {message}"));
         });
         Self {
             device,
             queue,
             adapter,
             failure,
+            patience: PATIENCE,
             pipelines: Arc::default(),
         }
     }
@@ -129,7 +137,14 @@ impl Gpu {
 
     /// The stages, compiled when they are first asked for.
     pub(crate) fn pipelines(&self) -> &[Pipeline] {
-        self.pipelines.get_or_init(|| pipelines(self))
+        self.pipelines
+            .get_or_init(|| pipelines(self, &stage_constants()))
+    }
+
+    /// Sets the stages, before they are asked for.
+    #[cfg(test)]
+    pub(crate) fn set_pipelines(&self, stages: Vec<Pipeline>) {
+        self.pipelines.set(stages).expect("they were not asked for");
     }
 
     /// An error that says what went wrong on this device.
@@ -144,8 +159,74 @@ impl Gpu {
     pub(crate) fn check(&self) -> Result<(), GpuError> {
         let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
         match &*failure {
-            Some(reason) => Err(self.failed(reason.clone())),
+            Some(error) => Err(error.clone()),
             None => Ok(()),
         }
+    }
+
+    /// Waits until all is done that was submitted.
+    ///
+    /// # Errors
+    /// [`GpuError::TimedOut`] where that takes too long; the device is not used any more.
+    pub(crate) fn wait(&self) -> Result<(), GpuError> {
+        let outcome = self.device.poll(wgpu::PollType::Wait {
+            submission_index: None,
+            timeout: Some(self.patience),
+        });
+        match outcome {
+            Ok(_) => self.check(),
+            Err(wgpu::PollError::Timeout) => Err(self.give_up()),
+            Err(error) => Err(self.failed(error.to_string())),
+        }
+    }
+
+    /// Notes that the device did not answer in time.
+    pub(crate) fn give_up(&self) -> GpuError {
+        let error = GpuError::TimedOut {
+            adapter: self.adapter.to_string(),
+            seconds: self.patience.as_secs(),
+        };
+        note(&self.failure, error.clone());
+        // To drop a queue is to wait until it is idle, however long that takes.
+        std::mem::forget(self.clone());
+        error
+    }
+}
+
+/// The first failure stays.
+fn note(failure: &Mutex<Option<GpuError>>, error: GpuError) {
+    let mut failure = failure.lock().unwrap_or_else(PoisonError::into_inner);
+    failure.get_or_insert(error);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::WgpuBackend;
+    use crate::buffers::create;
+
+    /// A device that takes longer than it may is given up, with an error that says so, and does not
+    /// hold up whoever drops it.
+    #[test]
+    fn a_device_that_takes_too_long_is_given_up() {
+        let Some(mut gpu) = crate::testing::open() else {
+            return;
+        };
+        gpu.wait().expect("it is idle");
+        gpu.patience = Duration::ZERO;
+        let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        // Copies of 16 GB take longer than no time.
+        let [from, to] = [(); 2].map(|()| create(&gpu, "copied", usage, 1 << 26).expect("room"));
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        for _ in 0..256 {
+            encoder.copy_buffer_to_buffer(&from, 0, &to, 0, 1 << 26);
+        }
+        gpu.queue.submit([encoder.finish()]);
+        let error = gpu.wait().expect_err("it is not done");
+        assert!(matches!(error, GpuError::TimedOut { .. }), "{error}");
+        assert!(error.to_string().contains("TLDI_BACKEND=cpu"), "{error}");
+        // From now on.
+        assert_eq!(gpu.check(), Err(error.clone()));
+        assert_eq!(WgpuBackend::new(gpu).err(), Some(error));
     }
 }

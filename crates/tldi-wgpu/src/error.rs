@@ -31,6 +31,38 @@ pub enum GpuError {
         /// What its driver says.
         reason: String,
     },
+    /// The device did not finish its work in time.
+    #[error(
+        "the GPU `{adapter}` did not finish its work within {seconds} s: it hangs or another program holds it; \
+         restart the program, update the driver, or use the CPU backend (`TLDI_BACKEND=cpu`)"
+    )]
+    TimedOut {
+        /// Name of the adapter.
+        adapter: String,
+        /// How long it was waited for.
+        seconds: u64,
+    },
+    /// What came back from the device makes no sense.
+    #[error(
+        "the GPU `{adapter}` gave an answer that makes no sense: {reason}; update its driver, or use the CPU \
+         backend (`TLDI_BACKEND=cpu`)"
+    )]
+    BadAnswer {
+        /// Name of the adapter.
+        adapter: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The device's answers are not the CPU's.
+    #[error(
+        "the GPU `{adapter}` is not used, its answers are not those of the CPU: {reason}; update its driver"
+    )]
+    Disagrees {
+        /// Name of the adapter.
+        adapter: String,
+        /// Where they differ.
+        reason: String,
+    },
     /// The variable `TLDI_BACKEND`, or an option, names no backend.
     #[error("`{0}` is no backend: write auto, cpu or gpu")]
     UnknownBackend(String),

@@ -1,5 +1,6 @@
 //! What is uploaded with every batch, with the layout of `shared/types.wgsl`.
 
+use crate::GpuError;
 use bytemuck::{Pod, Zeroable};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
 use tldi::plan::{DepthScale, PairPlan, SidePlan, ZoneGrid};
@@ -13,14 +14,46 @@ pub(crate) const VIEW_BYTES: u64 = 144;
 pub(crate) const SPLAT_BYTES: u64 = 64;
 pub(crate) const LAYER_BYTES: u64 = 32;
 pub(crate) const FRAGMENT_BYTES: u64 = 8;
+pub(crate) const TILE_BYTES: u64 = 3 * 4;
+/// The begins and ends of both sides.
+pub(crate) const PIXEL_BYTES: u64 = 4 * 4;
 pub(crate) const SAMPLE_SLOTS: u64 = 1024;
 pub(crate) const SIDE_WORDS: u32 = 16;
 pub(crate) const VIEW_WORDS: u32 = 16;
 pub(crate) const PAIR_WORDS: u32 = 16;
 pub(crate) const CONTACT_WORDS: u32 = 16;
 pub(crate) const COUNTERS: u32 = 16;
+/// Counter that is not 0 where there are more fragments than a word counts.
+pub(crate) const FRAGMENTS_WRAPPED: u32 = 8;
+pub(crate) const MAX_VIEWS: u32 = 3;
 /// Threads of a workgroup.
 pub(crate) const GROUP: u32 = 256;
+
+/// Bits of a fragment's weight. Its other bits are the number of its splat: one word holds both.
+pub(crate) const WEIGHT_BITS: u32 = 8;
+/// Splats that a fragment can number.
+pub(crate) const MOST_SPLATS: u32 = 1 << (u32::BITS - WEIGHT_BITS);
+/// Culled points of a batch. Each is a splat in three views at most, and those are counted in a word.
+pub(crate) const MOST_SURVIVORS: u32 = 1 << 30;
+
+/// The numbers that the stages share with the host: the CPU's, and how words are packed here.
+pub(crate) fn stage_constants() -> Vec<(&'static str, f64)> {
+    let mut all = plan::stage_constants();
+    all.push(("WEIGHT_BITS", f64::from(WEIGHT_BITS)));
+    all
+}
+
+/// `count` words, or elements, as the stages number them.
+///
+/// # Errors
+/// [`GpuError::TooLarge`] where a word cannot.
+pub(crate) fn numbered(buffer: &'static str, count: u64) -> Result<u32, GpuError> {
+    u32::try_from(count).map_err(|_| GpuError::TooLarge {
+        buffer,
+        needed: count.saturating_mul(4),
+        allowed: 4 * u64::from(u32::MAX),
+    })
+}
 
 const FIXED_VIEW: u32 = 6;
 const HAS_NORMALS: u32 = 1;
@@ -90,7 +123,14 @@ pub(crate) struct PairData {
 
 impl PairData {
     /// The pair's own data; the words of its zone begin at `zone_first`.
-    pub(crate) fn new(query: &PairQuery, plan: &PairPlan, zone_first: u32) -> Self {
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] where the stages cannot number the zone's words.
+    pub(crate) fn new(
+        query: &PairQuery,
+        plan: &PairPlan,
+        zone_first: u64,
+    ) -> Result<Self, GpuError> {
         let grid = ZoneGrid::new(&plan.overlap, plan.zone_reach);
         let row_words = grid.dims[0].div_ceil(32);
         let larger_from_a = rows(&plan.approach.larger_from_a);
@@ -100,7 +140,8 @@ impl PairData {
             View::Fixed(camera) => (FIXED_VIEW, camera.view_from_frame, camera.size),
             View::Aim { policy, .. } => (policy_number(policy), Pose3::IDENTITY, None),
         };
-        Self {
+        let zone_words = (row_words * grid.dims[1]) as u64 * grid.dims[2] as u64;
+        Ok(Self {
             params: query.params,
             overlap_min: plan.overlap.min.to_array(),
             zone_inv_cell: grid.inv_cell,
@@ -109,9 +150,9 @@ impl PairData {
             zone_dims: grid.dims.map(|n| n as u32),
             zone_row_words: row_words as u32,
             larger_from_a_x: larger_from_a[0],
-            zone_first,
+            zone_first: numbered("work", zone_first)?,
             larger_from_a_y: larger_from_a[1],
-            zone_words: (row_words * grid.dims[1] * grid.dims[2]) as u32,
+            zone_words: numbered("work", zone_words)?,
             larger_from_a_z: larger_from_a[2],
             policy,
             half_extents: plan.approach.half_extents.to_array(),
@@ -133,7 +174,7 @@ impl PairData {
             image_size: image_size.unwrap_or([0, 0]),
             depth_step: scale.step,
             depth_inv_step: scale.inv_step,
-        }
+        })
     }
 }
 
@@ -202,13 +243,16 @@ pub(crate) struct SideData {
 impl SideData {
     /// One side of a pair; its points are at `first_point` of the device's, its cells at
     /// `cell_first`.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] where the stages cannot number its points or cells.
     pub(crate) fn new(
         cloud: &CloudFacts,
         side: &SidePlan,
         params: &Params,
         [first_point, first_normal]: [u32; 2],
-        cell_first: u32,
-    ) -> Self {
+        cell_first: u64,
+    ) -> Result<Self, GpuError> {
         let stride = plan::stride(cloud.mean_radius, params.pixel_size);
         let radius_scale = (stride as f32).sqrt();
         let mut flags = 0;
@@ -222,13 +266,13 @@ impl SideData {
             true => (cell, [0; 3]),
             false => cells(side.region.overlap.extents(), cell, cloud.len),
         };
-        Self {
+        Ok(Self {
             frame_from_cloud: pose_rows(&side.frame_from_surface),
             other_from_frame: pose_rows(&side.region.other_from_frame),
             other_min: side.region.other_bounds.min.to_array(),
             stride: stride as u32,
             other_max: side.region.other_bounds.max.to_array(),
-            len: cloud.len as u32,
+            len: numbered("points", cloud.len as u64)?,
             middle: side.middle.unwrap_or(Vec3::ZERO).to_array(),
             flags,
             first_point,
@@ -236,17 +280,17 @@ impl SideData {
             radius_scale,
             max_radius: cloud.max_radius,
             cell_dims,
-            cell_first,
+            cell_first: numbered("work", cell_first)?,
             cell_inv: 1.0 / cell,
             mean_radius: cloud.mean_radius,
             merge_steps: DepthScale::new(0.0, params).merge_steps(params, cloud.noise),
             noise: cloud.noise,
-        }
+        })
     }
 
     /// Number of cells in which neighbours are looked for.
-    pub(crate) fn cells(&self) -> u32 {
-        self.cell_dims.iter().product()
+    pub(crate) fn cells(&self) -> u64 {
+        self.cell_dims.iter().map(|&n| u64::from(n)).product()
     }
 }
 
@@ -286,6 +330,12 @@ fn pose_rows(pose: &Pose3) -> [[f32; 4]; 3] {
     [0, 1, 2].map(|k| [r[k][0], r[k][1], r[k][2], t[k]])
 }
 
+/// Whether only the device has the points of a cloud of the pair.
+pub(crate) fn lives_on_device(query: &PairQuery) -> bool {
+    let is_resident = |surface| matches!(surface, Surface::Device(_));
+    is_resident(query.a) || is_resident(query.b)
+}
+
 /// Whether the device takes a pair: two clouds, oriented splats and an orthographic view. All else
 /// is compared by the CPU backend; so are uneven clouds, since the device goes by their mean radii, unless it alone has
 /// the points of the other one.
@@ -299,12 +349,11 @@ pub(crate) fn is_for_device(query: &PairQuery) -> bool {
     };
     let is_cloud = |surface| !matches!(surface, Surface::Exact(_));
     let is_even = |surface| !matches!(surface, Surface::Cloud(cloud) if cloud.is_uneven());
-    let is_resident = |surface| matches!(surface, Surface::Device(_));
     query.params.check().is_ok()
         && is_orthographic
         && is_cloud(query.a)
         && is_cloud(query.b)
-        && (is_even(query.a) && is_even(query.b) || is_resident(query.a) || is_resident(query.b))
+        && (is_even(query.a) && is_even(query.b) || lives_on_device(query))
         && query.params.variant() == Variant::Oriented
 }
 
@@ -394,12 +443,29 @@ mod tests {
         }
     }
 
+    /// A fragment's word holds the last splat's number and the greatest weight, and gives both back
+    /// as the stages take it apart.
+    #[test]
+    fn a_fragment_holds_every_splat_and_weight() {
+        let constants = stage_constants();
+        let (_, most_weight) = (constants.iter().find(|(name, _)| *name == "MAX_WEIGHT"))
+            .expect("the CPU has a greatest weight");
+        let weight = *most_weight as u32;
+        assert!(weight < 1 << WEIGHT_BITS, "{weight}");
+        let word = ((MOST_SPLATS - 1) << WEIGHT_BITS) | weight;
+        assert_eq!(word >> WEIGHT_BITS, MOST_SPLATS - 1);
+        assert_eq!(word & ((1 << WEIGHT_BITS) - 1), weight);
+        assert_eq!(u64::from(MOST_SPLATS) << WEIGHT_BITS, 1 << 32);
+    }
+
     /// Numbers that are written on both sides.
     #[test]
     fn numbers_are_those_of_wgsl() {
         let compare = tldi_shaders::STAGES.last().expect("there are stages");
         for (name, value) in [
             ("GROUP", GROUP),
+            ("FRAGMENTS_WRAPPED", FRAGMENTS_WRAPPED),
+            ("MAX_VIEWS", MAX_VIEWS),
             ("SAMPLE_SLOTS", SAMPLE_SLOTS as u32),
             ("SIDE_WORDS", SIDE_WORDS),
             ("VIEW_WORDS", VIEW_WORDS),

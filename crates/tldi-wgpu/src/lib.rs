@@ -11,6 +11,8 @@ mod bandwidth;
 mod batch_buffers;
 mod buffers;
 mod choice;
+mod counters;
+mod crossover;
 mod device;
 mod error;
 mod layout;
@@ -18,6 +20,8 @@ mod pipelines;
 mod readback;
 mod resident;
 mod sources;
+#[cfg(test)]
+mod testing;
 mod timer;
 mod upload;
 

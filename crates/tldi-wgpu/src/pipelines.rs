@@ -11,9 +11,8 @@ pub(crate) struct Pipeline {
     pub(crate) layout: wgpu::BindGroupLayout,
 }
 
-/// All stages, in their order.
-pub(crate) fn pipelines(gpu: &Gpu) -> Vec<Pipeline> {
-    let constants = tldi::plan::stage_constants();
+/// All stages, in their order, with these constants.
+pub(crate) fn pipelines(gpu: &Gpu, constants: &[(&'static str, f64)]) -> Vec<Pipeline> {
     STAGES
         .iter()
         .map(|stage| {
@@ -31,7 +30,7 @@ pub(crate) fn pipelines(gpu: &Gpu) -> Vec<Pipeline> {
                     module: &module,
                     entry_point: Some(stage.name),
                     compilation_options: wgpu::PipelineCompilationOptions {
-                        constants: &constants,
+                        constants,
                         ..Default::default()
                     },
                     cache: None,

@@ -1,100 +1,13 @@
 //! What a batch found, as it is read back.
 
-use crate::layout::{
-    CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, PAIR_WORDS, PLANE_BYTES,
-    SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES,
-};
-use crate::upload::Upload;
-use bytemuck::{Pod, Zeroable};
+use crate::counters::Counters;
+use crate::layout::{CONTACT_WORDS, COUNTERS, FRAGMENTS_WRAPPED, MAX_VIEWS, PAIR_WORDS};
 use tldi::glamx::Vec3;
 use tldi::{ContactPixel, PairQuery, PairResult, View, VirtualCamera, plan};
 
-/// Elements that a batch needs of each buffer whose size is not known before.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct Counters {
-    pub(crate) survivors: u32,
-    pub(crate) tiles: u32,
-    pub(crate) pixels: u32,
-    pub(crate) splats: u32,
-    pub(crate) fragments: u32,
-    pub(crate) layers: u32,
-    pub(crate) contacts: u32,
-}
-
-impl Counters {
-    /// Enough for a small scene.
-    pub(crate) const LEAST: Self = Self {
-        survivors: 1 << 15,
-        tiles: 1 << 14,
-        pixels: 1 << 15,
-        splats: 1 << 15,
-        fragments: 1 << 18,
-        layers: 1 << 16,
-        contacts: 1 << 11,
-    };
-
-    /// What each stage that runs must read and write at least, bytes.
-    pub(crate) fn bytes(&self, upload: &Upload) -> Vec<(&'static str, u64)> {
-        let times = |count: u32, bytes: u64| u64::from(count) * bytes;
-        let survivors = times(self.survivors, SURVIVOR_BYTES);
-        let tiles = times(self.tiles, 4);
-        // Both sides' begins and ends.
-        let pixels = times(self.pixels, 2 * 8);
-        let fragments = times(self.fragments, FRAGMENT_BYTES);
-        let splats = times(self.splats, SPLAT_BYTES);
-        let layers = times(self.layers, LAYER_BYTES);
-        let bare = upload.has_bare_sides();
-        let entries = times(if bare { self.survivors } else { 0 }, ENTRY_BYTES);
-        let normals = times(self.survivors, if bare { PLANE_BYTES } else { 12 });
-        let all = [
-            ("cull", 16 * upload.points() as u64 + survivors),
-            ("zone", 2 * survivors),
-            ("normals_alloc", upload.cell_bytes()),
-            ("normals_sort", survivors + entries),
-            ("sample", survivors),
-            ("aim", 2 * 16 * SAMPLE_SLOTS * upload.pairs.len() as u64),
-            ("columns_bounds", survivors),
-            ("columns_tiles", 0),
-            ("columns_depths", survivors + 2 * tiles),
-            ("columns_touch", 3 * tiles),
-            ("columns_pixels", 0),
-            ("normals", survivors + entries + normals),
-            ("normals_sharpen", survivors + entries + 2 * normals),
-            ("normals_settle", survivors + entries + 2 * normals),
-            ("mark", survivors + normals + splats + pixels),
-            ("alloc", 2 * pixels),
-            ("splat", splats + fragments),
-            ("sweep", fragments + splats + layers + pixels),
-            (
-                "compare",
-                layers + pixels + times(self.contacts, 4 * u64::from(CONTACT_WORDS)),
-            ),
-        ];
-        let runs = |stage: &(&str, u64)| bare || !stage.0.starts_with("normals");
-        all.into_iter().filter(runs).collect()
-    }
-
-    /// Whether buffers of this size are large enough.
-    pub(crate) fn holds(&self, needed: &Self) -> bool {
-        let words = |c| -> [u32; 7] { bytemuck::cast(c) };
-        let mut all = words(*self).into_iter().zip(words(*needed));
-        all.all(|(own, needed)| needed <= own)
-    }
-
-    /// Grows what is too small, by doubling.
-    pub(crate) fn grow(&mut self, needed: &Self) {
-        let needed: [u32; 7] = bytemuck::cast(*needed);
-        let own: &mut [u32; 7] = bytemuck::cast_mut(self);
-        for (own, needed) in own.iter_mut().zip(needed) {
-            if needed > *own {
-                *own = needed.checked_next_power_of_two().unwrap_or(u32::MAX);
-            }
-        }
-    }
-}
-
-/// The words that were read back: counters, pairs, contacts.
+/// The words that were read back: counters, pairs, contacts. The device wrote them, so nothing is
+/// taken from them unchecked.
+#[derive(Debug)]
 pub(crate) struct Readback<'a> {
     counters: &'a [u32],
     pairs: &'a [[u32; PAIR_WORDS as usize]],
@@ -108,19 +21,32 @@ const VIEWS: usize = 3;
 const AXES: usize = 4;
 
 impl<'a> Readback<'a> {
-    pub(crate) fn new(words: &'a [u32], pairs: usize) -> Self {
-        let (counters, rest) = words.split_at(COUNTERS as usize);
-        let (pairs, contacts) = rest.split_at(pairs * PAIR_WORDS as usize);
-        Self {
+    /// The words of a batch with so many pairs.
+    ///
+    /// # Errors
+    /// What is missing, where there are too few.
+    pub(crate) fn new(words: &'a [u32], pairs: usize) -> Result<Self, String> {
+        let split = (words.split_at_checked(COUNTERS as usize)).and_then(|(counters, rest)| {
+            let (pairs, contacts) = rest.split_at_checked(pairs * PAIR_WORDS as usize)?;
+            Some((counters, pairs, contacts))
+        });
+        let (counters, pairs, contacts) = split
+            .ok_or_else(|| format!("{} words came back, too few for {pairs} pairs", words.len()))?;
+        Ok(Self {
             counters,
             pairs: pairs.as_chunks().0,
             contacts: contacts.as_chunks().0,
-        }
+        })
     }
 
+    /// What the batch needed.
     pub(crate) fn counters(&self) -> Counters {
         let words: [u32; 7] = std::array::from_fn(|k| self.counters[k]);
-        bytemuck::cast(words)
+        let mut counters: Counters = bytemuck::cast(words);
+        if self.counters[FRAGMENTS_WRAPPED as usize] != 0 {
+            counters.fragments = u32::MAX;
+        }
+        counters
     }
 
     /// Whether the `k`-th pair on the device has a pixel with too many fragments.
@@ -129,8 +55,22 @@ impl<'a> Readback<'a> {
     }
 
     /// Fills all but the contacts of the `k`-th pair on the device.
-    pub(crate) fn fill(&self, k: usize, query: &PairQuery, result: &mut PairResult) {
+    ///
+    /// # Errors
+    /// What makes no sense.
+    pub(crate) fn fill(
+        &self,
+        k: usize,
+        query: &PairQuery,
+        result: &mut PairResult,
+    ) -> Result<(), String> {
         let words = &self.pairs[k];
+        if words[VIEWS] > MAX_VIEWS {
+            let count = words[VIEWS];
+            return Err(format!(
+                "pair {k} has {count} views, at most {MAX_VIEWS} exist"
+            ));
+        }
         result.collides = words[CROSSINGS] >= plan::CROSSED;
         result.gap = (words[GAP] != 0).then(|| -unordered(words[GAP]));
         result.axes.clear();
@@ -141,30 +81,48 @@ impl<'a> Readback<'a> {
             View::Aim { .. } => Vec3::from_array(axis.map(f32::from_bits)),
         }));
         result.contacts.clear();
+        let numbers = (result.axes.iter().flat_map(|axis| axis.to_array())).chain(result.gap);
+        all_finite(numbers)
+            .ok_or_else(|| format!("pair {k} has a gap or an axis that is no number"))
     }
 
     /// Adds the contacts of all pairs but crowded ones to their results.
+    ///
+    /// # Errors
+    /// What makes no sense.
     pub(crate) fn fill_contacts(
         &self,
         pairs_of: &[usize],
         batch: &[PairQuery],
         results: &mut [PairResult],
-    ) {
+    ) -> Result<(), String> {
         let count = self.counters().contacts as usize;
-        for words in &self.contacts[..count] {
-            let (k, view) = ((words[0] / 3) as usize, words[0] % 3);
+        let contacts = self.contacts.get(..count).ok_or_else(|| {
+            let room = self.contacts.len();
+            format!("{count} contacts were counted where {room} have room")
+        })?;
+        for (at, words) in contacts.iter().enumerate() {
+            let (k, view) = ((words[0] / MAX_VIEWS) as usize, words[0] % MAX_VIEWS);
+            let Some(&pair) = pairs_of.get(k) else {
+                let pairs = pairs_of.len();
+                return Err(format!("contact {at} is of pair {k} of {pairs}"));
+            };
             if self.is_crowded(k) {
                 continue;
             }
-            let query = &batch[pairs_of[k]];
-            let result = &mut results[pairs_of[k]];
+            let query = &batch[pair];
+            let result = &mut results[pair];
+            let Some(axis) = result.axes.get(view as usize) else {
+                let views = result.axes.len();
+                return Err(format!("contact {at} is in view {view} of {views}"));
+            };
             let camera = match query.view {
                 View::Fixed(camera) => camera,
-                View::Aim { .. } => {
-                    VirtualCamera::along(result.axes[view as usize], query.params.pixel_size)
-                }
+                View::Aim { .. } => VirtualCamera::along(*axis, query.params.pixel_size),
             };
             let number = |at: usize| f32::from_bits(words[at]);
+            all_finite((4..13).map(number))
+                .ok_or_else(|| format!("contact {at} has a place or a normal that is no number"))?;
             let vector = |at: usize| Vec3::new(number(at), number(at + 1), number(at + 2));
             let pixel = [words[1] as i32, words[2] as i32];
             let [u, v] = pixel.map(|c| c as f32 + 0.5);
@@ -179,7 +137,12 @@ impl<'a> Readback<'a> {
                 gap: number(6),
             });
         }
+        Ok(())
     }
+}
+
+fn all_finite(mut numbers: impl Iterator<Item = f32>) -> Option<()> {
+    numbers.all(f32::is_finite).then_some(())
 }
 
 /// The inverse of `ordered` in WGSL.
@@ -189,4 +152,88 @@ fn unordered(key: u32) -> f32 {
     } else {
         !key
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tldi::glamx::Pose3;
+    use tldi::{Params, PointCloud, Surface};
+
+    const PAIR: usize = COUNTERS as usize;
+    const CONTACT: usize = PAIR + PAIR_WORDS as usize;
+    const CONTACTS: usize = 6;
+
+    /// Of one pair with one view and one contact, and room for two.
+    fn words() -> Vec<u32> {
+        let mut words = vec![0; CONTACT + 2 * CONTACT_WORDS as usize];
+        words[CONTACTS] = 1;
+        words[PAIR + VIEWS] = 1;
+        words[PAIR + AXES + 1] = 1.0_f32.to_bits();
+        words
+    }
+
+    fn taken(words: &[u32]) -> Result<PairResult, String> {
+        let points = [Vec3::ZERO, Vec3::X, Vec3::Z];
+        let cloud = PointCloud::builder(&points[..]).radius(1.0).build();
+        let cloud = cloud.expect("the points are valid");
+        let batch = [PairQuery {
+            a: Surface::Cloud(&cloud),
+            b: Surface::Cloud(&cloud),
+            a_from_b: Pose3::IDENTITY,
+            view: View::aimed(),
+            params: Params::for_radius(1.0),
+        }];
+        let mut results = [PairResult::default()];
+        let readback = Readback::new(words, 1)?;
+        readback.fill(0, &batch[0], &mut results[0])?;
+        readback.fill_contacts(&[0], &batch, &mut results)?;
+        let [result] = results;
+        Ok(result)
+    }
+
+    /// Words that a sound device does not write are refused, each with what is wrong.
+    #[test]
+    fn words_that_make_no_sense_are_refused() {
+        assert_eq!(taken(&words()).map(|result| result.contacts.len()), Ok(1));
+        let nan = f32::NAN.to_bits();
+        for (at, word, expected) in [
+            (CONTACTS, 3, "3 contacts were counted where 2 have room"),
+            (CONTACTS, u32::MAX, "have room"),
+            (PAIR + VIEWS, 4, "pair 0 has 4 views"),
+            (PAIR + VIEWS, u32::MAX, "views"),
+            (PAIR + VIEWS, 0, "contact 0 is in view 0 of 0"),
+            (PAIR + AXES, nan, "an axis that is no number"),
+            (PAIR + GAP, u32::MAX, "no number"),
+            (CONTACT, 1, "contact 0 is in view 1 of 1"),
+            (CONTACT, 3, "contact 0 is of pair 1 of 1"),
+            (CONTACT, u32::MAX, "contact 0 is of pair"),
+            (CONTACT + 6, nan, "contact 0 has a place"),
+            (
+                CONTACT + 12,
+                f32::INFINITY.to_bits(),
+                "contact 0 has a place",
+            ),
+        ] {
+            let mut words = words();
+            words[at] = word;
+            let refused = taken(&words).expect_err(expected);
+            assert!(refused.contains(expected), "{at}: {refused}");
+        }
+        for length in [0, PAIR - 1, CONTACT - 1] {
+            let refused = taken(&words()[..length]).expect_err("too few");
+            assert!(refused.contains("too few"), "{length}: {refused}");
+        }
+    }
+
+    /// More fragments than a word counts are more than any buffer holds.
+    #[test]
+    fn fragments_beyond_a_word_are_too_many() {
+        let mut words = words();
+        words[FRAGMENTS_WRAPPED as usize] = 1;
+        let needed = Readback::new(&words, 1).map(|readback| readback.counters());
+        let needed = needed.expect("there are enough words");
+        let most = Counters::most(u64::MAX);
+        assert!(Counters::LEAST.grown(&needed, &most).is_err());
+    }
 }

@@ -1,6 +1,7 @@
 //! Clouds on the device: uploaded when their content is new, and kept while they are used.
 
-use crate::buffers::create;
+use crate::buffers::{create, most_bytes};
+use crate::layout::numbered;
 use crate::{Gpu, GpuError};
 use std::collections::HashMap;
 use tldi::{PointCloud, Radii};
@@ -61,14 +62,20 @@ impl Pool {
         }
     }
 
-    /// Makes room for `count` more elements in a row; what is there stays where it is.
+    /// Makes room for `count` more elements in a row, or for as many as the device allows; what is
+    /// there stays where it is.
     fn grow(&mut self, gpu: &Gpu, count: u32) -> Result<(), GpuError> {
-        let elements = u64::from(self.capacity) + u64::from(count);
+        // The stages number the words of a pool in a word.
+        let most = most_bytes(gpu).min(4 * u64::from(u32::MAX)) / self.element_bytes;
+        let elements = (u64::from(self.capacity) + u64::from(count)).min(most);
+        if elements <= u64::from(self.capacity) {
+            return Ok(());
+        }
         let buffer = create(gpu, self.name, USAGE, elements * self.element_bytes)?;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(&self.buffer, 0, &buffer, 0, self.buffer.size());
         gpu.queue.submit([encoder.finish()]);
-        let capacity = (buffer.size() / self.element_bytes).min(u64::from(u32::MAX)) as u32;
+        let capacity = (buffer.size() / self.element_bytes).min(most) as u32;
         let former = std::mem::replace(&mut self.capacity, capacity);
         self.buffer = buffer;
         self.give_back(former, capacity - former);
@@ -125,7 +132,7 @@ impl Resident {
             return Ok([slot.points.0, slot.normals.unwrap_or(0)]);
         }
         let normals = cloud.normals();
-        let count = cloud.len() as u32;
+        let count = numbered("points", cloud.len() as u64)?;
         let [first, first_normal] = self.reserve(gpu, id, count, normals.is_some())?;
         if let Some(normals) = normals {
             self.staging.clear();
@@ -166,7 +173,13 @@ impl Resident {
         self.forget(id);
         let first = self.room(gpu, count, |all| &mut all.points)?;
         let normals = match has_normals {
-            true => Some(self.room(gpu, count, |all| &mut all.normals)?),
+            true => match self.room(gpu, count, |all| &mut all.normals) {
+                Ok(first) => Some(first),
+                Err(error) => {
+                    self.points.give_back(first, count);
+                    return Err(error);
+                }
+            },
             false => None,
         };
         let slot = Slot {
@@ -188,11 +201,16 @@ impl Resident {
         if let Some(first) = pool(self).take(count) {
             return Ok(first);
         }
-        self.forget_unused();
+        self.forget_unused(KEPT_BATCHES);
         if let Some(first) = pool(self).take(count) {
             return Ok(first);
         }
         pool(self).grow(gpu, count)?;
+        if let Some(first) = pool(self).take(count) {
+            return Ok(first);
+        }
+        // The device has no more: only this batch's clouds stay.
+        self.forget_unused(1);
         let pool = pool(self);
         pool.take(count).ok_or(GpuError::TooLarge {
             buffer: pool.name,
@@ -210,10 +228,47 @@ impl Resident {
         }
     }
 
-    fn forget_unused(&mut self) {
-        let is_unused = |slot: &Slot| slot.used + KEPT_BATCHES <= self.batch;
+    /// Forgets the clouds that none of the last `kept` batches used, the present one included.
+    fn forget_unused(&mut self, kept: u64) {
+        let is_unused = |slot: &Slot| slot.used + kept <= self.batch;
         let unused = self.slots.iter().filter(|(_, slot)| is_unused(slot));
         let unused: Vec<u64> = unused.map(|(id, _)| *id).collect();
         unused.into_iter().for_each(|id| self.forget(id));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing;
+    use tldi::glamx::Vec3;
+
+    /// A cloud that has no room beside those of earlier batches takes their place; one that has none
+    /// beside those of its own batch is refused, and what is there stays.
+    #[test]
+    fn clouds_of_earlier_batches_give_their_place() {
+        // 4096 points.
+        let Some(gpu) = testing::open_small(1 << 16) else {
+            return;
+        };
+        let cloud = |points: usize| {
+            let positions: Vec<Vec3> = (0..points).map(|i| Vec3::X * i as f32).collect();
+            let built = PointCloud::builder(positions).radius(1.0).build();
+            built.expect("the points are valid")
+        };
+        let (first, second, third) = (cloud(3000), cloud(3500), cloud(700));
+        let mut resident = Resident::new(&gpu).expect("there is room");
+        resident.begin();
+        resident.place(&gpu, &first).expect("there is room");
+        resident.begin();
+        let place = resident.place(&gpu, &second);
+        let place = place.expect("the first cloud is not used any more");
+        let refused = resident.place(&gpu, &third);
+        assert!(
+            matches!(refused, Err(GpuError::TooLarge { .. })),
+            "{refused:?}"
+        );
+        assert_eq!(resident.place(&gpu, &second), Ok(place));
+        gpu.check().expect("nothing failed");
     }
 }

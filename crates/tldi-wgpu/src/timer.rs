@@ -85,9 +85,7 @@ impl Timer {
         let slice = self.readback.slice(..);
         slice.map_async(wgpu::MapMode::Read, |_| {});
         let failed = |reason| gpu.failed(reason);
-        gpu.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| failed(e.to_string()))?;
+        gpu.wait()?;
         let view = slice
             .get_mapped_range()
             .map_err(|e| failed(e.to_string()))?;

@@ -1,9 +1,10 @@
 //! What a batch uploads: its pairs, their sides, and the blocks of points in reach.
 
+use crate::counters::Counters;
 use crate::layout::{
-    BatchData, COUNTERS, CloudFacts, PairData, SIDE_WORDS, SideData, VIEW_WORDS, is_for_device,
+    BatchData, CONTACT_WORDS, COUNTERS, CloudFacts, MAX_VIEWS, PAIR_WORDS, PIXEL_BYTES, PairData,
+    SIDE_WORDS, SideData, TILE_BYTES, VIEW_WORDS, is_for_device, numbered,
 };
-use crate::readback::Counters;
 use crate::resident::Resident;
 use crate::sources::Sources;
 use crate::{Gpu, GpuError};
@@ -20,18 +21,19 @@ pub(crate) struct Upload {
     pub(crate) sides: Vec<SideData>,
     /// Side and first point of each block that may have points in reach.
     pub(crate) items: Vec<[u32; 2]>,
-    zone_words: u32,
-    cells: u32,
+    zone_words: u64,
+    cells: u64,
 }
 
 impl Upload {
-    /// Selects the pairs that the device takes and whose bounds, and blocks, say that they may
-    /// touch.
-    pub(crate) fn select(&mut self, batch: &[PairQuery<'_>]) {
+    /// Selects those of `among` (indices into the batch) that the device takes and whose bounds, and
+    /// blocks, say that they may touch.
+    pub(crate) fn select(&mut self, batch: &[PairQuery<'_>], among: impl Iterator<Item = usize>) {
         self.pairs_of.clear();
         self.plans.clear();
         self.items.clear();
-        for (pair, query) in batch.iter().enumerate() {
+        for pair in among {
+            let query = &batch[pair];
             if !is_for_device(query) {
                 continue;
             }
@@ -83,10 +85,14 @@ impl Upload {
 
     /// Bytes of the cells in which neighbours are looked for.
     pub(crate) fn cell_bytes(&self) -> u64 {
-        2 * 4 * u64::from(self.cells)
+        2 * 4 * self.cells
     }
 
     /// Puts the clouds of the selected pairs on the device, and fills what tells of them.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] where there is no room for the clouds, or the stages cannot number
+    /// what there is of them.
     pub(crate) fn place(
         &mut self,
         batch: &[PairQuery<'_>],
@@ -101,8 +107,8 @@ impl Upload {
         (self.zone_words, self.cells) = (0, 0);
         for (plan, &pair) in self.plans.iter().zip(&self.pairs_of) {
             let query = &batch[pair];
-            let data = PairData::new(query, plan, self.zone_words);
-            self.zone_words += 2 * data.zone_words;
+            let data = PairData::new(query, plan, self.zone_words)?;
+            self.zone_words += 2 * u64::from(data.zone_words);
             self.pairs.push(data);
             for (surface, side) in [query.a, query.b].iter().zip(&plan.sides) {
                 let place = match surface {
@@ -113,7 +119,7 @@ impl Upload {
                 let Some(facts) = CloudFacts::of(surface) else {
                     continue;
                 };
-                let side = SideData::new(&facts, side, &query.params, place, self.cells);
+                let side = SideData::new(&facts, side, &query.params, place, self.cells)?;
                 self.cells += side.cells();
                 self.sides.push(side);
             }
@@ -122,16 +128,29 @@ impl Upload {
     }
 
     /// Sizes of the batch and where the parts of the arena are.
-    pub(crate) fn batch_data(&self, capacities: &Counters) -> BatchData {
-        let pairs = self.pairs.len() as u32;
-        let sides_at = COUNTERS;
-        let views_at = sides_at + 2 * pairs * SIDE_WORDS;
-        let zone_at = views_at + 3 * pairs * VIEW_WORDS;
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] where a word cannot number all of the arena, of what is found, or of
+    /// the points.
+    pub(crate) fn batch_data(&self, capacities: &Counters) -> Result<BatchData, GpuError> {
+        let pairs = self.pairs.len() as u64;
+        let sides_at = u64::from(COUNTERS);
+        let views_at = sides_at + 2 * pairs * u64::from(SIDE_WORDS);
+        let zone_at = views_at + pairs * u64::from(MAX_VIEWS * VIEW_WORDS);
         let cells_at = zone_at + self.zone_words;
         let tiles_at = cells_at + 2 * self.cells;
-        BatchData {
-            pairs,
-            items: self.items.len() as u32,
+        let pixels_at = tiles_at + TILE_BYTES / 4 * u64::from(capacities.tiles);
+        let work_words = pixels_at + PIXEL_BYTES / 4 * u64::from(capacities.pixels);
+        // The stages compute places anywhere in it.
+        numbered("work", work_words)?;
+        let contact_words = u64::from(CONTACT_WORDS) * u64::from(capacities.contacts);
+        numbered("found", u64::from(PAIR_WORDS) * pairs + contact_words)?;
+        // The stages count what is culled of them.
+        numbered("survivors", self.points() as u64)?;
+        let of_work = |words| numbered("work", words);
+        Ok(BatchData {
+            pairs: numbered("pairs", pairs)?,
+            items: numbered("items", self.items.len() as u64)?,
             survivors: capacities.survivors,
             tiles: capacities.tiles,
             pixels: capacities.pixels,
@@ -139,13 +158,50 @@ impl Upload {
             fragments: capacities.fragments,
             layers: capacities.layers,
             contacts: capacities.contacts,
-            cells: self.cells,
-            sides_at,
-            views_at,
-            zone_at,
-            cells_at,
-            tiles_at,
-            pixels_at: tiles_at + 3 * capacities.tiles,
-        }
+            cells: of_work(self.cells)?,
+            sides_at: of_work(sides_at)?,
+            views_at: of_work(views_at)?,
+            zone_at: of_work(zone_at)?,
+            cells_at: of_work(cells_at)?,
+            tiles_at: of_work(tiles_at)?,
+            pixels_at: of_work(pixels_at)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Places in the arena that a word cannot number are refused, whichever part makes them so.
+    #[test]
+    fn sizes_that_a_word_does_not_hold_are_refused() {
+        let refused_buffer =
+            |upload: &Upload, capacities: Counters| match upload.batch_data(&capacities) {
+                Err(GpuError::TooLarge { buffer, .. }) => Some(buffer),
+                _ => None,
+            };
+        let with = |tiles, pixels, contacts| Counters {
+            tiles,
+            pixels,
+            contacts,
+            ..Counters::LEAST
+        };
+        let upload = Upload::default();
+        assert_eq!(refused_buffer(&upload, Counters::LEAST), None);
+        // 3 * 2^31 words are 2^31 modulo 2^32.
+        assert_eq!(refused_buffer(&upload, with(1 << 31, 1, 1)), Some("work"));
+        assert_eq!(refused_buffer(&upload, with(1, 1 << 30, 1)), Some("work"));
+        assert_eq!(refused_buffer(&upload, with(1, 1, 1 << 28)), Some("found"));
+        let of_cells = Upload {
+            cells: 1 << 31,
+            ..Upload::default()
+        };
+        assert_eq!(refused_buffer(&of_cells, Counters::LEAST), Some("work"));
+        let of_zones = Upload {
+            zone_words: 1 << 32,
+            ..Upload::default()
+        };
+        assert_eq!(refused_buffer(&of_zones, Counters::LEAST), Some("work"));
     }
 }

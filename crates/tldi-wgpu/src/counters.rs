@@ -1,0 +1,186 @@
+//! How many elements a batch needs, and how many a device takes.
+
+use crate::GpuError;
+use crate::layout::{
+    CONTACT_WORDS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, MOST_SPLATS, MOST_SURVIVORS,
+    PIXEL_BYTES, PLANE_BYTES, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, TILE_BYTES,
+};
+use crate::upload::Upload;
+use bytemuck::{Pod, Zeroable};
+
+/// Bytes of an element of each counter, in its buffer, and what the element is.
+const ELEMENT_BYTES: [u64; 7] = [
+    SURVIVOR_BYTES,
+    TILE_BYTES,
+    PIXEL_BYTES,
+    SPLAT_BYTES,
+    FRAGMENT_BYTES,
+    LAYER_BYTES,
+    4 * CONTACT_WORDS as u64,
+];
+const ELEMENT_NAMES: [&str; 7] = [
+    "survivors",
+    "tiles",
+    "pixels",
+    "splats",
+    "fragments",
+    "layers",
+    "contacts",
+];
+
+/// Elements that a batch needs of each buffer whose size is not known before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Counters {
+    pub(crate) survivors: u32,
+    pub(crate) tiles: u32,
+    pub(crate) pixels: u32,
+    pub(crate) splats: u32,
+    pub(crate) fragments: u32,
+    pub(crate) layers: u32,
+    pub(crate) contacts: u32,
+}
+
+impl Counters {
+    /// Enough for a small scene.
+    pub(crate) const LEAST: Self = Self {
+        survivors: 1 << 15,
+        tiles: 1 << 14,
+        pixels: 1 << 15,
+        splats: 1 << 15,
+        fragments: 1 << 18,
+        layers: 1 << 16,
+        contacts: 1 << 11,
+    };
+
+    /// What each stage that runs must read and write at least, bytes.
+    pub(crate) fn bytes(&self, upload: &Upload) -> Vec<(&'static str, u64)> {
+        let times = |count: u32, bytes: u64| u64::from(count) * bytes;
+        let survivors = times(self.survivors, SURVIVOR_BYTES);
+        let tiles = times(self.tiles, 4);
+        // Both sides' begins and ends.
+        let pixels = times(self.pixels, 2 * 8);
+        let fragments = times(self.fragments, FRAGMENT_BYTES);
+        let splats = times(self.splats, SPLAT_BYTES);
+        let layers = times(self.layers, LAYER_BYTES);
+        let bare = upload.has_bare_sides();
+        let entries = times(if bare { self.survivors } else { 0 }, ENTRY_BYTES);
+        let normals = times(self.survivors, if bare { PLANE_BYTES } else { 12 });
+        let all = [
+            ("cull", 16 * upload.points() as u64 + survivors),
+            ("zone", 2 * survivors),
+            ("normals_alloc", upload.cell_bytes()),
+            ("normals_sort", survivors + entries),
+            ("sample", survivors),
+            ("aim", 2 * 16 * SAMPLE_SLOTS * upload.pairs.len() as u64),
+            ("columns_bounds", survivors),
+            ("columns_tiles", 0),
+            ("columns_depths", survivors + 2 * tiles),
+            ("columns_touch", 3 * tiles),
+            ("columns_pixels", 0),
+            ("normals", survivors + entries + normals),
+            ("normals_sharpen", survivors + entries + 2 * normals),
+            ("normals_settle", survivors + entries + 2 * normals),
+            ("mark", survivors + normals + splats + pixels),
+            ("alloc", 2 * pixels),
+            ("splat", splats + fragments),
+            ("sweep", fragments + splats + layers + pixels),
+            (
+                "compare",
+                layers + pixels + times(self.contacts, 4 * u64::from(CONTACT_WORDS)),
+            ),
+        ];
+        let runs = |stage: &(&str, u64)| bare || !stage.0.starts_with("normals");
+        all.into_iter().filter(runs).collect()
+    }
+
+    /// Whether buffers of this size are large enough.
+    pub(crate) fn holds(&self, needed: &Self) -> bool {
+        let words = |c| -> [u32; 7] { bytemuck::cast(c) };
+        let mut all = words(*self).into_iter().zip(words(*needed));
+        all.all(|(own, needed)| needed <= own)
+    }
+
+    /// The most that a device takes whose buffers have at most `allowed` bytes, and that the
+    /// stages can number.
+    pub(crate) fn most(allowed: u64) -> Self {
+        // The last number says that more were counted than a word holds.
+        let within = |bytes: u64| {
+            u32::try_from(allowed / bytes)
+                .unwrap_or(u32::MAX)
+                .min(u32::MAX - 1)
+        };
+        let most = ELEMENT_BYTES.map(within);
+        let mut most: Self = bytemuck::cast(most);
+        most.survivors = most.survivors.min(MOST_SURVIVORS);
+        most.splats = most.splats.min(MOST_SPLATS);
+        most
+    }
+
+    /// The lesser of each.
+    pub(crate) fn min(self, other: &Self) -> Self {
+        let words = |c: Self| -> [u32; 7] { bytemuck::cast(c) };
+        let (own, other) = (words(self), words(*other));
+        let least: [u32; 7] = std::array::from_fn(|k| own[k].min(other[k]));
+        bytemuck::cast(least)
+    }
+
+    /// What is too small is grown by doubling, to at most `most`.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] where more than `most` is needed.
+    pub(crate) fn grown(self, needed: &Self, most: &Self) -> Result<Self, GpuError> {
+        let words = |c: Self| -> [u32; 7] { bytemuck::cast(c) };
+        let (mut own, needed, most) = (words(self), words(*needed), words(*most));
+        for k in 0..own.len() {
+            let bytes = |count: u32| ELEMENT_BYTES[k] * u64::from(count);
+            if needed[k] > most[k] {
+                return Err(GpuError::TooLarge {
+                    buffer: ELEMENT_NAMES[k],
+                    needed: bytes(needed[k]),
+                    allowed: bytes(most[k]),
+                });
+            }
+            if needed[k] > own[k] {
+                let doubled = needed[k].checked_next_power_of_two();
+                own[k] = doubled.unwrap_or(u32::MAX).min(most[k]);
+            }
+        }
+        Ok(bytemuck::cast(own))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a device has no room for, or a stage no number, is refused; all else is had by doubling.
+    #[test]
+    fn counters_grow_up_to_what_can_be_numbered() {
+        // More than any device: only the numbers bound it.
+        let most = Counters::most(u64::MAX);
+        assert_eq!(most.splats, 1 << 24);
+        assert_eq!(most.fragments, u32::MAX - 1);
+        let with = |splats| Counters {
+            splats,
+            ..Counters::LEAST
+        };
+        let grown = |splats| Counters::LEAST.grown(&with(splats), &most);
+        assert_eq!(grown(40_000), Ok(with(1 << 16)));
+        assert_eq!(grown(1 << 24), Ok(with(1 << 24)));
+        let refused = GpuError::TooLarge {
+            buffer: "splats",
+            needed: 64 * ((1 << 24) + 1),
+            allowed: 64 << 24,
+        };
+        assert_eq!(grown((1 << 24) + 1), Err(refused));
+        // Doubled, it would be more than a small device allows.
+        let small = Counters::most(1 << 20);
+        let needed = Counters {
+            splats: small.splats - 1,
+            ..Counters::default()
+        };
+        let grown = Counters::default().grown(&needed, &small);
+        assert_eq!(grown.map(|c| c.splats), Ok(small.splats));
+    }
+}
