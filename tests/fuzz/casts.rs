@@ -5,7 +5,7 @@ use crate::shapes::shape;
 use crate::spec::{any_number, cloud, pose};
 use proptest::prelude::*;
 use rapier3d::parry::query::details::ShapeCastOptions;
-use rapier3d::parry::query::{NonlinearRigidMotion, QueryDispatcher};
+use rapier3d::parry::query::{ClosestPoints, NonlinearRigidMotion, QueryDispatcher};
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 
@@ -59,8 +59,12 @@ fn questions_have_answers() {
             if let Ok(Some(contact)) = dispatcher.contact(&pos12, shape1, shape2, size) {
                 prop_assert!(contact.dist.is_finite() && contact.normal1.is_finite());
             }
-            let _ = dispatcher.closest_points(&pos12, shape1, shape2, size);
-            let _ = dispatcher.intersection_test(&pos12, shape1, shape2);
+            if let Ok(ClosestPoints::WithinMargin(p, q)) =
+                dispatcher.closest_points(&pos12, shape1, shape2, size)
+            {
+                prop_assert!(p.is_finite() && q.is_finite(), "{} {}", p, q);
+            }
+            prop_assert!(dispatcher.intersection_test(&pos12, shape1, shape2).is_ok());
             let options = ShapeCastOptions {
                 stop_at_penetration: flags[2],
                 ..ShapeCastOptions::with_max_time_of_impact(time)
@@ -94,7 +98,8 @@ fn questions_have_answers() {
                     hit
                 );
             }
-            let _ = first.project_local_point(pos12.translation, flags[2]);
+            let projected = first.project_local_point(pos12.translation, flags[2]);
+            prop_assert!(projected.point.is_finite(), "{:?}", projected);
             let mass = first.mass_properties(1.0);
             prop_assert!(mass.mass().is_finite() && mass.local_com.is_finite());
             prop_assert!(mass.principal_inertia().is_finite());

@@ -158,7 +158,12 @@ fn damaged_files_are_read_or_refused() {
 /// Nothing of a file but its beginning, if that.
 #[test]
 fn any_bytes_are_read_or_refused() {
-    let formats = prop_oneof![Just(Format::Ply), Just(Format::Pcd), Just(Format::Text)];
+    let formats = prop_oneof![
+        Just(Format::Ply),
+        Just(Format::Pcd),
+        Just(Format::Kitti),
+        Just(Format::Text)
+    ];
     let start = prop_oneof![
         Just(""),
         Just("ply\nformat ascii 1.0\n"),

@@ -25,7 +25,7 @@ pub(crate) const CONTACT_WORDS: u32 = 16;
 pub(crate) const COUNTERS: u32 = 16;
 /// Counter that is not 0 where there are more fragments than a word counts.
 pub(crate) const FRAGMENTS_WRAPPED: u32 = 8;
-pub(crate) const MAX_VIEWS: u32 = 3;
+pub(crate) const MAX_VIEWS: u32 = plan::MAX_VIEWS as u32;
 /// Threads of a workgroup.
 pub(crate) const GROUP: u32 = 256;
 

@@ -13,6 +13,7 @@ pub use crate::cpu::normals::SUPPORT;
 pub use crate::cpu::splat::DepthScale;
 pub use crate::cpu::zone::ZoneGrid;
 pub use crate::view::approach::{Approach, Body};
+pub use crate::view::camera_policy::MAX_VIEWS;
 
 /// Columns in which the surfaces are farther apart along the view than this many thicknesses, or
 /// prediction distances, are not drawn. A contact at the prediction distance is that far along the

@@ -41,7 +41,7 @@ pub enum CameraPolicy {
 }
 
 /// Most views of one pair: three axes span all directions.
-pub(crate) const MAX_VIEWS: usize = 3;
+pub const MAX_VIEWS: usize = 3;
 
 /// A normal within this of the axis is well seen: cos 50°. Depth errors of splats grow as the
 /// tangent beyond.
