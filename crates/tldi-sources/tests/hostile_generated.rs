@@ -11,7 +11,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
 use std::fmt::Debug;
-use tldi_sources::{Format, MovingPoints, ReadOptions, read_from};
+use tldi_sources::{Format, MovingPoints, PointCloud2, PointField, ReadOptions, read_from};
 
 /// Cases of each property where `PROPTEST_CASES` is not set.
 const CASES: u32 = 4000;
@@ -209,4 +209,60 @@ fn damaged_arrays_are_read_or_refused() {
         }
         Ok(())
     });
+}
+
+/// Messages whose counts, steps, fields and data have nothing to do with each other, or nearly so.
+#[test]
+fn any_messages_are_read_or_refused() {
+    let number = || prop_oneof![4 => 0..40u32, 1 => any::<u32>()];
+    let field = ("[xyz]|rgb|normal_x|radius", number(), 0..10u8, number());
+    let sizes = (0..4u32, number(), number(), number());
+    let message = (
+        vec(field, 0..6),
+        sizes,
+        any::<bool>(),
+        vec(any::<u8>(), 0..300),
+    );
+    check(
+        &message,
+        |(fields, (height, width, step, row), is_bigendian, data)| {
+            let fields = fields
+                .into_iter()
+                .map(|(name, offset, datatype, count)| PointField {
+                    name,
+                    offset,
+                    datatype,
+                    count,
+                });
+            // Half of the messages have coordinates, and the steps and the length that their counts ask for.
+            let fits = step % 2 == 0;
+            let (point_step, row_step) = match fits {
+                true => (step, step.saturating_mul(width)),
+                false => (step, row),
+            };
+            let axes = ["x", "y", "z"].into_iter().zip([0, 4, 8]);
+            let axes = axes
+                .filter(|_| fits)
+                .map(|(name, at)| PointField::f32(name, at));
+            let message = PointCloud2 {
+                height,
+                width,
+                fields: axes.chain(fields).collect(),
+                is_bigendian,
+                point_step,
+                row_step,
+                data: match fits {
+                    true => &data[..data.len().min(row_step as usize * height as usize)],
+                    false => &data,
+                },
+            };
+            match message.read(&ReadOptions::default()) {
+                Ok(cloud) => {
+                    prop_assert!(cloud.points.len() as u64 <= u64::from(width) * u64::from(height))
+                }
+                Err(error) => prop_assert!(!error.to_string().is_empty()),
+            }
+            Ok(())
+        },
+    );
 }
