@@ -3,7 +3,7 @@
 use tldi_tests::{ClosedShape, measure_overlaps};
 
 /// Spheres, boxes and capsules in all mutual poses. One in 300 is allowed to be told too deep: where edges cross by less
-/// than a splat. Without the rule of the least way out 16 of these 300 are.
+/// than a splat. Without the rule of the least way out 8 of these 300 are.
 #[test]
 fn closed_clouds_are_not_told_the_width_of_an_overlap() {
     let overlaps = measure_overlaps(&ClosedShape::primitives(), 300, 8, || ());
