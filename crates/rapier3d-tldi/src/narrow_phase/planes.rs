@@ -46,10 +46,10 @@ fn keep_supports(pair: &ShapePair<'_>, scatter: f32, manifold: &mut ContactManif
             gap: point.dist,
         })
         .collect();
-    let mut kept = supports(&points, manifold.local_n1, scatter).indices;
+    let mut kept = supports(&points, manifold.local_n1);
     kept.sort_by(|&k, &l| points[k].gap.total_cmp(&points[l].gap));
     let deepest = (0..points.len()).min_by(|&k, &l| points[k].gap.total_cmp(&points[l].gap));
-    if let Some(deepest) = deepest.filter(|&k| points[k].gap < points[kept[0]].gap - scatter) {
+    if let Some(deepest) = deepest.filter(|&k| points[k].gap < points[kept[0]].gap) {
         kept.truncate(PATCH_POINTS - 1);
         kept.push(deepest);
     }

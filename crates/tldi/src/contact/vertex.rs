@@ -1,0 +1,213 @@
+//! Where two or three faces meet at the contact of an edge or a corner.
+//!
+//! Pixels see such a contact beside its lowest place, and a quadric through them is rounded. Their normals tell the
+//! faces, and the contact is where the planes of the faces meet.
+
+use crate::contact::estimate::Observed;
+use crate::contact::quadric::{LEAST_DEVIATION, Quadric, robust};
+use arrayvec::ArrayVec;
+use glamx::{Mat3, Vec2, Vec3};
+
+/// Most faces that meet. A corner has three, or three of its faces suffice.
+const MOST_FACES: usize = 3;
+
+/// Least difference between the slopes of gaps over two faces: at 27° between them an edge is an eighth of a pixel below the
+/// gaps around it. With half of it noisy normals make faces.
+const APART: f32 = 0.5;
+
+/// Slopes that are this much apart, and as much more as they are steep, have a quarter of the weight for a face. With half of
+/// it estimated normals are too scattered for a face, with twice of it faces take normals of the edge.
+const SAME_FACE: f32 = 0.15;
+
+/// Rounds in which faces move to the middle of their slopes.
+const ROUNDS: usize = 6;
+
+/// Most slopes that are tried as a face's.
+const MOST_TRIED: usize = 64;
+
+/// Least share of each face in what holds the contact up. A face that rises by less bears the contact alone, as the bottom
+/// of a box beside its rims. With a third of it boxes stand on their rims, with three times of it edges that lean are none.
+const LEAST_SHARE: f32 = 0.1;
+
+/// How much smaller deviations must be with more faces. One factor for gaps and one for both slopes: as likelihoods
+/// of observations whose noise is not known compare. With twice of it the rims of bare boxes are edges; with half of it fewer
+/// edges of bare boxes are found.
+const BETTER: f32 = 0.25;
+
+/// Where faces meet, over places in pixels.
+#[derive(Debug)]
+pub(crate) struct Vertex {
+    /// Planes over places: gap at the origin and slopes.
+    faces: ArrayVec<Vec3, MOST_FACES>,
+    /// A place at which they meet, pixels.
+    pub(crate) place: Vec2,
+    /// Across the edge; any axis at a corner.
+    pub(crate) across: Vec2,
+    /// Whether they meet in one place only.
+    pub(crate) is_corner: bool,
+    /// Standard deviation of gaps about the highest face, where slopes are those of a face, pixels.
+    gaps_off: f32,
+    /// Standard deviation of slopes about those of the nearest face.
+    slopes_off: f32,
+}
+
+impl Vertex {
+    /// The faces that meet, if they explain what is `observed` better than `quadric` does, and meet no lower than `least`
+    /// pixels.
+    pub(crate) fn find(observed: &[Observed], quadric: &Quadric, least: f32) -> Option<Self> {
+        let seeds = seeds(observed);
+        let mut found: Option<Self> = None;
+        for count in 2..=seeds.len() {
+            let Some(vertex) = Self::of_faces(observed, &seeds[..count]) else {
+                continue;
+            };
+            if found
+                .as_ref()
+                .is_some_and(|f: &Self| vertex.slopes_off > 0.7 * f.slopes_off)
+            {
+                continue;
+            }
+            let [gaps_off, slopes_off] = match &found {
+                Some(_) => [quadric.gaps_off, quadric.slopes_off],
+                None => [quadric.gaps_off, quadric.slopes_off],
+            };
+            let smaller =
+                |off: f32, other: f32| off.max(LEAST_DEVIATION) / other.max(LEAST_DEVIATION);
+            let gaps = smaller(vertex.gaps_off, gaps_off);
+            let slopes = smaller(vertex.slopes_off, slopes_off);
+            if gaps * slopes * slopes < BETTER && vertex.gap(vertex.place) > least {
+                found = Some(vertex);
+            }
+        }
+        found
+    }
+
+    /// The gap at a place: that over the highest face.
+    pub(crate) fn gap(&self, place: Vec2) -> f32 {
+        let gaps = self.faces.iter().map(|face| over(*face, place));
+        gaps.fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// Standard deviation of gaps, pixels.
+    pub(crate) fn deviation(&self) -> f32 {
+        self.gaps_off
+    }
+
+    fn of_faces(observed: &[Observed], seeds: &[Vec2]) -> Option<Self> {
+        let faces = faces(observed, seeds);
+        let slope = |k: usize| faces[k].truncate();
+        let mut pairs = (0..faces.len()).flat_map(|k| (0..k).map(move |l| (k, l)));
+        if pairs.any(|(k, l)| slope(k).distance(slope(l)) < APART) {
+            return None;
+        }
+        let [gaps_off, slopes_off] = deviations(observed, &faces);
+        let is_corner = faces.len() == MOST_FACES;
+        let (shares, place, across) = if is_corner {
+            let columns = [0, 1, 2].map(|k| slope(k).extend(1.0));
+            let matrix = Mat3::from_cols(columns[0], columns[1], columns[2]);
+            let shares = matrix.inverse() * Vec3::Z;
+            // slope · place − gap = −(gap at the origin), for all faces.
+            let rows = matrix.transpose();
+            let meet = Mat3::from_cols(rows.x_axis, rows.y_axis, -rows.z_axis).inverse();
+            let place = meet * -Vec3::new(faces[0].z, faces[1].z, faces[2].z);
+            (shares.min_element(), place.truncate(), Vec2::X)
+        } else {
+            let (across, apart) = (slope(0) - slope(1)).normalize_and_length();
+            let [up, down] = [slope(0).dot(across), -slope(1).dot(across)];
+            let at = (faces[1].z - faces[0].z) / apart;
+            (up.min(down) / apart, at * across, across)
+        };
+        let meets = shares >= LEAST_SHARE && place.is_finite();
+        meets.then_some(Self {
+            faces,
+            place,
+            across,
+            is_corner,
+            gaps_off,
+            slopes_off,
+        })
+    }
+}
+
+/// The gap over a face.
+fn over(face: Vec3, place: Vec2) -> f32 {
+    face.z + face.truncate().dot(place)
+}
+
+/// Weight of a slope for a face.
+fn alike(slope: Vec2, of_face: Vec2) -> f32 {
+    robust(slope.distance(of_face) / (SAME_FACE * (1.0 + of_face.length())))
+}
+
+/// The slopes that most pixels have, each apart from the others.
+fn seeds(observed: &[Observed]) -> ArrayVec<Vec2, MOST_FACES> {
+    let tried = observed
+        .iter()
+        .step_by(observed.len().div_ceil(MOST_TRIED).max(1));
+    let mut tried: ArrayVec<(f32, Vec2), MOST_TRIED> = tried
+        .filter(|o| o.turn_weight > 0.0)
+        .map(|o| {
+            let pixels = observed.iter();
+            let mass = pixels.map(|p| p.turn_weight * alike(p.slope, o.slope));
+            (mass.sum::<f32>(), o.slope)
+        })
+        .collect();
+    let mut seeds = ArrayVec::new();
+    while !seeds.is_full()
+        && let Some((_, most)) = tried.iter().copied().max_by(|s, t| s.0.total_cmp(&t.0))
+    {
+        seeds.push(most);
+        tried.retain(|(_, slope)| slope.distance(most) >= APART);
+    }
+    seeds
+}
+
+/// The planes on which pixels of like slopes lie, from `seeds` on.
+fn faces(observed: &[Observed], seeds: &[Vec2]) -> ArrayVec<Vec3, MOST_FACES> {
+    let mut slopes: ArrayVec<Vec2, MOST_FACES> = seeds.iter().copied().collect();
+    let mut faces = ArrayVec::new();
+    for _ in 0..ROUNDS {
+        faces = (slopes.iter())
+            .map(|&slope| {
+                let nearest = |o: &&Observed| {
+                    let own = o.slope.distance(slope);
+                    slopes.iter().all(|other| other.distance(o.slope) >= own)
+                };
+                let (mut weights, mut sum, mut gap) = (f32::MIN_POSITIVE, Vec2::ZERO, 0.0);
+                let mut place = Vec2::ZERO;
+                for o in observed
+                    .iter()
+                    .filter(|o| o.turn_weight > 0.0)
+                    .filter(nearest)
+                {
+                    let weight = alike(o.slope, slope);
+                    weights += weight;
+                    sum += weight * o.slope;
+                    gap += weight * o.gap;
+                    place += weight * o.place;
+                }
+                let slope = sum / weights;
+                slope.extend(gap / weights - slope.dot(place / weights))
+            })
+            .collect();
+        slopes = faces.iter().map(|face: &Vec3| face.truncate()).collect();
+    }
+    faces
+}
+
+/// Standard deviations of gaps and of slopes about faces.
+fn deviations(observed: &[Observed], faces: &[Vec3]) -> [f32; 2] {
+    let (mut squares, mut weights) = ([0.0; 2], [f32::MIN_POSITIVE; 2]);
+    for o in observed {
+        let slopes = || faces.iter().map(|face| face.truncate());
+        let off = slopes().map(|slope| o.slope.distance(slope));
+        squares[1] += o.turn_weight * off.fold(f32::INFINITY, f32::min).powi(2);
+        weights[1] += o.turn_weight;
+        let likeness = slopes().map(|slope| alike(o.slope, slope));
+        let weight = o.turn_weight * likeness.fold(0.0, f32::max);
+        let gaps = faces.iter().map(|face| over(*face, o.place));
+        squares[0] += weight * (o.gap - gaps.fold(f32::NEG_INFINITY, f32::max)).powi(2);
+        weights[0] += weight;
+    }
+    [0, 1].map(|k| (squares[k] / weights[k]).sqrt())
+}
