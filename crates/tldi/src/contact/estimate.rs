@@ -26,9 +26,8 @@ const BAND: f32 = 1.0;
 /// What a pixel counts at least: one that is far up still tells that nothing is lower there.
 const LEAST_WEIGHT: f32 = 1e-3;
 
-/// Least cosine between a surface's normal and the other's opposite for them to tell a slope. Edges of 90° have 0.7 where
-/// they stand on a plane; what is seen edge on has 0.
-const LEAST_FACING: f32 = 0.2;
+/// Steepest slope that is one, a tangent: 79°. What rises more steeply is seen edge on.
+const STEEPEST: f32 = 5.0;
 
 /// Most by which a gap along the normal of the contact and one along the pixel's own differ.
 const LONGER: f32 = 2.0;
@@ -81,10 +80,10 @@ impl Plane {
     }
 
     /// What a contact pixel tells, whose gap is `mean_gap` metres among its neighbours.
-    fn observe(&self, member: u32, contact: &ContactPixel, mean_gap: f32) -> Observed {
+    pub(crate) fn observe(&self, member: u32, contact: &ContactPixel, mean_gap: f32) -> Observed {
         let pixels = |point: Vec3| (point - self.origin) / self.pixel_size;
         let [a, b] = [contact.normal_a, contact.normal_b].map(Vec3::normalize_or_zero);
-        let facing = -a.dot(b);
+        let facing = (-a.dot(b)).max(0.0);
         let apart = contact.point_b - contact.point_a;
         let longer = apart.dot(self.normal) / apart.dot(contact.normal());
         let longer = if longer.is_finite() { longer } else { 1.0 };
@@ -103,8 +102,7 @@ impl Plane {
             weight,
             turn_weight: 0.0,
         };
-        let facing = facing.max(0.0);
-        if slope_a.is_finite() && slope_b.is_finite() && (slope_b - slope_a).length() < 5.0 {
+        if slope_a.is_finite() && slope_b.is_finite() && (slope_b - slope_a).length() < STEEPEST {
             // Both surfaces' tangent planes at the place midway between what the ray meets.
             let aside = self.across(0.5 * apart / self.pixel_size);
             observed.gap -= (slope_a + slope_b).dot(aside);
@@ -164,6 +162,16 @@ impl Region {
 
     fn place(&self, along: Vec2) -> Vec2 {
         along.x * self.axes[0] + along.y * self.axes[1]
+    }
+
+    /// Takes away extents that are less than [`SAME_POINT`].
+    fn narrow(&mut self) {
+        let middle = 0.5 * (self.from + self.to);
+        for k in 0..2 {
+            if self.to[k] - self.from[k] < SAME_POINT {
+                (self.from[k], self.to[k]) = (middle[k], middle[k]);
+            }
+        }
     }
 
     /// All of the footprint.
@@ -253,10 +261,11 @@ impl Estimate {
         let least = observed.iter().fold(f32::INFINITY, |g, o| g.min(o.gap)) - LOWER;
         let quadric = Quadric::fit(observed, links, contacts, residuals);
         let vertex = Vertex::find(observed, &quadric, least);
-        let region = match &vertex {
+        let mut region = match &vertex {
             Some(vertex) => Region::of_vertex(vertex, observed),
             None => Region::of_quadric(&quadric, observed),
         };
+        region.narrow();
         let middle = 0.5 * (region.from + region.to);
         // Where it is open in what part of a bend the gap is least, it may be least in all of it.
         let gap_at = |along: Vec2| match &vertex {
@@ -278,22 +287,17 @@ impl Estimate {
             plane.point(place, height, gap_at(along))
         };
         let in_region = |along: Vec2| along.clamp(region.from, region.to);
-        let mut points = ArrayVec::<ContactPoint, PATCH_POINTS>::new();
-        if (region.to - region.from).max_element() < SAME_POINT {
-            points.push(point(middle));
-        } else {
-            places.clear();
-            places.extend(observed.iter().map(|o| in_region(region.along(o.place))));
-            let mut chosen = ArrayVec::<Vec2, PATCH_POINTS>::new();
-            for k in farthest(places.iter().copied()) {
-                let inwards = inwards(&observed[k], observed, links);
-                let along = in_region(region.along(inwards));
-                if chosen.iter().all(|c| c.distance(along) >= SAME_POINT) {
-                    chosen.push(along);
-                }
+        places.clear();
+        places.extend(observed.iter().map(|o| in_region(region.along(o.place))));
+        let mut chosen = ArrayVec::<Vec2, PATCH_POINTS>::new();
+        for k in farthest(places.iter().copied()) {
+            let inwards = inwards(&observed[k], observed, links);
+            let along = in_region(region.along(inwards));
+            if chosen.iter().all(|c| c.distance(along) >= SAME_POINT) {
+                chosen.push(along);
             }
-            points.extend(chosen.into_iter().map(point));
         }
+        let mut points: ArrayVec<_, PATCH_POINTS> = chosen.into_iter().map(point).collect();
         points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
         let radius = |k: usize| {
             let axis = region.axes[k];
@@ -327,4 +331,158 @@ fn inwards(pixel: &Observed, observed: &[Observed], links: &Links) -> Vec2 {
         }
     }
     sum / count
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::ContactPoint;
+    use crate::contact::footprint::{Footprint, PIXEL, ball, faces, normal};
+    use glamx::Vec2;
+
+    fn place(point: &ContactPoint) -> Vec2 {
+        point.middle().truncate() / PIXEL
+    }
+
+    fn disc(reach: f32, at: Vec2) -> Option<Vec2> {
+        (at.length() <= reach).then_some(at)
+    }
+
+    #[test]
+    fn a_ball_touches_in_its_lowest_point() {
+        for seed in 0..100 {
+            let mut rng = fastrand::Rng::with_seed(seed);
+            let lowest = Vec2::new(rng.f32(), rng.f32());
+            let (radius, gap) = (8.0 + 30.0 * rng.f32(), -rng.f32());
+            // As far as the surfaces are within a pixel.
+            let reach = (2.0 * radius).sqrt();
+            let found =
+                Footprint::of(|at| disc(reach, at - lowest).map(|_| ball(at, lowest, radius, gap)));
+            let found = found.estimate();
+            assert_eq!(found.points.len(), 1, "seed {seed}");
+            let point = &found.points[0];
+            // The ball is no quadric: at a height of a pixel it is lower by 1 / (2 radius).
+            assert!(
+                place(point).distance(lowest) < 0.05,
+                "seed {seed}: {point:?}"
+            );
+            assert!(
+                (point.gap / PIXEL - gap).abs() < 0.02,
+                "seed {seed}: {point:?}"
+            );
+            for radii in found.relative_radii.expect("it rolls") {
+                let ratio = radii.length() / PIXEL / radius;
+                assert!((0.9..1.05).contains(&ratio), "seed {seed}: {ratio}");
+            }
+        }
+    }
+
+    /// The wider the more noise there is: with one of 95 % both coordinates of the lowest place are between its points.
+    #[test]
+    fn a_ball_on_noise_touches_as_wide_as_the_noise_leaves_open() {
+        let (mut within, mut seen) = (0, 0);
+        let mut widths = [0.0; 2];
+        for seed in 0..400 {
+            let mut rng = fastrand::Rng::with_seed(seed);
+            let noise = [0.08, 0.16][seed as usize % 2];
+            let lowest = Vec2::new(rng.f32(), rng.f32());
+            let found = Footprint::of(|at| {
+                let at = disc(7.0, at - lowest)? + lowest;
+                let (gap, slope) = ball(at, lowest, 30.0, -0.5);
+                let turn = 0.5 * Vec2::new(normal(&mut rng), normal(&mut rng));
+                Some((gap + noise * normal(&mut rng), slope + noise * turn))
+            });
+            let points = found.estimate().points;
+            let places = || points.iter().map(place);
+            let low = places().fold(Vec2::INFINITY, Vec2::min);
+            let high = places().fold(Vec2::NEG_INFINITY, Vec2::max);
+            within += usize::from(low.cmple(lowest).all() && lowest.cmple(high).all());
+            seen += 1;
+            widths[seed as usize % 2] += (high - low).length();
+        }
+        let share = f64::from(within as u32) / f64::from(seen);
+        assert!(share > 0.9, "{share}");
+        assert!(widths[1] > 1.3 * widths[0], "{widths:?}");
+    }
+
+    #[test]
+    fn a_face_rests_on_its_corners_and_a_cylinder_on_the_ends_of_a_line() {
+        for seed in 0..100 {
+            let mut rng = fastrand::Rng::with_seed(seed);
+            let axis = Vec2::from_angle(std::f32::consts::TAU * rng.f32());
+            let half = Vec2::new(8.0, 5.0);
+            let along = |at: Vec2| Vec2::new(at.dot(axis), at.dot(axis.perp()));
+            let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]]
+                .map(|[x, y]| half * Vec2::new(x, y));
+            // Pixels that the face covers in part have a contact as well.
+            let inside = |at: Vec2| along(at).abs().cmple(half + 0.5).all();
+            let face = Footprint::of(|at| inside(at).then_some((-0.3, Vec2::ZERO))).estimate();
+            assert_eq!(face.points.len(), 4, "seed {seed}");
+            for corner in corners {
+                let off = face.points.iter().map(|p| along(place(p)).distance(corner));
+                // A pixel's middle, and as far again inwards.
+                assert!(off.fold(f32::INFINITY, f32::min) < 2.0, "seed {seed}");
+            }
+            assert!(face.relative_radii.is_none(), "seed {seed}");
+
+            let cylinder = Footprint::of(|at| {
+                let (gap, slope) = ball(Vec2::Y * along(at).y, Vec2::ZERO, 20.0, -0.3);
+                inside(at).then_some((gap, slope.y * axis.perp()))
+            });
+            let cylinder = cylinder.estimate();
+            assert_eq!(cylinder.points.len(), 2, "seed {seed}");
+            for point in &cylinder.points {
+                let at = along(place(point));
+                assert!(
+                    (at.x.abs() - half.x).abs() < 1.0 && at.y.abs() < 0.1,
+                    "seed {seed}: {at}"
+                );
+                assert!((point.gap / PIXEL + 0.3).abs() < 0.05, "seed {seed}");
+            }
+            let radii = cylinder.relative_radii.expect("it rolls");
+            assert!(
+                (radii[0].length() / PIXEL / 20.0 - 1.0).abs() < 0.05,
+                "seed {seed}"
+            );
+            assert!(radii[1].length() == 0.0, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn an_edge_touches_where_its_faces_meet_and_does_not_roll() {
+        for seed in 0..100 {
+            let mut rng = fastrand::Rng::with_seed(seed);
+            let across = Vec2::from_angle(std::f32::consts::TAU * rng.f32());
+            let meet = Vec2::new(rng.f32(), rng.f32());
+            let found = Footprint::of(|at| {
+                let (gap, slope) = faces(at, meet, -0.4, &[0.8 * across, -1.2 * across]);
+                (gap < 0.6 && at.dot(across.perp()).abs() < 8.0).then_some((gap, slope))
+            });
+            let found = found.estimate();
+            assert_eq!(found.points.len(), 2, "seed {seed}");
+            for point in &found.points {
+                let off = (place(point) - meet).dot(across);
+                assert!(off.abs() < 0.05, "seed {seed}: {off}");
+                assert!((point.gap / PIXEL + 0.4).abs() < 0.05, "seed {seed}");
+            }
+            assert!(found.relative_radii.is_none(), "seed {seed}");
+        }
+    }
+
+    /// What a device tells may be wrong: whatever it is, nothing panics.
+    #[test]
+    fn no_pixels_panic() {
+        for seed in 0..2000 {
+            let mut rng = fastrand::Rng::with_seed(seed);
+            let scale = 10.0_f32.powi(rng.i32(-30..38));
+            let mut footprint = Footprint::of(|at| disc(3.0, at).map(|_| (-0.5, Vec2::ZERO)));
+            for contact in &mut footprint.contacts {
+                contact.gap *= rng.f32() * scale;
+                contact.point_b *= rng.f32() * scale;
+                contact.normal_a *= rng.f32() - 0.5;
+                contact.normal_b =
+                    [contact.normal_b, glamx::Vec3::NAN, scale * contact.normal_b][rng.usize(0..3)];
+            }
+            footprint.estimate();
+        }
+    }
 }

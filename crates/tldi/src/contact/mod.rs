@@ -1,6 +1,8 @@
 //! Contacts: from contact pixels to the few points that a solver takes. On the CPU for every backend.
 
 pub(crate) mod estimate;
+#[cfg(test)]
+pub(crate) mod footprint;
 pub(crate) mod links;
 pub(crate) mod lone_points;
 pub(crate) mod noise;
