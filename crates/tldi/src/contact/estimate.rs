@@ -151,6 +151,8 @@ struct Region {
     to: Vec2,
     /// Along each axis: by how much gaps bend, per pixel; 0 where they bend downwards.
     bends: [f32; 2],
+    /// Where along each axis the gap is least in the footprint, if the gaps tell.
+    lowest: [Option<f32>; 2],
     /// Whether the footprint is bent so that it is much longer than the region.
     is_round: [bool; 2],
 }
@@ -181,6 +183,7 @@ impl Region {
             from: Vec2::INFINITY,
             to: Vec2::NEG_INFINITY,
             bends: [0.0; 2],
+            lowest: [None; 2],
             is_round: [false; 2],
         };
         for o in observed {
@@ -229,6 +232,7 @@ impl Region {
             let [_, error] = quadric.slope_along(at, region.axes[k]);
             let reach = DOUBT * error / sure[k];
             let inside = lowest[k].clamp(low[k], high[k]);
+            region.lowest[k] = Some(inside);
             region.from[k] = (inside - reach).max(low[k]);
             region.to[k] = (inside + reach).min(high[k]);
             let is_narrow = region.to[k] - region.from[k] < 0.5 * (high[k] - low[k]);
@@ -267,13 +271,19 @@ impl Estimate {
         };
         region.narrow();
         let middle = 0.5 * (region.from + region.to);
-        // Where it is open in what part of a bend the gap is least, it may be least in all of it.
         let gap_at = |along: Vec2| match &vertex {
             Some(vertex) => vertex.gap(region.place(along)),
             None => {
-                let off = along - middle;
-                let [x, y] = [0, 1].map(|k| 0.5 * region.bends[k] * off[k] * off[k]);
-                (quadric.gap(region.place(along)) - x - y).max(least)
+                let (mut at, mut rise) = (along, 0.0);
+                for k in 0..2 {
+                    match region.lowest[k] {
+                        // All of the region may be the lowest place.
+                        Some(lowest) => at[k] = lowest,
+                        // What is no bend leaves a slope.
+                        None => rise += 0.5 * region.bends[k] * (along[k] - middle[k]).powi(2),
+                    }
+                }
+                (quadric.gap(region.place(at)) - rise).max(least)
             }
         };
         let point = |along: Vec2| {
