@@ -8,13 +8,13 @@ use std::process::ExitCode;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
 use tldi_examples::cli::Common;
-use tldi_examples::render::{BODY_COLORS, Item, Paint, Scene};
 use tldi_examples::report::DropReport;
 use tldi_examples::scan::{ScanSource, choose_up, load_scan, positive};
 use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::{DropSimulation, NamedCloud, Snapshot};
 use tldi_examples::spots::{Demand, find_spots};
-use tldi_examples::{load, output, viewpoint};
+use tldi_examples::{load, output};
+use tldi_pictures::{BODY_COLORS, Item, Paint, Scene, thinned, viewpoint};
 
 /// Lets point-cloud bodies fall onto a point-cloud scan and come to rest
 ///
@@ -166,7 +166,7 @@ fn draw(
         .fold(0.0, f32::max);
     let scan = simulation.scan();
     let most = LARGEST_DRAWN_RADIUS * scan.mean_radius();
-    let drawn_scan = load::derived(scan, 1, |p| p, |radius| radius.min(most))?;
+    let drawn_scan = thinned(scan, 1, |radius| radius.min(most))?;
     let scene = |snapshot: &Snapshot| {
         let scan = Item {
             cloud: &drawn_scan,

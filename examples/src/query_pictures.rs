@@ -1,15 +1,14 @@
 //! Pictures of one query: the layers of both images, a cut through them, the contact zone, the contact
 //! pixels.
 
-use crate::load;
 use crate::query::{Answer, CloudQuery};
-use crate::render::{BODY_COLORS, Item, Paint, Picture, Scene};
-use crate::sheet::{Key, Panel, sheet};
-use crate::viewpoint;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
     CloudError, ContactPixel, Facing, KdTree, Layer, Params, PointCloud, Tldi, VirtualCamera,
 };
+use tldi_pictures::sheet::{Key, Panel, sheet};
+use tldi_pictures::viewpoint;
+use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, painted};
 
 /// Most pixels along an edge of a layer's panel before it is enlarged.
 const PANEL_PIXELS: u32 = 320;
@@ -68,7 +67,7 @@ pub fn zone(
                   other_from_cloud: Pose3,
                   color: [f32; 3]| {
         let tree = KdTree::new(other);
-        load::painted(cloud, |i| {
+        painted(cloud, |i| {
             let place = other_from_cloud * cloud.point(i);
             let strength = if tree.nearest(place, reach).is_some() {
                 1.0
