@@ -6,10 +6,14 @@
 
 pub mod animation;
 mod clouds;
+mod front_layers;
+mod picture;
 mod render;
+mod scene;
 mod shading;
 pub mod sheet;
 pub mod viewpoint;
 
 pub use clouds::{painted, thinned};
-pub use render::{BODY_COLORS, Item, Paint, Picture, Scene, pixels_of};
+pub use picture::Picture;
+pub use scene::{BODY_COLORS, Item, Paint, Scene, pixels_of};

@@ -1,6 +1,6 @@
 //! Panels side by side on one sheet, with captions and a legend.
 
-use crate::render::Picture;
+use crate::Picture;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
 /// Space between panels and around the sheet in picture pixels.
