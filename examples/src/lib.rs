@@ -11,6 +11,7 @@ pub mod load;
 pub mod output;
 pub mod query;
 pub mod query_pictures;
+mod query_views;
 pub mod recording;
 pub mod report;
 pub mod robot;
