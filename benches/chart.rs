@@ -14,10 +14,10 @@ use tldi_benches::charts::draw_all;
 /// Nothing is measured.
 #[derive(Parser)]
 struct Args {
-    /// Folder with the results (*.json)
+    /// Folder with the results (*.json), or with a folder of results for each kind of chart
     #[arg(long, value_name = "DIR", default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/results"))]
     results: PathBuf,
-    /// Folder for the charts (that of the results without)
+    /// Folder for the charts, each in the folder of its kind (that of the results without)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

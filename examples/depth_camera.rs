@@ -12,12 +12,12 @@ use tldi_examples::depth::{
     DepthScene, DepthSimulation, DepthSnapshot, FrameSource, GeneratedCamera, camera_up,
 };
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
-use tldi_examples::render::{BODY_COLORS, Item, Paint, Picture, Scene};
 use tldi_examples::scan::positive;
 use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::NamedCloud;
 use tldi_examples::spots::{Demand, NoSpot, Spot, find_spots_where};
-use tldi_examples::{animation, load, output, viewpoint};
+use tldi_examples::{load, output};
+use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, viewpoint};
 use tldi_sources::depth::{DepthCamera, DepthSequence, SensorModel};
 
 /// Depth frames become a collider that is new in every frame; bodies rest on it and are pushed

@@ -8,13 +8,13 @@ use std::process::ExitCode;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
 use tldi_examples::cli::Common;
-use tldi_examples::render::{BODY_COLORS, Item, Paint, Scene};
 use tldi_examples::report::DropReport;
 use tldi_examples::scan::{ScanSource, choose_up, load_scan, positive};
 use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::{DropSimulation, NamedCloud, Snapshot};
 use tldi_examples::spots::{Demand, find_spots};
-use tldi_examples::{load, output, viewpoint};
+use tldi_examples::{load, output};
+use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, thinned, viewpoint};
 
 /// Lets point-cloud bodies fall onto a point-cloud scan and come to rest
 ///
@@ -37,9 +37,12 @@ struct Args {
     /// Number of steps of 1/60 s
     #[arg(long, value_name = "N", default_value_t = 300)]
     steps: usize,
-    /// Folder for initial.png, mid.png and final.png
+    /// Folder for initial.png, mid.png and final.png (and motion.png)
     #[arg(long, value_name = "DIR", default_value = "out/drop")]
     out: PathBuf,
+    /// Writes motion.png, too: the fall at half speed, an animated PNG
+    #[arg(long)]
+    animate: bool,
     #[command(flatten)]
     common: Common,
 }
@@ -52,6 +55,16 @@ const MID_STEP: usize = 15;
 /// camera's flying pixels, have far larger ones and would hide what is behind them.
 const LARGEST_DRAWN_RADIUS: f32 = 3.0;
 const PICTURE_SIZE: [u32; 2] = [1280, 720];
+/// Columns and rows of the animation: a page shows it at this size, and four times the pixels make four times the file.
+const ANIMATION_SIZE: [u32; 2] = [640, 360];
+/// Steps from one picture of the animation to the next. One doubles the file, four jump while bodies fall.
+const ANIMATION_STEPS: usize = 2;
+/// Steps that the animation shows: bodies fall for 15 to 20, and rock for as many again.
+const ANIMATION_END: usize = 90;
+/// Seconds for which a picture of the animation is shown: half speed, since a fall takes a quarter of a second.
+const ANIMATION_SECONDS: f32 = 2.0 * ANIMATION_STEPS as f32 / 60.0;
+/// How often the last picture is repeated, so that one sees where bodies end: a second and a half.
+const ANIMATION_HOLD: usize = 22;
 
 fn main() -> ExitCode {
     let args = Args::parse();
@@ -79,9 +92,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let spots = find_spots(&scan, up, &demand)?;
     let (seed, backend) = (args.common.seed, args.common.backend.open()?);
     let mut simulation = DropSimulation::new(scan, up, bodies, &spots, seed, backend)?;
-    let snapshots = simulate(&mut simulation, args.steps)?;
+    let run = simulate(&mut simulation, args)?;
     let report = simulation.report();
-    draw(&simulation, &report, up, &snapshots, &args.out)?;
+    draw(&simulation, &report, up, &run, &args.out)?;
     if let Some(path) = &args.common.json {
         output::write_json(path, &report)?;
     }
@@ -136,27 +149,43 @@ fn ball_radius(cloud: &PointCloud<'_>) -> f32 {
     cloud.points().map(Vec3::length).fold(0.0, f32::max)
 }
 
-/// Takes all steps; returns the state before the first one, after [`MID_STEP`] and after the last.
-fn simulate(simulation: &mut DropSimulation, steps: usize) -> anyhow::Result<[Snapshot; 3]> {
+/// What is drawn of a run.
+struct Run {
+    /// Before the first step, after [`MID_STEP`] and after the last.
+    stills: [Snapshot; 3],
+    /// After every [`ANIMATION_STEPS`], up to [`ANIMATION_END`]; empty if no animation is asked for.
+    motion: Vec<Snapshot>,
+}
+
+/// Takes all steps.
+fn simulate(simulation: &mut DropSimulation, args: &Args) -> anyhow::Result<Run> {
+    let steps = args.steps;
     let bar = output::progress_bar(steps, "steps");
     let initial = simulation.snapshot();
     let mut mid = initial.clone();
+    let mut motion: Vec<Snapshot> = args.animate.then(|| initial.clone()).into_iter().collect();
     for step in 1..=steps {
         (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
         if step == MID_STEP.min(steps) {
             mid = simulation.snapshot();
         }
+        if args.animate && step <= ANIMATION_END && step % ANIMATION_STEPS == 0 {
+            motion.push(simulation.snapshot());
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok([initial, mid, simulation.snapshot()])
+    Ok(Run {
+        stills: [initial, mid, simulation.snapshot()],
+        motion,
+    })
 }
 
 fn draw(
     simulation: &DropSimulation,
     report: &DropReport,
     up: Vec3,
-    snapshots: &[Snapshot; 3],
+    run: &Run,
     folder: &Path,
 ) -> anyhow::Result<()> {
     let clouds = simulation.clouds();
@@ -166,7 +195,7 @@ fn draw(
         .fold(0.0, f32::max);
     let scan = simulation.scan();
     let most = LARGEST_DRAWN_RADIUS * scan.mean_radius();
-    let drawn_scan = load::derived(scan, 1, |p| p, |radius| radius.min(most))?;
+    let drawn_scan = thinned(scan, 1, |radius| radius.min(most))?;
     let scene = |snapshot: &Snapshot| {
         let scan = Item {
             cloud: &drawn_scan,
@@ -189,7 +218,7 @@ fn draw(
         }
     };
     // A body that was lost is looked for where it started, not where it fell to.
-    let [initial, _, last] = snapshots;
+    let [initial, _, last] = &run.stills;
     let mut in_sight = last.clone();
     for (k, body) in report.bodies.iter().enumerate() {
         if !body.inside_bounds {
@@ -199,14 +228,28 @@ fn draw(
     let starts: Vec<Vec3> = (initial.scan_from_body.iter())
         .map(|pose| pose.translation)
         .collect();
-    let camera = viewpoint::choose(&scene(&in_sight), &starts, PICTURE_SIZE);
+    let camera = |size| viewpoint::choose(&scene(&in_sight), &starts, size);
+    let still_camera = camera(PICTURE_SIZE);
     output::make_folder(folder)?;
-    for (snapshot, name) in snapshots
-        .iter()
-        .zip(["initial.png", "mid.png", "final.png"])
-    {
-        let picture = scene(snapshot).draw(&camera, &snapshot.contacts);
+    let names = ["initial.png", "mid.png", "final.png"];
+    for (snapshot, name) in run.stills.iter().zip(names) {
+        let picture = scene(snapshot).draw(&still_camera, &snapshot.contacts);
         output::write_file(&folder.join(name), &picture.to_png()?)?;
+    }
+    if !run.motion.is_empty() {
+        let camera = camera(ANIMATION_SIZE);
+        let bar = output::progress_bar(run.motion.len(), "pictures");
+        let mut pictures: Vec<Picture> = (run.motion.iter())
+            .map(|snapshot| {
+                bar.inc(1);
+                scene(snapshot).draw(&camera, &snapshot.contacts)
+            })
+            .collect();
+        let last = pictures.last().cloned();
+        pictures.extend(std::iter::repeat_n(last, ANIMATION_HOLD).flatten());
+        let bytes = animation::to_apng(&pictures, ANIMATION_SECONDS)?;
+        output::write_file(&folder.join("motion.png"), &bytes)?;
+        bar.finish_and_clear();
     }
     eprintln!("pictures are in {}", folder.display());
     Ok(())

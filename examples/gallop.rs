@@ -11,10 +11,10 @@ use tldi_examples::cli::{Common, UpChoice};
 use tldi_examples::gallop::{
     DT, GallopScene, GallopSimulation, GallopSnapshot, Ground, Runner, creature,
 };
+use tldi_examples::output;
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
-use tldi_examples::render::{BODY_COLORS, Item, Paint, Picture, Scene};
 use tldi_examples::scan::positive;
-use tldi_examples::{animation, load, output};
+use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, painted};
 use tldi_sources::{MovingPoints, ReadOptions};
 
 /// A deforming cloud gallops over ground that deforms as well
@@ -277,13 +277,13 @@ fn tinted(snapshot: &GallopSnapshot, reach: f32) -> anyhow::Result<PointCloud<'s
         [r, g, b, 255]
     };
     if snapshot.contacts.is_empty() {
-        return Ok(load::painted(runner, |_| plain(SKIN))?);
+        return Ok(painted(runner, |_| plain(SKIN))?);
     }
     let contacts = PointCloud::builder(&snapshot.contacts)
         .radius(reach)
         .build()?;
     let tree = KdTree::new(&contacts);
-    Ok(load::painted(runner, |i| {
+    Ok(painted(runner, |i| {
         let place = snapshot.world_from_runner * runner.point(i);
         let distance = tree
             .nearest(place, reach)

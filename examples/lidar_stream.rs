@@ -11,12 +11,12 @@ use tldi_examples::cli::{Common, UpChoice};
 use tldi_examples::lidar::{
     LidarReport, LidarScene, LidarSimulation, Scanner, Sweep, SweepSource, recipe, within,
 };
-use tldi_examples::render::{BODY_COLORS, Item, Paint, Scene};
 use tldi_examples::scan::positive;
 use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::NamedCloud;
 use tldi_examples::spots::{Demand, find_spots};
-use tldi_examples::{load, output, viewpoint};
+use tldi_examples::{load, output};
+use tldi_pictures::{BODY_COLORS, Item, Paint, Scene, viewpoint};
 
 /// Turns sweeps of a laser scanner into a collider that is new ten times a second, and drops bodies on it
 ///

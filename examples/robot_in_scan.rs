@@ -8,13 +8,13 @@ use std::process::ExitCode;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, Triple};
+use tldi_examples::output;
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
-use tldi_examples::render::{BODY_COLORS, Item, Paint, Picture, Scene};
 use tldi_examples::robot::{
     BUILT_IN, Base, DT, Description, RobotScene, RobotSimulation, RobotSnapshot,
 };
 use tldi_examples::scan::{ScanSource, choose_up, load_scan};
-use tldi_examples::{animation, load, output, viewpoint};
+use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, thinned, viewpoint};
 
 /// A robot whose links are point clouds moves in a scan that is a point cloud
 ///
@@ -195,7 +195,7 @@ fn draw(
 ) -> anyhow::Result<()> {
     let scan = simulation.scan();
     let most = LARGEST_DRAWN_RADIUS * scan.mean_radius();
-    let drawn_scan = load::derived(scan, 1, |p| p, |radius| radius.min(most))?;
+    let drawn_scan = thinned(scan, 1, |radius| radius.min(most))?;
     let [initial, last] = [&snapshots[0], &snapshots[snapshots.len() - 1]];
     // The moment with the most contacts is the one worth a picture.
     let mid = (snapshots

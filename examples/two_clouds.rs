@@ -10,7 +10,8 @@ use tldi::glamx::{Pose3, Vec3};
 use tldi_examples::cli::{Common, PoseArgument, Triple};
 use tldi_examples::query::{Answer, CloudQuery};
 use tldi_examples::scene::BodyShape;
-use tldi_examples::{animation, load, output, query_pictures};
+use tldi_examples::{load, output, query_pictures};
+use tldi_pictures::animation;
 
 /// Asks about two clouds once: do they collide, what is the gap, where do they touch
 ///

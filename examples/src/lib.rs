@@ -1,7 +1,6 @@
 //! What the runnable stories share: command-line options, generated scenes, loading, finding up,
 //! spots to drop bodies on, the simulation, pictures and reports.
 
-pub mod animation;
 pub mod cli;
 pub mod contact_kinds;
 pub mod depth;
@@ -12,17 +11,14 @@ pub mod load;
 pub mod output;
 pub mod query;
 pub mod query_pictures;
+mod query_views;
 pub mod recording;
-pub mod render;
 pub mod report;
 pub mod robot;
 pub mod scan;
 pub mod scene;
-mod shading;
-mod sheet;
 pub mod simulation;
 pub mod spots;
 pub mod step_totals;
 pub mod surface_sampling;
 pub mod up;
-pub mod viewpoint;

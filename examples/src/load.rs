@@ -21,17 +21,9 @@ const LEAST_BODY_RADII: f32 = 10.0;
 /// # Errors
 /// Those of reading the file and of building the cloud, with the path.
 pub fn scan_from_file(path: &Path, scale: f32) -> anyhow::Result<PointCloud<'static>> {
-    let mut raw = tldi_sources::read(path, &tldi_sources::ReadOptions::default())
+    let raw = tldi_sources::read(path, &tldi_sources::ReadOptions::default())
         .with_context(|| format!("cannot read the scan {}", path.display()))?;
-    if scale != 1.0 {
-        raw.points.iter_mut().for_each(|point| *point *= scale);
-        raw.radii
-            .iter_mut()
-            .flatten()
-            .for_each(|radius| *radius *= scale);
-        raw.viewpoint = raw.viewpoint.map(|viewpoint| viewpoint * scale);
-    }
-    finish_scan(raw.into_builder())
+    finish_scan(raw.scaled(scale).into_builder())
         .with_context(|| format!("cannot use the scan {}", path.display()))
 }
 
@@ -112,21 +104,6 @@ pub fn resized(cloud: &PointCloud<'_>, size: f32) -> Result<PointCloud<'static>,
     )
 }
 
-/// Every `step`-th point of a cloud, to be drawn: with its normal and colour, at another place and
-/// with another radius. `place` must not turn the cloud. All normals count as known to point outward.
-///
-/// # Errors
-/// [`CloudError`] if places or radii are refused.
-pub fn derived(
-    cloud: &PointCloud<'_>,
-    step: usize,
-    place: impl Fn(Vec3) -> Vec3,
-    radius: impl Fn(f32) -> f32,
-) -> Result<PointCloud<'static>, CloudError> {
-    let kept: Vec<usize> = (0..cloud.len()).step_by(step).collect();
-    part(cloud, &kept, place, radius, true)
-}
-
 /// The points of a cloud with these indices, with their normals and colours, at another place and with
 /// another radius. `place` must not turn the cloud. Normals that do not know their side are estimated
 /// anew, and do not know it then either.
@@ -139,24 +116,12 @@ pub fn subset(
     place: impl Fn(Vec3) -> Vec3,
     radius: impl Fn(f32) -> f32,
 ) -> Result<PointCloud<'static>, CloudError> {
-    part(cloud, indices, place, radius, cloud.normals_oriented())
-}
-
-/// `keep_normals`: hand them on. What is given to a builder counts as known to point outward; else
-/// they are estimated anew.
-fn part(
-    cloud: &PointCloud<'_>,
-    indices: &[usize],
-    place: impl Fn(Vec3) -> Vec3,
-    radius: impl Fn(f32) -> f32,
-    keep_normals: bool,
-) -> Result<PointCloud<'static>, CloudError> {
     let kept = || indices.iter().copied();
     let points: Vec<Vec3> = kept().map(|i| place(cloud.point(i))).collect();
     let radii: Vec<f32> = kept().map(|i| radius(cloud.radius(i))).collect();
     let mut builder = PointCloud::builder(points).radii(radii);
     builder = match cloud.normals() {
-        Some(normals) if keep_normals => {
+        Some(normals) if cloud.normals_oriented() => {
             builder.normals(kept().map(|i| normals[i]).collect::<Vec<_>>())
         }
         Some(_) => builder.pca_normals(SCAN_NORMAL_NEIGHBORS),
@@ -166,24 +131,6 @@ fn part(
         builder = builder.colors(kept().map(|i| colors[i]).collect::<Vec<_>>());
     }
     Ok(builder.build()?.into_owned())
-}
-
-/// The cloud with a colour (red, green, blue, alpha) for each point, to be drawn, as [`derived`].
-///
-/// # Errors
-/// [`CloudError`]; not for a cloud that was valid.
-pub fn painted(
-    cloud: &PointCloud<'_>,
-    color: impl Fn(usize) -> [u8; 4],
-) -> Result<PointCloud<'static>, CloudError> {
-    let points: Vec<Vec3> = cloud.points().collect();
-    let radii: Vec<f32> = (0..cloud.len()).map(|i| cloud.radius(i)).collect();
-    let colors: Vec<[u8; 4]> = (0..cloud.len()).map(color).collect();
-    let mut builder = PointCloud::builder(points).radii(radii).colors(colors);
-    if let Some(normals) = cloud.normals() {
-        builder = builder.normals(normals.to_vec());
-    }
-    builder.build()
 }
 
 /// The name of a file without its folder and extensions.

@@ -1,18 +1,14 @@
 //! Pictures of one query: the layers of both images, a cut through them, the contact zone, the contact
 //! pixels.
 
-use crate::load;
 use crate::query::{Answer, CloudQuery};
-use crate::render::{BODY_COLORS, Item, Paint, Picture, Scene};
-use crate::sheet::{Key, Panel, sheet};
-use crate::viewpoint;
+use crate::query_views::Views;
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{
-    CloudError, ContactPixel, Facing, KdTree, Layer, Params, PointCloud, Tldi, VirtualCamera,
-};
+use tldi::{CloudError, ContactPixel, Facing, KdTree, Layer, PointCloud, Tldi, VirtualCamera};
+use tldi_pictures::sheet::{Key, Panel, sheet};
+use tldi_pictures::viewpoint;
+use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, painted};
 
-/// Most pixels along an edge of a layer's panel before it is enlarged.
-const PANEL_PIXELS: u32 = 320;
 /// Width or height in picture pixels that panels are enlarged to, at most: a layer, contact pixels, and
 /// the width of a section.
 const LAYER_EDGE: u32 = 320;
@@ -35,6 +31,10 @@ const ONLY: [[u8; 3]; 2] = [[226, 214, 204], [206, 216, 228]];
 /// A and B in a section, and half the width of the line of a surface there, in picture pixels.
 const SIDES: [[u8; 3]; 2] = [[214, 92, 30], [40, 116, 200]];
 const SURFACE_LINE: f32 = 1.6;
+/// A point of a section, its radius in picture pixels, and the width of the line between points and layers.
+const POINT: [u8; 3] = [40, 44, 52];
+const POINT_DOT: f32 = 2.0;
+const DIVIDER: u32 = 2;
 /// Full penetration, a full gap, and points of the solver.
 const DEEP: [u8; 3] = [235, 30, 20];
 const WIDE: [u8; 3] = [30, 90, 235];
@@ -68,7 +68,7 @@ pub fn zone(
                   other_from_cloud: Pose3,
                   color: [f32; 3]| {
         let tree = KdTree::new(other);
-        load::painted(cloud, |i| {
+        painted(cloud, |i| {
             let place = other_from_cloud * cloud.point(i);
             let strength = if tree.nearest(place, reach).is_some() {
                 1.0
@@ -184,10 +184,11 @@ pub fn contact_pixels(query: &CloudQuery, answer: &Answer) -> Picture {
     sheet(&[panels], &legend)
 }
 
-/// A cut through both images along a row of pixels, seen from the side: the rays go down. Dark: the
-/// surface of each layer; medium: what was merged into it, from nearest to farthest; pale: between a layer
-/// where the ray enters a body and the next where it leaves it, red where that is so of both. The row is
-/// that with most contact pixels, or the middle one.
+/// How points become layers: a row of pixels from the side. The rays go down.
+///
+/// The left half shows the points in the row, each as a disc. The right half shows the layers. Dark is the
+/// surface of a layer, medium the fragments merged into it, from nearest to farthest. Pale is inside a body, red
+/// inside both. The row is the one with most contact pixels, or the middle one.
 pub fn section(query: &CloudQuery, answer: &Answer) -> Picture {
     let views = Views::new(query, answer);
     let images = views.images(query);
@@ -222,25 +223,96 @@ pub fn section(query: &CloudQuery, answer: &Answer) -> Picture {
         }
     };
     let width = views.size[0] * enlarged;
+    let middle = width / 2;
     let rgb = (0..height)
         .flat_map(|y| (0..width).map(move |x| (x, y)))
         // A gap between the columns shows the rays.
         .map(|(x, y)| match x % enlarged {
+            _ if x < middle => NOTHING,
+            _ if x < middle + DIVIDER => POINT,
             0 if enlarged > 2 => NOTHING,
             _ => color_at(&columns[(x / enlarged) as usize], y),
         })
         .collect();
-    let picture = Picture {
+    let mut picture = Picture {
         size: [width, height],
         rgb,
     };
+    let poses = [Pose3::IDENTITY, query.a_from_b];
+    for ((cloud, pose), color) in [&query.a, &query.b].into_iter().zip(poses).zip(SIDES) {
+        let place = |point: Vec3| {
+            let [u, v] = views.camera.pixel_from_view(point);
+            let x = (u - views.origin[0] as f32) * enlarged as f32;
+            let is_in_row = (v - row as f32 - 0.5).abs() <= 0.5;
+            (is_in_row && x < middle as f32).then_some([x, (point.z - near) * scale + margin])
+        };
+        discs(
+            &mut picture,
+            cloud,
+            &(views.camera.view_from_frame * pose),
+            scale,
+            color,
+            place,
+        );
+    }
     let legend = [
+        Key::new(
+            POINT,
+            "left: points near the row, each a disc; right: layers",
+        ),
         Key::new(SIDES[0], "surface of A in each layer, pale inside of A"),
         Key::new(SIDES[1], "surface of B, and inside of it"),
         Key::new(faded(DEEP, 0.3), "inside both: penetration"),
     ];
-    let caption = "one row of pixels from the side: the rays go down".to_owned();
+    let caption =
+        "points become layers: one row of pixels from the side, the rays go down".to_owned();
     sheet(&[vec![Panel { picture, caption }]], &legend)
+}
+
+/// Draws the points that have a `place` in the picture, each with its disc from the side, `scale` picture pixels a
+/// metre.
+fn discs(
+    picture: &mut Picture,
+    cloud: &PointCloud<'_>,
+    view_from_cloud: &Pose3,
+    scale: f32,
+    color: [u8; 3],
+    place: impl Fn(Vec3) -> Option<[f32; 2]>,
+) {
+    for i in 0..cloud.len() {
+        let Some([x, y]) = place(*view_from_cloud * cloud.point(i)) else {
+            continue;
+        };
+        if let Some(normals) = cloud.normals() {
+            // Where the disc's plane cuts that of the picture.
+            let along = (view_from_cloud.rotation * normals[i])
+                .cross(Vec3::Y)
+                .normalize_or_zero();
+            let radius = cloud.radius(i) * scale;
+            for step in 0..=(4.0 * radius) as u32 {
+                let t = 0.5 * step as f32 - radius;
+                dot(
+                    picture,
+                    [x + t * along.x, y + t * along.z],
+                    0.5 * SURFACE_LINE,
+                    color,
+                );
+            }
+        }
+        dot(picture, [x, y], POINT_DOT, POINT);
+    }
+}
+
+/// Fills a disc of `radius` picture pixels, as far as it is in the picture.
+fn dot(picture: &mut Picture, [u, v]: [f32; 2], radius: f32, color: [u8; 3]) {
+    let [width, height] = picture.size.map(|n| n as i32);
+    let around = |c: f32| (c - radius).floor() as i32..=(c + radius).ceil() as i32;
+    for (x, y) in around(v).flat_map(|y| around(u).map(move |x| (x, y))) {
+        let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
+        if is_inside && (x as f32 + 0.5 - u).hypot(y as f32 + 0.5 - v) <= radius {
+            picture.rgb[(y * width + x) as usize] = color;
+        }
+    }
 }
 
 /// The row with most contact pixels of the first view, in the rows of `views`, or else the middle one.
@@ -283,129 +355,6 @@ fn layer_color(image: &Tldi, views: &Views, [x, y]: [i32; 2], k: usize) -> [u8; 
     let farness = (layer.depth - near) / (far - near).max(1e-9);
     let light = (1.0 - 0.5 * farness) * (0.55 + 0.45 * layer.normal.z.abs());
     full.map(|c| (f32::from(c) * light) as u8)
-}
-
-/// A rectangle of a view's pixels that both images are shown in.
-struct Views {
-    camera: VirtualCamera,
-    params: Params,
-    origin: [i32; 2],
-    size: [u32; 2],
-    /// Nearest and farthest depth of both clouds, metres.
-    depths: [f32; 2],
-}
-
-impl Views {
-    /// All of both clouds, in coarser pixels than the query's where there would be too many.
-    fn new(query: &CloudQuery, answer: &Answer) -> Self {
-        let axis = axis_of(query, answer, 0);
-        let fine = Self::around(query, axis, answer.params.pixel_size, answer.params);
-        let deep = (fine.depths[1] - fine.depths[0]) / answer.params.pixel_size;
-        let pixels = deep.max(fine.size[0].max(fine.size[1]) as f32);
-        let pixel_size = answer.params.pixel_size * (pixels / PANEL_PIXELS as f32).max(1.0);
-        let params = answer.params.with_pixel_size(pixel_size);
-        Self::around(query, axis, pixel_size, params)
-    }
-
-    /// The contact pixels of a view and their surroundings, in the query's pixels, as far as a panel holds them.
-    fn of_contacts(
-        query: &CloudQuery,
-        answer: &Answer,
-        view: usize,
-        contacts: &[&ContactPixel],
-    ) -> Self {
-        let axis = axis_of(query, answer, view);
-        let mut views = Self::around(query, axis, answer.params.pixel_size, answer.params);
-        if contacts.is_empty() {
-            return Self::new(query, answer);
-        }
-        // As many as a panel holds, around the middle one of them.
-        let range = |k: usize| {
-            let mut pixels: Vec<i32> = contacts.iter().map(|contact| contact.pixel[k]).collect();
-            pixels.sort_unstable();
-            let middle = pixels[pixels.len() / 2];
-            let half = PANEL_PIXELS as i32 / 2;
-            let shown = |p: i32| p.clamp(middle.saturating_sub(half), middle.saturating_add(half));
-            (shown(pixels[0]), shown(pixels[pixels.len() - 1]))
-        };
-        for k in 0..2 {
-            let (least, most) = range(k);
-            let margin = 6 + (most - least) / 4;
-            views.origin[k] = least - margin;
-            views.size[k] = (most - least + 1 + 2 * margin) as u32;
-        }
-        views
-    }
-
-    fn around(query: &CloudQuery, axis: Vec3, pixel_size: f32, params: Params) -> Self {
-        let camera = VirtualCamera::along(axis, pixel_size);
-        let seen = |bounds: tldi::Aabb, pose: &Pose3| {
-            bounds.transformed(&(camera.view_from_frame * *pose))
-        };
-        let both = seen(query.a.bounds(), &Pose3::IDENTITY)
-            .merged(seen(query.b.bounds(), &query.a_from_b));
-        let low = [both.min.x, both.min.y].map(|c| (c / pixel_size).floor() as i32 - 2);
-        let high = [both.max.x, both.max.y].map(|c| (c / pixel_size).ceil() as i32 + 2);
-        Self {
-            camera,
-            params,
-            origin: low,
-            size: [0, 1].map(|k| (high[k] - low[k]).max(1) as u32),
-            depths: [both.min.z, both.max.z],
-        }
-    }
-
-    /// Of the pixels of the rectangle, which are counted from its first one.
-    fn images(&self, query: &CloudQuery) -> [Tldi; 2] {
-        let mut camera = self.camera;
-        let first = self.origin.map(|c| c as f32 * self.params.pixel_size);
-        camera.view_from_frame.translation -= Vec3::new(first[0], first[1], 0.0);
-        camera.size = Some(self.size);
-        let poses = [Pose3::IDENTITY, query.a_from_b];
-        [(&query.a, poses[0]), (&query.b, poses[1])]
-            .map(|(cloud, pose)| tldi::build(cloud, &pose, &camera, &self.params))
-    }
-
-    /// The layers of an image at a pixel of the view.
-    fn layers_at<'a>(&self, image: &'a Tldi, pixel: [i32; 2]) -> &'a [Layer] {
-        let [i, j] = [0, 1].map(|k| pixel[k] - self.origin[k] - image.origin[k]);
-        let inside = i >= 0 && j >= 0 && i < image.size[0] as i32 && j < image.size[1] as i32;
-        if inside {
-            image.layers_at(i as u32, j as u32)
-        } else {
-            &[]
-        }
-    }
-
-    /// Picture pixels along the edge of a pixel of the view, in a panel of up to `edge` picture pixels.
-    fn enlargement(&self, edge: u32) -> u32 {
-        (edge / self.size[0].max(self.size[1])).max(1)
-    }
-
-    /// A picture of the rectangle, enlarged up to `edge` picture pixels; `color` gets columns and rows
-    /// of the view.
-    fn panel(&self, edge: u32, color: impl Fn(i32, i32) -> [u8; 3]) -> Picture {
-        let enlarged = self.enlargement(edge);
-        let size = self.size.map(|n| n * enlarged);
-        let colors: Vec<[u8; 3]> = (0..self.size[1] as i32)
-            .flat_map(|j| (0..self.size[0] as i32).map(move |i| (i, j)))
-            .map(|(i, j)| color(self.origin[0] + i, self.origin[1] + j))
-            .collect();
-        let rgb = (0..size[1])
-            .flat_map(|y| (0..size[0]).map(move |x| (x, y)))
-            .map(|(x, y)| colors[(y / enlarged * self.size[0] + x / enlarged) as usize])
-            .collect();
-        Picture { size, rgb }
-    }
-}
-
-/// The axis of a view or, for clouds that are out of reach of each other, from `b` to `a`.
-fn axis_of(query: &CloudQuery, answer: &Answer, view: usize) -> Vec3 {
-    let apart = query.a.bounds().center() - query.a_from_b * query.b.bounds().center();
-    let axes = &answer.result.axes;
-    axes.get(view)
-        .copied()
-        .unwrap_or_else(|| apart.normalize_or(Vec3::Z))
 }
 
 fn cross(picture: &mut Picture, [u, v]: [f32; 2]) {

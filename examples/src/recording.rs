@@ -1,12 +1,12 @@
 //! Recordings of a run, and viewing while it runs, with [rerun](https://rerun.io): points, robot,
 //! contacts and cameras as entities of their own. Only with the feature `rerun`.
 
-use crate::render::Item;
 use std::path::PathBuf;
 use std::str::FromStr;
 use thiserror::Error;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Projection, VirtualCamera};
+use tldi_pictures::Item;
 
 /// The option `--rerun`; flatten into the binary's own arguments.
 #[derive(clap::Args, Clone, Debug)]
@@ -139,13 +139,13 @@ impl Recording {
 #[cfg(feature = "rerun")]
 mod stream {
     use super::*;
-    use crate::render::Paint;
     use rerun::{
         Color, Pinhole, Points3D, Quaternion, RecordingStream, RecordingStreamBuilder, Transform3D,
         ViewCoordinates,
     };
     use std::collections::HashMap;
     use tldi::PointCloud;
+    use tldi_pictures::Paint;
 
     /// Radius in metres and colour of the dots at contacts.
     const CONTACT_RADIUS: f32 = 0.006;

@@ -39,6 +39,10 @@ pub enum ChartError {
     },
 }
 
+/// Folders of the charts below that of all results. Each holds the rows that its charts are drawn from, too:
+/// wrong answers against time, against one setting, contacts, frames of new points.
+const ROOMS: [&str; 4] = ["accuracy", "sweeps", "contacts", "frames"];
+
 /// Results of all files of a folder.
 #[derive(Default)]
 struct Results {
@@ -48,20 +52,16 @@ struct Results {
 }
 
 impl Results {
+    /// The rows in the charts' folders below `folder` or, if there are none, in `folder` itself.
     fn read(folder: &Path) -> Result<Self, ChartError> {
-        let unreadable = |source| StoredError::File {
-            path: folder.to_owned(),
-            source,
-        };
         let mut files = Vec::new();
-        for entry in std::fs::read_dir(folder).map_err(unreadable)? {
-            let path = entry.map_err(unreadable)?.path();
-            if path
-                .extension()
-                .is_some_and(|extension| extension == "json")
-            {
-                files.push(path);
+        for room in ROOMS.map(|room| folder.join(room)) {
+            if room.is_dir() {
+                files.extend(json_files(&room)?);
             }
+        }
+        if files.is_empty() {
+            files = json_files(folder)?;
         }
         if files.is_empty() {
             return Err(ChartError::NoResults(folder.to_owned()));
@@ -85,6 +85,25 @@ impl Results {
     }
 }
 
+/// The results in a folder, not below it.
+fn json_files(folder: &Path) -> Result<Vec<PathBuf>, ChartError> {
+    let unreadable = |source| StoredError::File {
+        path: folder.to_owned(),
+        source,
+    };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        if path
+            .extension()
+            .is_some_and(|extension| extension == "json")
+        {
+            files.push(path);
+        }
+    }
+    Ok(files)
+}
+
 /// What became of the charts.
 #[derive(Debug, Default)]
 pub struct Drawn {
@@ -94,24 +113,33 @@ pub struct Drawn {
     pub skipped: Vec<String>,
 }
 
-/// Draws all charts for which the folder `results` holds rows into `out`, as SVG and PNG.
+/// Draws all charts for which `results` holds rows, as SVG and PNG, each into its own folder below `out`.
 pub fn draw_all(results: &Path, out: &Path) -> Result<Drawn, ChartError> {
     let all = Results::read(results)?;
-    std::fs::create_dir_all(out).map_err(|source| StoredError::File {
-        path: out.to_owned(),
-        source,
-    })?;
-    let mut figures = speed_accuracy::figures(&all.accuracy);
-    figures.extend(sweeps::figures(&all.accuracy));
-    figures.extend(contact_quality::figures(&all.contacts));
-    figures.extend(frames::figures(&all.frames));
     let mut drawn = Drawn::default();
+    let mut frames = frames::figures(&all.frames);
     match work::figures(&all.frames) {
-        Ok(work) => figures.extend(work),
+        Ok(work) => frames.extend(work),
         Err(missing) => drawn.skipped.push(missing),
     }
-    for figure in figures {
-        drawn.files.extend(paint::save(&figure, out)?);
+    let figures = [
+        speed_accuracy::figures(&all.accuracy),
+        sweeps::figures(&all.accuracy),
+        contact_quality::figures(&all.contacts),
+        frames,
+    ];
+    for (room, figures) in ROOMS.iter().zip(figures) {
+        if figures.is_empty() {
+            continue;
+        }
+        let folder = out.join(room);
+        std::fs::create_dir_all(&folder).map_err(|source| StoredError::File {
+            path: folder.clone(),
+            source,
+        })?;
+        for figure in figures {
+            drawn.files.extend(paint::save(&figure, &folder)?);
+        }
     }
     Ok(drawn)
 }

@@ -168,7 +168,7 @@ fn stored_results_become_charts() {
         assert!(length > 3_000, "{}: {length} bytes", file.display());
     }
     let text = |name: &str| std::fs::read_to_string(out.join(name)).expect("it was drawn");
-    let main = text("speed_accuracy.svg");
+    let main = text("accuracy/speed_accuracy.svg");
     for words in [
         "2 × 4321 points, 1000 to 9000 cases",
         "ddd4444",
@@ -185,11 +185,12 @@ fn stored_results_become_charts() {
     // Not on the front, so without its setting; and not of another run.
     assert!(!main.contains("1024²") && !main.contains("bbb2222"));
     assert!(
-        text("false_answers.svg").contains("grid (counting sort), culled and 1 that answer alike")
+        text("accuracy/false_answers.svg")
+            .contains("grid (counting sort), culled and 1 that answer alike")
     );
-    assert!(text("error_rho.svg").contains("Bunny 36k: 0.39 %"));
-    assert!(text("error_noise.svg").contains("bbb2222"));
-    assert!(text("frame_cost_a_ball.svg").contains("ccc3333"));
+    assert!(text("sweeps/error_rho.svg").contains("Bunny 36k: 0.39 %"));
+    assert!(text("sweeps/error_noise.svg").contains("bbb2222"));
+    assert!(text("frames/frame_cost_a_ball.svg").contains("ccc3333"));
     std::fs::remove_dir_all(results).expect("it is there");
 }
 

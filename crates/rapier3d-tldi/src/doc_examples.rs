@@ -1,4 +1,5 @@
 //! The code of the README and of the pages in `docs`, compiled and run as tests.
+//! `tests/doc_pages.rs` checks that no page with code is missing here.
 
 /// The code of one page.
 macro_rules! page {
@@ -10,5 +11,10 @@ macro_rules! page {
 
 page!(Readme, "../../../README.md");
 page!(Choosing, "../../../docs/choosing.md");
+page!(DepthCamera, "../../../docs/depth_camera.md");
+page!(Gallop, "../../../docs/gallop.md");
 page!(InYourApp, "../../../docs/in_your_app.md");
+page!(LidarStream, "../../../docs/lidar_stream.md");
+page!(RobotInScan, "../../../docs/robot_in_scan.md");
+page!(Streams, "../../../docs/streams.md");
 page!(TwoClouds, "../../../docs/two_clouds.md");

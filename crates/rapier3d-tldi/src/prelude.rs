@@ -2,6 +2,6 @@
 
 pub use crate::{
     CloudStream, Contact as CloudContact, MassModel, PointCloudShape, Resolution, StepReport,
-    TldiConfig, TldiError, TldiPipeline, cloud_collider,
+    TldiConfig, TldiError, TldiPipeline, cloud_collider, points_on, sample_shape,
 };
-pub use tldi::{CameraPolicy, CloudError, NonFinite, PointCloud, Variant};
+pub use tldi::{CameraPolicy, CloudError, CloudRecipe, NonFinite, PointCloud, RadiusRule, Variant};

@@ -192,11 +192,15 @@ impl Collector {
             return Err(too_many(self.max_points));
         }
         let mut sample = *sample;
-        if let Some(splats) = self.splats
-            && !splat::finish(&mut sample, splats.color, splats.least_opacity)
-        {
-            self.left_out += 1;
-            return Ok(());
+        if let Some(splats) = self.splats {
+            let Some(point) = splat::point(&sample.splat, splats.least_opacity) else {
+                self.left_out += 1;
+                return Ok(());
+            };
+            (sample.normal, sample.radius) = (point.normal, point.radius);
+            if splats.color {
+                sample.color = point.color;
+            }
         }
         let position = DVec3::from_array(sample.position);
         match &mut self.pending {

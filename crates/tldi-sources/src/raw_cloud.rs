@@ -84,6 +84,25 @@ impl RawCloud {
         Some(sums.iter().map(unit).collect())
     }
 
+    /// The same in metres, from a file whose unit is `metres` long: points, radii, viewpoint and origin.
+    ///
+    /// ```
+    /// use tldi_sources::RawCloud;
+    /// use tldi::glamx::Vec3;
+    /// let in_millimetres = RawCloud { points: vec![Vec3::X * 1500.0], ..Default::default() };
+    /// assert_eq!(in_millimetres.scaled(0.001).points, [Vec3::X * 1.5]);
+    /// ```
+    pub fn scaled(mut self, metres: f32) -> Self {
+        for point in self.points.iter_mut().chain(&mut self.viewpoint) {
+            *point *= metres;
+        }
+        for radius in self.radii.iter_mut().flatten() {
+            *radius *= metres;
+        }
+        self.origin *= f64::from(metres);
+        self
+    }
+
     /// Hands points, colours, radii, normals and viewpoint to the builder of a cloud.
     ///
     /// The normals are those of the file or else, if there are faces, the

@@ -4,7 +4,6 @@
 //! standard deviations, a quaternion that turns it, the logit of its opacity, and the constant term of its
 //! colour in spherical harmonics.
 
-use crate::collector::Sample;
 use tldi::glamx::{Quat, Vec3};
 
 /// Values of a splat: three of size, four of rotation, opacity, three of colour.
@@ -31,10 +30,19 @@ pub(crate) fn part_from_name(name: &str) -> Option<usize> {
     names.iter().position(|known| *known == name)
 }
 
-/// Gives `sample` the normal, the radius and, with `has_color`, the colour of its splat. `false`, if it has less
-/// than the least opacity, or no extent or direction.
-pub(crate) fn finish(sample: &mut Sample, has_color: bool, least_opacity: f32) -> bool {
-    let parts = &sample.splat;
+/// What a splat is as a point.
+pub(crate) struct SplatPoint {
+    /// Unit length, of either sign.
+    pub(crate) normal: [f32; 3],
+    /// In units of the file.
+    pub(crate) radius: f32,
+    /// Red, green, blue, alpha, 0 to 255.
+    pub(crate) color: [f32; 4],
+}
+
+/// The point of a splat with these `parts`, or `None` if it has less than the least opacity, or no extent or
+/// direction.
+pub(crate) fn point(parts: &[f32; PARTS], least_opacity: f32) -> Option<SplatPoint> {
     let opacity = 1.0 / (1.0 + (-parts[OPACITY]).exp());
     let sigmas = Vec3::new(parts[0], parts[1], parts[2]).exp();
     let [w, x, y, z] = std::array::from_fn(|k| parts[ROTATION + k]);
@@ -44,14 +52,10 @@ pub(crate) fn finish(sample: &mut Sample, has_color: bool, least_opacity: f32) -
     // Of the disc with the area of the two longer axes' ellipse.
     let radius = (sigmas[(shortest + 1) % 3] * sigmas[(shortest + 2) % 3]).sqrt();
     let is_sound = length.is_finite() && length > 0.0 && sigmas.is_finite() && radius > 0.0;
-    if !(is_sound && opacity >= least_opacity) {
-        return false;
-    }
-    sample.normal = (rotation.normalize() * Vec3::AXES[shortest]).to_array();
-    sample.radius = radius;
-    if has_color {
-        let channel = |k: usize| 255.0 * (0.5 + CONSTANT_HARMONIC * sample.splat[COLOR + k]);
-        sample.color = [channel(0), channel(1), channel(2), 255.0 * opacity];
-    }
-    true
+    let channel = |k: usize| 255.0 * (0.5 + CONSTANT_HARMONIC * parts[COLOR + k]);
+    (is_sound && opacity >= least_opacity).then(|| SplatPoint {
+        normal: (rotation.normalize() * Vec3::AXES[shortest]).to_array(),
+        radius,
+        color: [channel(0), channel(1), channel(2), 255.0 * opacity],
+    })
 }

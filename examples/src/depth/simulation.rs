@@ -3,7 +3,6 @@
 use super::report::{DepthBodyReport, DepthReport, FrameReport};
 use super::source::TimedFrame;
 use crate::contact_kinds::ContactKinds;
-use crate::load;
 use crate::simulation::NamedCloud;
 use crate::spots::Spot;
 use crate::step_totals::StepTotals;
@@ -270,7 +269,7 @@ impl DepthSimulation {
         let frame = (surface.as_shape::<PointCloudShape>()).context("the frame is a cloud")?;
         // The fewer points, the larger their discs, so that they cover as much.
         let grown = |radius| radius * (step as f32).sqrt();
-        let frame = load::derived(frame.cloud(), step, |p| p, grown)?;
+        let frame = tldi_pictures::thinned(frame.cloud(), step, grown)?;
         let contacts = self
             .tldi
             .contacts(&self.world.narrow_phase, &self.world.colliders);

@@ -1,9 +1,8 @@
-//! How fast a surface moves that is sampled anew in every frame.
+//! The speed of a surface that is sampled anew in every frame.
 //!
-//! New points say nothing of where the old ones went, but a surface that comes nearer stands higher
-//! along the normal of a contact than it did. What is told apart from the noise of the samples, twice
-//! in a row, is taken for its speed; a surface that is replaced by another one, or that stands
-//! still, has none.
+//! New points do not tell where the old ones went. But a surface that comes nearer stands higher than before, along the
+//! normal of a contact. If the rise exceeds the noise of the samples twice in a row, it is the surface's speed. A surface
+//! that stands still, or is replaced by another one, has no speed.
 
 use nalgebra::{SMatrix, SVector};
 use rapier3d::glamx::Vec3;
@@ -13,22 +12,23 @@ use tldi::{Aabb, BLOCK, PointCloud};
 /// Radius about a contact, in mean radii, whose points tell the height of the surface: some thirty.
 const AROUND: f32 = 3.0;
 
-/// Fewest points that tell it, for each term of what is fitted to them.
+/// Fewest points of a fit, for each of its terms.
 const POINTS_PER_TERM: usize = 3;
 
 /// Terms of a plane and of a paraboloid.
 const PLANE: usize = 3;
 const PARABOLOID: usize = 6;
 
-/// Farthest that a surface moves from one sampling to the next, in mean radii: beyond, the points of others are as near.
+/// Farthest motion of a surface from one frame to the next, in mean radii. Beyond it, points of another surface are as
+/// near.
 const FARTHEST: f32 = 8.0;
 
-/// Shortest way from one sampling to the next, in mean radii, that counts as a motion: twice what measured depths
-/// scatter by.
+/// Shortest motion from one frame to the next, in mean radii, that counts: twice the scatter of measured
+/// depths.
 const SHORTEST: f32 = 0.2;
 
-/// Standard errors that a motion must exceed. Twice in a row, that of a surface at rest does so by
-/// chance a few times in 10⁷ steps.
+/// A motion must exceed this many standard errors. A surface at rest seems to do so twice in a row a few times in 10⁷
+/// steps, by chance.
 const SURE: f32 = 4.0;
 
 /// The points that a cloud had, by blocks.

@@ -184,8 +184,8 @@ impl SurfaceMotions {
             .any(|collider| colliders.contains(&collider))
     }
 
-    /// Velocity in world space, m/s, of the collider's surface at a point in world space, beside
-    /// that of its body; of one that was sampled anew along `normal`, of unit length.
+    /// Velocity of the collider's surface at a point, m/s, without the velocity of its body. Both are in world space. For a
+    /// surface that was sampled anew it is known only along the unit vector `normal`.
     pub(crate) fn at(
         &self,
         collider: ColliderHandle,

@@ -1,19 +1,21 @@
 //! What the contacts of a step tell its sweeps (CCD), and what these tell the bodies.
 //!
-//! A body of which a part is on the wrong side of a sheet leaves it through the side that its contacts
-//! remember: a sweep must not hold it there, from behind. And a body that is deep in a trough may move
-//! against its slope, which no contact faces, since the body's own flat bottom decides on the normal: the sweep holds it in
-//! every step, its corrections included, and it would keep its velocity until the trough has closed over
-//! it. So it loses there what is directed into the slope, as by an impact without friction or rebound.
+//! **Leaving a sheet.** A part of a body may be on the wrong side of a sheet. It leaves through the side that its contacts
+//! remember. A sweep meets the sheet from behind and must not hold the body there.
 //!
-//! Rapier asks for sweeps without naming the colliders: they are known by their shapes, by where what
-//! moves was when the step began, and by where its target is.
+//! **Blocked sweeps.** A body deep in a trough may move against the trough's slope. No contact faces the slope, because
+//! the flat bottom of the body decides the normal. The sweep then stops the body in every step, but leaves its velocity
+//! as it is, until the trough has closed over it. So the body loses the part of its velocity that points into the slope,
+//! as in an impact without friction and rebound.
+//!
+//! Rapier does not name the colliders of a sweep. They are found by their shapes, by the pose of the moving one at the
+//! beginning of the step, and by the place of its target.
 
 use crate::corrections::impulses::{PushedPoint, separate};
-use crate::step::prepared::{Batch, PreparedPair, Question, address, locked};
+use crate::step::prepared::{Batch, Blocked, PreparedPair, Question, address, locked};
 use rapier3d::dynamics::RigidBodySet;
 use rapier3d::geometry::{Collider, ColliderSet};
-use rapier3d::math::{Pose, Vector};
+use rapier3d::math::Pose;
 use rapier3d::parry::shape::Shape;
 use tldi::Penetration;
 
@@ -25,14 +27,6 @@ pub(crate) struct SweptPair<'a> {
     pub(crate) shapes: [&'a dyn Shape; 2],
     /// In world space, at first. A target that the step has moved already is where it is then.
     pub(crate) poses: [Pose; 2],
-}
-
-/// Where a sweep holds a pair, in world space.
-#[derive(Clone, Copy)]
-pub(crate) struct Blocked {
-    pub(crate) point: Vector,
-    /// Unit normal from the first collider of the pair towards the second.
-    pub(crate) normal: Vector,
 }
 
 impl Batch {
@@ -96,7 +90,7 @@ impl Batch {
         }
     }
 
-    /// Takes from the bodies of the pairs that are held what they move into each other by.
+    /// Takes from the bodies of held pairs the part of their velocities with which they move into each other.
     pub(crate) fn stop_blocked(&self, bodies: &mut RigidBodySet, colliders: &ColliderSet) {
         let blocked = self.pairs.iter().filter_map(|pair| {
             let Blocked { point, normal } = locked(&pair.blocked).take()?;
@@ -120,6 +114,7 @@ mod tests {
     use crate::narrow_phase::parts::{Hint, ShapePair, append_part_pairs};
     use crate::{PointCloudShape, TldiConfig};
     use rapier3d::geometry::{ColliderHandle, SharedShape};
+    use rapier3d::math::Vector;
     use std::sync::Mutex;
     use std::sync::atomic::AtomicBool;
     use tldi::{ContactPatch, ContactPoint, PairResult, PointCloud};

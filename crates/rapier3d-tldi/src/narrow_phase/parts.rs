@@ -1,11 +1,11 @@
 //! From a pair of shapes to the comparisons it needs: one for each pair of parts.
 
-use crate::narrow_phase::passing::has_surface;
 use crate::shape::exact::ExactShape;
 use crate::{PointCloudShape, TldiConfig};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::bounding_volume::{Aabb, BoundingVolume};
-use rapier3d::parry::shape::Shape;
+use rapier3d::parry::shape::{Shape, ShapeType};
+use tldi::plan::largest_pixel;
 use tldi::{PairQuery, Params, PointCloud, Surface, View};
 
 /// The cloud of a shape that is one.
@@ -23,6 +23,16 @@ pub(crate) fn clouds_of(shape: &dyn Shape) -> impl Iterator<Item = &PointCloud<'
 /// Whether the shape is a cloud or a compound that holds one.
 pub(crate) fn has_cloud(shape: &dyn Shape) -> bool {
     clouds_of(shape).next().is_some()
+}
+
+/// Whether rays can cross the shape or it is a cloud, whose points have radii.
+pub(crate) fn has_surface(shape: &dyn Shape) -> bool {
+    if cloud_of(shape).is_some() {
+        return true;
+    }
+    let pixel = largest_pixel(shape.compute_local_aabb().extents(), 0.0);
+    let is_line = matches!(shape.shape_type(), ShapeType::Segment | ShapeType::Polyline);
+    pixel >= *Params::LENGTHS.start() && !is_line
 }
 
 /// Number of parts: those of a compound, or one.

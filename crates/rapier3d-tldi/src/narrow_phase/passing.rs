@@ -1,14 +1,34 @@
 //! What passes through clouds, and that a pipeline says so once for each collider.
 
 use crate::TldiError;
-use crate::narrow_phase::parts::{cloud_of, has_cloud, part, part_count};
+use crate::narrow_phase::parts::{has_cloud, has_surface, part, part_count};
 use crate::step::candidates::Candidate;
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
-use rapier3d::parry::shape::{Shape, ShapeType};
-use tldi::Params;
-use tldi::plan::largest_pixel;
 
 /// Why a collider passes through clouds.
+///
+/// ```
+/// # use rapier3d::prelude::*;
+/// # use rapier3d_tldi::prelude::*;
+/// # let points: Vec<Vector> = (0..400)
+/// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+/// #     .collect();
+/// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+/// # let mut world = PhysicsWorld::default();
+/// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// # tldi.attach(&mut world);
+/// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+/// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+/// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+/// // A segment has no surface: `step` says so once.
+/// use rapier3d_tldi::Passes;
+/// let body = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.01, 0.5));
+/// world.insert(body, ColliderBuilder::segment(-Vector::X, Vector::X));
+/// let error = tldi.step(&mut world).unwrap_err();
+/// assert!(matches!(error, TldiError::PassesThrough { reason: Passes::Line, .. }));
+/// # let _ = (scan, ball);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Passes {
@@ -31,16 +51,6 @@ impl std::fmt::Display for Passes {
             }
         })
     }
-}
-
-/// Whether rays can cross the shape or it is a cloud, whose points have radii.
-pub(crate) fn has_surface(shape: &dyn Shape) -> bool {
-    if cloud_of(shape).is_some() {
-        return true;
-    }
-    let pixel = largest_pixel(shape.compute_local_aabb().extents(), 0.0);
-    let is_line = matches!(shape.shape_type(), ShapeType::Segment | ShapeType::Polyline);
-    pixel >= *Params::LENGTHS.start() && !is_line
 }
 
 /// Why the collider passes through clouds, if it does.

@@ -10,12 +10,11 @@
 
 use super::queries;
 use crate::TldiConfig;
-use crate::corrections::sweeps::{Blocked, SweptPair};
-use crate::narrow_phase::parts::{ShapePair, has_cloud, part, part_count, surface};
-use crate::narrow_phase::passing::has_surface;
+use crate::corrections::sweeps::SweptPair;
+use crate::narrow_phase::parts::{ShapePair, has_cloud, has_surface, part, part_count, surface};
 use crate::narrow_phase::straight_way::StraightWay;
 use crate::shape::exact::ExactShape;
-use crate::step::prepared::Shared;
+use crate::step::prepared::{Blocked, Shared};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::details::ShapeCastOptions;
 use rapier3d::parry::query::{
@@ -340,7 +339,7 @@ impl Turning<'_> {
         Pose::from_parts(pose_at(time) * middle - rotation * middle, rotation)
     }
 
-    /// As many pieces as displace no point by more than `allowed` metres, but for [`MAX_PIECES`].
+    /// Pieces in which no point is displaced by more than `allowed` metres, or [`MAX_PIECES`] if that takes more.
     fn pieces(
         &self,
         start: f32,
@@ -353,7 +352,7 @@ impl Turning<'_> {
         let turn_by = |angvel: Vector| (angvel.as_dvec3().length() * f64::from(duration)) as f32;
         let turn_a = turn_by(motion_a.angvel);
         let turn = turn_by(motion_b.angvel - motion_a.angvel);
-        // The corners of the second part turn by so much, and its middle's way bends about the first.
+        // The corners of the second part turn. The way of its middle bends about the first part.
         let turned = 0.5 * turn * bounds.half_extents().length();
         let lever = [start, end]
             .map(|time| self.a_from_b(time, time) * bounds.center())

@@ -1,7 +1,7 @@
 //! The part of a straight way on which two shapes can meet.
 //!
-//! A cast may go on for as far as `f32` counts. Images are built only of the part on which the shapes' bounds
-//! meet, so they are no larger than the shapes; lengths of the whole are `f64`, whose squares do not overflow.
+//! A cast may be as long as an `f32` can say. Images are built only for the part on which the shapes' bounds meet, so
+//! they are no larger than the shapes. Lengths of the whole are `f64`, whose squares do not overflow.
 
 use crate::narrow_phase::parts::cloud_of;
 use rapier3d::glamx::DVec3;

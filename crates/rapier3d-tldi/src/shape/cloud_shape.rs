@@ -107,6 +107,20 @@ impl PointCloudShape {
     }
 
     /// A shape over `cloud` with the mass that `mass_model` says.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// use rapier3d_tldi::MassModel;
+    /// let shape = PointCloudShape::with_mass_model(scan, MassModel::Shell { thickness: 0.01 });
+    /// let mass = ColliderBuilder::new(SharedShape::new(shape)).density(1000.0).build().mass();
+    /// assert!(mass > 0.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn with_mass_model(cloud: PointCloud<'static>, mass_model: MassModel) -> Self {
         Self {
             content: Arc::new(Content::new(cloud, mass_model)),
@@ -138,6 +152,19 @@ impl PointCloudShape {
     /// Memory is reused unless clones share it. A collider's shape is reached through
     /// [`Collider::shape_mut`](rapier3d::prelude::Collider::shape_mut), which also tells rapier of
     /// the change.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// let mut shape = PointCloudShape::new(scan);
+    /// shape.set_points(&points[..300], None)?;
+    /// assert_eq!(shape.cloud().len(), 300);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn set_points(
         &mut self,
         points: &[Vec3],
@@ -150,6 +177,20 @@ impl PointCloudShape {
     ///
     /// # Errors
     /// Those of `set_points`.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// let mut shape = PointCloudShape::new(scan);
+    /// let moved: Vec<Vector> = points.iter().map(|p| *p + 0.1 * Vector::Y).collect();
+    /// shape.move_points(&moved, None)?; // as many as before; radii stay
+    /// assert_eq!(shape.cloud().point(7), moved[7]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn move_points(
         &mut self,
         points: &[Vec3],
@@ -181,6 +222,19 @@ impl PointCloudShape {
 
     /// Replaces the cloud as a whole: points, radii, normals and colours. The mass properties stay, as
     /// with [`set_points`](Self::set_points).
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// let (mut shape, former) = (PointCloudShape::new(scan), 400);
+    /// shape.set_cloud(PointCloud::builder(points[..9].to_vec()).radius(0.2).build()?);
+    /// assert_eq!((former, shape.cloud().len()), (400, 9));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn set_cloud(&mut self, cloud: PointCloud<'static>) {
         let mut content = Content::new(cloud, self.mass_model());
         content.unit_mass = self.content.unit_mass.clone();

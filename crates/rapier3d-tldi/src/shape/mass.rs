@@ -1,11 +1,12 @@
 //! Mass properties of a cloud: of the solid it encloses, or of the shell it samples.
 
 mod orient;
+mod surfel;
 mod surfels;
 
 use rapier3d::glamx::{DMat3, DSymmetricEigen3, DVec3, Vec3};
 use rapier3d::prelude::MassProperties;
-use surfels::Surfel;
+use surfel::Surfel;
 use tldi::PointCloud;
 
 /// Which part of a cloud has mass.

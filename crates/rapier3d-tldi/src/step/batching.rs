@@ -143,8 +143,8 @@ fn pair_id(colliders: [ColliderHandle; 2]) -> PairId {
 /// Colliders and parts of a comparison.
 type PartsId = (PairId, [u32; 2]);
 
-/// Steps without contact for which the axis of the last one is remembered: a body that hops, or of
-/// which noise hides the contact, is on the side where it was. Longer, and it may be elsewhere.
+/// Steps without contact for which the last axis is remembered. A body that hops, or whose contact noise hides, is still
+/// on the side where it was. After more steps it may be elsewhere.
 const MOST_LOST: u32 = 6;
 
 /// Main view axis of the last contact of two parts.

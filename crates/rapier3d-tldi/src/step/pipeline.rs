@@ -32,6 +32,26 @@ use tldi::{Backend, PairQuery, PointCloud};
 ///
 /// Several worlds may be attached to one pipeline if each is prepared, stepped and finished before
 /// the next is prepared; a pipeline for each remembers more (the view axes of its pairs).
+///
+/// ```
+/// # use rapier3d::prelude::*;
+/// # use rapier3d_tldi::prelude::*;
+/// # let points: Vec<Vector> = (0..400)
+/// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+/// #     .collect();
+/// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+/// let mut world = PhysicsWorld::default();
+/// let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// tldi.attach(&mut world);
+/// world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+/// let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.3, 1.0));
+/// let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+/// for _ in 0..60 {
+///     tldi.step(&mut world)?; // in place of `world.step()`
+/// }
+/// assert!((world.bodies[ball].translation().y - 0.2).abs() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct TldiPipeline {
     backend: Box<dyn Backend>,
     compared_by: ComparedBy,
@@ -69,6 +89,13 @@ impl TldiPipeline {
     ///
     /// # Errors
     /// [`TldiError::BadConfig`].
+    ///
+    /// ```
+    /// # use rapier3d_tldi::prelude::*;
+    /// use rapier3d_tldi::tldi::CpuBackend;
+    /// let tldi = TldiPipeline::with_backend(TldiConfig::default(), Box::new(CpuBackend::new()))?;
+    /// # Ok::<(), TldiError>(())
+    /// ```
     pub fn with_backend(config: TldiConfig, backend: Box<dyn Backend>) -> Result<Self, TldiError> {
         Ok(Self {
             compared_by: ComparedBy::default(),
@@ -87,6 +114,16 @@ impl TldiPipeline {
 
     /// Makes the world's narrow phase ask this pipeline, and rapier's own dispatcher about pairs
     /// without a cloud. Needed once, and again after the world was deserialised.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// let mut world = PhysicsWorld::default();
+    /// let tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// tldi.attach(&mut world);
+    /// assert!(tldi.is_attached(&world.narrow_phase));
+    /// # Ok::<(), TldiError>(())
+    /// ```
     pub fn attach(&self, world: &mut PhysicsWorld) {
         self.attach_narrow_phase(&mut world.narrow_phase);
     }
@@ -98,12 +135,42 @@ impl TldiPipeline {
 
     /// The dispatcher that [`attach`](Self::attach) installs, for a chain of your own; it must come
     /// before rapier's default one.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// // Distances without a world. The pose is that of the second shape in the frame of the first.
+    /// use rapier3d::parry::query::QueryDispatcher;
+    /// let tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// let (scan, ball) = (PointCloudShape::new(scan), Ball::new(0.2));
+    /// let pose = Pose::from_translation(Vector::new(1.0, 0.5, 1.0));
+    /// let found = tldi.dispatcher().distance(&pose, &scan, &ball)?;
+    /// assert!((found.distance - 0.3).abs() < 1e-3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn dispatcher(&self) -> TldiDispatcher {
         TldiDispatcher::new(Arc::clone(&self.shared))
     }
 
     /// A collider for a cloud; see [`cloud_collider`]. For several bodies of one cloud, make one
     /// [`PointCloudShape`] and give each a clone.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// let tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// let mut world = PhysicsWorld::default();
+    /// world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan).friction(0.8));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn collider(&self, cloud: PointCloud<'static>) -> ColliderBuilder {
         cloud_collider(PointCloudShape::new(cloud))
     }
@@ -126,6 +193,30 @@ impl TldiPipeline {
     /// # Errors
     /// [`TldiError::Pair`] or [`TldiError::Batch`] where the backend fails; the step should not be
     /// taken then.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// // What `step` does, one call after the other.
+    /// let integration = world.integration_parameters;
+    /// tldi.prepare(world.gravity, &integration, &world.bodies, &world.colliders)?;
+    /// tldi.push(&mut world.bodies, &world.colliders, &integration);
+    /// world.step_with_events(&tldi.hooks(&()), &()); // your own hooks and events
+    /// let report = tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
+    /// assert_eq!((report.pairs_batched, report.pairs_missed), (1, 0));
+    /// # let _ = (scan, ball);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn prepare(
         &mut self,
         gravity: Vector,
@@ -275,6 +366,30 @@ impl TldiPipeline {
     ///
     /// # Errors
     /// Those of [`step`](Self::step).
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// use std::sync::mpsc::channel;
+    /// let (collisions, started) = channel();
+    /// let ((forces, _), (tears, _)) = (channel(), channel());
+    /// world.colliders[scan].set_active_events(ActiveEvents::COLLISION_EVENTS);
+    /// let events = ChannelEventCollector::new(collisions, forces, tears);
+    /// tldi.step_with_events(&mut world, &(), &events)?;
+    /// assert!(started.try_recv()?.started());
+    /// # let _ = ball;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn step_with_events(
         &mut self,
         world: &mut PhysicsWorld,
@@ -301,6 +416,28 @@ impl TldiPipeline {
 
     /// The contact points of all pairs with a cloud, as of the last step in which each pair was
     /// awake, at the colliders' present poses.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// tldi.step(&mut world)?;
+    /// for contact in tldi.contacts(&world.narrow_phase, &world.colliders) {
+    ///     assert!((contact.depth - 0.01).abs() < 0.01, "{} m at {}", contact.depth, contact.point);
+    /// }
+    /// # assert!(tldi.contacts(&world.narrow_phase, &world.colliders).count() > 0);
+    /// # let _ = (scan, ball);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn contacts<'a>(
         &self,
         narrow_phase: &'a NarrowPhase,

@@ -1,7 +1,6 @@
 //! What the pipeline and the dispatchers it handed to rapier share: the results of the batch, the
 //! workspaces for pairs that are not in it, and the errors that rapier would drop.
 
-use crate::corrections::sweeps::Blocked;
 use crate::narrow_phase::parts::{
     Hint, PartPair, ShapePair, append_part_pairs, append_queries, within_reach,
 };
@@ -9,7 +8,7 @@ use crate::step::measured::{Measured, rolls};
 use crate::{TldiConfig, TldiError};
 use rapier3d::dynamics::RigidBodyHandle;
 use rapier3d::geometry::{ColliderHandle, SharedShape};
-use rapier3d::math::Pose;
+use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::shape::{Ball, Shape};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -57,6 +56,14 @@ impl PairKey {
             pos12: [x, y, z, i, j, k, w].map(f32::to_bits),
         }
     }
+}
+
+/// Where a sweep holds a pair, in world space.
+#[derive(Clone, Copy)]
+pub(crate) struct Blocked {
+    pub(crate) point: Vector,
+    /// Unit normal from the first collider of the pair towards the second.
+    pub(crate) normal: Vector,
 }
 
 /// A pair of the batch.

@@ -65,7 +65,7 @@ pub(crate) struct Class {
 }
 
 impl Class {
-    /// Whether it holds a point that reaches `further` by so much, metres; of a cloud of this mean radius.
+    /// Whether the class holds a point whose reach exceeds that of the `mean` radius by `further`; metres.
     pub(crate) fn holds(&self, further: f32, mean: f32) -> bool {
         number(further, mean) == self.number
     }
@@ -80,7 +80,8 @@ fn number(further: f32, mean: f32) -> u8 {
     1 + exponent.clamp(0, 126) as u8
 }
 
-/// The classes of points that each reach `further` by so much, ascending; a single one where that is empty.
+/// The classes of the points, ascending. `further` says by how much each point reaches farther than the mean radius,
+/// metres; if it is empty, there is a single class.
 pub(crate) fn classes(further: &[f32], mean: f32) -> impl Iterator<Item = Class> {
     let mut most = [-1.0f32; 128];
     for &further in further {
@@ -106,7 +107,7 @@ pub(crate) struct Ring {
 }
 
 impl Ring {
-    /// Of so many reaches of each point.
+    /// A ring as wide as `reaches` times the reach of each point.
     pub(crate) fn new(surface: &Surface, reaches: f32) -> Self {
         Self {
             reaches,
@@ -115,7 +116,7 @@ impl Ring {
         }
     }
 
-    /// Of the points that reach least, where those of the other surface may reach farthest; metres.
+    /// Width for the points that reach least, beside another surface whose points may reach farthest; metres.
     pub(crate) fn beside(&self, other: &Self) -> f32 {
         self.of(self.mean).max(other.widest())
     }
@@ -125,7 +126,7 @@ impl Ring {
         self.of(self.largest)
     }
 
-    /// By how much that of a point of a radius is wider than what was `included` for all points, metres.
+    /// By how much the ring of a point of this `radius` is wider than the width `included` for all points, metres.
     pub(crate) fn beyond(&self, included: f32, radius: f32) -> f32 {
         (self.of(radius) - included).max(0.0)
     }

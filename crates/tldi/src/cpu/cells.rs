@@ -17,14 +17,14 @@ use std::ops::Range;
 /// of bodies thinner than a pixel.
 const MERGED: f32 = 0.6;
 
-/// Steps of a coordinate in a pixel: the error of a depth is far below that of its plane.
+/// Steps of a coordinate in a pixel. The rounding is then far smaller than the error of a cell's plane.
 const STEPS: f32 = 256.0;
 
 /// Least points of a cell and its neighbours: three tell a plane. Fewer stand alone.
 const LEAST_POINTS: f32 = 3.0;
 
-/// Share of the squared spread of the points over the pixels that they must have across their main
-/// direction to tell a plane; of those on a line the mean depth is all that is known.
+/// Least spread of the points across their main direction, as a share of their squared spread over the pixels. Below it
+/// they lie on a line and tell no plane, only a mean depth.
 const LEAST_SPREAD: f32 = 1e-2;
 
 /// Standard deviation, in pixels, up to which a cell and its neighbours are on a plane. A sphere of a
@@ -228,8 +228,8 @@ impl Cells {
         }
     }
 
-    /// The plane of a cell or, where it and its neighbours are on none, the flattest of those of its neighbours that
-    /// goes through it: beside an edge the plane of one face, not of both.
+    /// The plane of a cell. If the cell and its neighbours lie on no common plane, it is the flattest plane of a neighbour
+    /// that passes through the cell: beside an edge, the plane of one face.
     fn sharpened(&self, cell: usize, pixel: [usize; 2], rect: &Rect) -> Plane {
         let plane = self.planes[cell];
         let square = |pixels: f32| (pixels * STEPS).powi(2);

@@ -88,7 +88,7 @@ impl Window {
 pub(super) enum FirstLook {
     /// Both sides hold nothing of use.
     Nothing,
-    /// It settled nothing, but both sides hold what was culled, every so many points, and what of it is near.
+    /// It settled nothing. Both sides hold culled points, one in as many as said here, and which of them are near.
     Culled([usize; 2]),
     /// The result is filled.
     Settled,
@@ -109,8 +109,8 @@ fn overlap(query: &PairQuery) -> Option<f32> {
     (!overlap.is_empty()).then(|| overlap.extents().min_element())
 }
 
-/// The largest of the large pixels, metres, that resolve the smaller body and in which what is so deep is at least
-/// `deep` pixels.
+/// The largest of the large pixels, metres, of two kinds: they resolve the smaller body, and at least `deep` of them
+/// fit into `depth`.
 fn large_pixel(query: &PairQuery, depth: f32, deep: f32) -> Option<f32> {
     let radius = query.a.mean_radius().max(query.b.mean_radius());
     let pixels = LARGE.map(|large| large * query.params.pixel_size.max(radius));

@@ -524,8 +524,8 @@ mod tests {
         assert!(counts.iter().all(|&n| n > 20 && n < BLOCK), "{counts:?}");
     }
 
-    /// Each point by its own radius, by brute force: in shares of what is kept of the coarsest, which blocks have in
-    /// some places only.
+    /// Brute force says: each point is kept by its own radius, even if only some of the blocks hold coarse
+    /// points.
     #[test]
     fn coarse_points_are_kept_farther_away() {
         let mut rng = fastrand::Rng::with_seed(6);

@@ -11,20 +11,20 @@
 use super::rect::Rect;
 use glamx::Vec3;
 
-/// Empty quanta that are left of a gap: one that goes with what is before it, one with what is behind, and one
-/// between them.
+/// Empty quanta that remain of a gap: one belongs to the points before it, one to the points behind it, and one lies
+/// between. With fewer, points on both sides could meet.
 const LEFT: i64 = 3;
 
-/// Pixels, or cells, for each point beyond which an axis is folded: several times what the points of a surface
-/// cover.
+/// Axes are folded if there are more pixels, or cells, than this for each point: several times as many as the points of
+/// a surface cover.
 pub(super) const PER_POINT: usize = 16;
 
-/// Pixels up to which an image is not folded, whatever the number of points: 256 × 256, which takes less time
-/// than the stages before it.
+/// Images of up to this many pixels (256 × 256) are never folded. They take less time than the stages before
+/// them.
 const SMALL: usize = 1 << 16;
 
-/// Pixels that an image may have whatever the number of points: 16 MiB of offsets. A ring of 2,000 pixels, of which
-/// nothing can be folded, still gets all of them; twice as many would double a pair's memory and its longest step.
+/// Pixels that any image may have, even of few points: 16 MiB of offsets. A ring 2,000 pixels wide cannot be folded, and
+/// still gets all of its pixels. Twice as many would double a pair's memory and its longest step.
 const LARGE: usize = 1 << 22;
 
 /// Fragments that an image may have whatever the number of points: a quarter of a second. Pixels that are much
@@ -168,12 +168,12 @@ impl ViewFold {
         self.axes.iter_mut().for_each(AxisFold::clear);
     }
 
-    /// Whether an image of so many `points` is worth folding.
+    /// Whether an image of this many `points` is worth folding.
     pub(super) fn is_wanted(rect: &Rect, points: usize) -> bool {
         rect.pixels() > SMALL + PER_POINT * points
     }
 
-    /// Whether there is no room for an image of so many `points`, or no time for so many `fragments`;
+    /// Whether there is no room for an image of this many `points`, or no time for this many `fragments`;
     /// [`coarser`](Self::coarser) then says what pixels it needs.
     pub(super) fn refuses(&mut self, rect: &Rect, points: usize, fragments: f32) -> bool {
         let most = |whatever: usize, per_point: usize| (whatever + per_point * points) as f32;

@@ -1,9 +1,8 @@
 //! Stage `impact`: where a surface in straight motion first meets another.
 //!
-//! A camera along the motion sees in each pixel how far the surface there can move: from where the
-//! ray leaves the moving surface to where it enters the other one. The least of these distances is
-//! the impact's. No surface is too thin for that, and none too fast: the images hold all that the
-//! motion passes.
+//! A camera looks along the motion. In each pixel, the moving surface can go from where the ray leaves it to where the
+//! ray enters the other one. The least of these distances is the distance to the impact. The images hold all that the
+//! motion passes, so no surface is too thin, and none too fast.
 
 use super::columns::{Columns, dilate};
 use super::cull::{self, PointRadii, Region};
@@ -19,26 +18,25 @@ use crate::{
 };
 use glamx::{Pose3, Vec3};
 
-/// Width in pixels of the rim that [`ImpactQuery::core_only`] spares: splats stand out by one on
-/// either side, and one is for roughness. A surface that is missed there penetrates by no more than
-/// that pixel, and contacts push it out again.
+/// Width in pixels of the rim that [`ImpactQuery::core_only`] leaves out. Splats stand out by one pixel on either side,
+/// and one more is for roughness. A surface missed in the rim penetrates by at most that pixel, and contacts push it
+/// out again.
 const RIM: i32 = 3;
 
-/// Width in pixels of the part of the rim that is always left out: a splat of either side stands
-/// out by that much. The rest passes what the motion does not go on towards by more than all of the
-/// rim.
+/// Width in pixels of the outer rim, which is always left out: a splat of either side stands out by that much. The inner
+/// rim stops a motion only if it would go on, past what it meets there, by more than the whole rim.
 const OUTER_RIM: u8 = 2;
 
-/// Pixels around an image that tell its rim from its edge: the rim, and one for the closing.
+/// Pixels added around an image so that a rim shows there: its width, and one for closing gaps.
 pub(super) const BORDER: i32 = RIM + 1;
 
-/// Band above the least distance, in pixels, whose normals are averaged.
+/// Normals are averaged over the pixels whose distance is within this many pixels of the least.
 const NORMAL_BAND: f32 = 0.5;
 
-/// Least cosine between the normal of a penetration and that of its surface, seen from behind.
+/// Least cosine between the normal of a penetration and the normal of the surface that it leaves from behind.
 const FROM_BEHIND: f32 = 0.5;
 
-/// Where a pixel is in a moving surface.
+/// In which part of a moving surface a pixel lies.
 const OUTSIDE: u8 = 0;
 const INNER_RIM: u8 = 1;
 const CORE: u8 = 2;
@@ -48,7 +46,7 @@ const CORE: u8 = 2;
 pub(super) struct CoreScratch {
     covered: Vec<u8>,
     inner: Vec<u8>,
-    /// Pixels from the rim's edge, counted up to where the rim ends.
+    /// Distance from the edge in pixels, counted up to the width of the rim.
     depth: Vec<u8>,
     spare: Vec<u8>,
 }
@@ -56,7 +54,7 @@ pub(super) struct CoreScratch {
 /// Where the ray of a pixel sees the surfaces meet.
 pub(super) struct Meeting {
     pixel: usize,
-    /// How far the moving surface is from there, metres.
+    /// Distance of the moving surface from there, metres.
     distance: f32,
     depth: f32,
     /// Least cosine between the motion and the normals of both.
@@ -161,7 +159,7 @@ impl Scratch {
             };
             of(&query.a, place(meeting.pixel, meeting.depth)) || of(&query.b, b_from_a * before)
         };
-        // What a lone point hides its pixel meets behind it.
+        // A lone point is passed over: the pixel meets what lies behind it.
         let mut lone = 0;
         while let Some(meeting) = self.meetings.get(lone).filter(|meeting| is_lone(meeting)) {
             let Some(behind) = nearest(meeting.pixel, meeting.distance) else {
@@ -187,7 +185,7 @@ impl Scratch {
         })
     }
 
-    /// Fills both sides' points that the motion can bring together; `None` where there are none.
+    /// Fills both sides with the points that the motion can bring together. `None` if there are none.
     fn cull_swept(&mut self, query: &ImpactQuery, camera: &VirtualCamera) -> Option<()> {
         let [ring_a, ring_b] = [query.a, query.b].map(|surface| ring(&surface, &query.params));
         let widest_ring = ring_a.widest().max(ring_b.widest());
@@ -208,12 +206,13 @@ impl Scratch {
         if !seen_a.intersects(&met_by_b) {
             return None;
         }
-        // Which layer leads is told by what is before it; what is of the rim, by what is beside it.
+        // What lies in front of a layer of `b` tells whether it leads; what lies beside it, whether it is of the rim.
+        // Both belong to the region.
         meeting_a.max.z = meeting_a.max.z.max(seen_b.max.z);
         let beside = (BORDER + 1) as f32 * query.params.pixel_size * Vec3::new(1.0, 1.0, 0.0);
         (meeting_a.min, meeting_a.max) = (meeting_a.min - beside, meeting_a.max + beside);
         if query.a.is_oriented() {
-            // Whether `b` is inside is told by what is behind it.
+            // What lies behind a layer of `a` tells whether `b` is inside.
             met_by_b.min.z = met_by_b.min.z.min(seen_a.min.z);
         }
         let frame_from_view = view_from_a.inverse();
@@ -323,7 +322,7 @@ impl Scratch {
 }
 
 impl ImpactQuery<'_> {
-    /// Whether `b` leaves there, from behind and from no deeper than it is, what it is in.
+    /// Whether `b` leaves here the surface that it penetrates: from behind, and from no deeper than it is.
     fn leaves_at(&self, meeting: &Meeting, camera: &VirtualCamera) -> bool {
         self.penetration
             .is_some_and(|Penetration { normal, depth }| {
@@ -335,7 +334,7 @@ impl ImpactQuery<'_> {
 }
 
 impl CoreScratch {
-    /// Covers what `image` covers. Beyond it, its border goes on.
+    /// Covers the pixels that `image` covers. Beyond the image, its border is continued.
     fn cover_by_image(&mut self, image: &Tldi) {
         let [width, height] = image.size.map(|n| n as i32);
         self.covered.clear();
@@ -377,7 +376,7 @@ impl CoreScratch {
     /// Marks what is covered as core, rim or outside; the image is `width` pixels wide.
     fn find(&mut self, width: u32) {
         let row = width as usize + 2 * BORDER as usize;
-        // Closed first: a gap of a pixel in the cover is no rim.
+        // Gaps are closed first: a gap of one pixel has no rim.
         let (covered, inner, depth) = (&mut self.covered, &mut self.inner, &mut self.depth);
         inner.clone_from(covered);
         dilate(inner, &mut self.spare, row, u8::max);
@@ -388,10 +387,10 @@ impl CoreScratch {
                 *depth += *inner;
             }
         }
-        // The innermost pixels of a part are no rim, however thin the part is.
+        // Even a thin part has a core: its innermost pixels.
         let deepest_around = inner;
         deepest_around.clone_from(depth);
-        // Twice: around a round border it grows by one in two pixels here and there.
+        // Twice, since along a round border the core grows by only one in two pixels in places.
         for _ in 0..2 {
             dilate(deepest_around, &mut self.spare, row, u8::max);
         }
@@ -415,8 +414,8 @@ impl CoreScratch {
     }
 }
 
-/// Whether the last of `layers` is where a ray leaves a solid that it has entered: what is inside
-/// may leave. A sheet that is only ever left is met from behind.
+/// Whether the ray has entered a solid and leaves it at the last of `layers`. What is inside such a solid may leave. A
+/// sheet that the ray leaves without having entered is met from behind.
 fn leaves_solid(layers: &[Layer]) -> bool {
     let mut known = layers.iter().rev().filter(|layer| !is_edge_on(layer));
     layers
@@ -427,8 +426,8 @@ fn leaves_solid(layers: &[Layer]) -> bool {
             .is_some_and(|layer| layer.facing == Facing::Entry)
 }
 
-/// Whether a ray leaves the moving surface at this layer. Without orientation, at every second one
-/// and the last.
+/// Whether a ray leaves the moving surface at this layer. If its side is unknown, the ray leaves at every second layer and
+/// at the last.
 fn is_leading(layers: &[Layer], index: usize) -> bool {
     let is_last = index + 1 == layers.len();
     match layers[index].facing {
@@ -460,7 +459,7 @@ fn back(layer: &Layer, params: &Params) -> f32 {
     }
 }
 
-/// How far splats that are seen edge-on stand out in depth beyond their points, metres.
+/// How far a splat seen edge-on stands out in depth beyond its point, metres.
 fn rise(params: &Params) -> f32 {
     0.5 * params.thickness * params.slope_damping
 }

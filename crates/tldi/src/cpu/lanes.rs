@@ -1,7 +1,7 @@
 //! What the stages need so that compilers turn their loops into SIMD instructions.
 
-/// Compiles functions for the instruction sets that matter, chosen when they are called. Results
-/// are the same: no fused multiply-add is made of what is written as two operations.
+/// Compiles a function for several instruction sets. The call chooses the best that the machine has. Results are equal:
+/// the compiler does not fuse a multiplication and an addition.
 macro_rules! multiversioned {
     ($function:item) => {
         #[multiversion::multiversion(targets(
@@ -17,7 +17,7 @@ pub(super) use multiversioned;
 /// Largest bound of [`truncated`], the largest `f32` below 2³¹.
 const MOST: f32 = 2_147_483_520.0;
 
-/// The integer part of `value` within 0 to `most` (itself at least 0); 0 for what is not a number.
+/// The integer part of `value`, clamped to 0 to `most`. `most` is at least 0. 0 if `value` is not a number.
 ///
 /// `as` does the same, but handles each number for itself: its conversions do not become SIMD
 /// instructions.

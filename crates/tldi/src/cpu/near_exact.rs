@@ -1,10 +1,9 @@
 //! Stage `zone` for a cloud and an exact surface: which of the culled points are near it.
 //!
-//! A surface's distance is expensive to compute, and few points are near. So it is computed once
-//! for each cell of a coarse grid that holds points: no point in a cell is nearer than the cell's
-//! middle by more than half of its diagonal. An even selection of the points in cells that can be
-//! near aims the camera. If it finds few near points, all are asked, so that no contact is too
-//! small to be found.
+//! The distance to a surface is expensive, and few points are near. So it is computed once for each cell of a coarse
+//! grid that holds points. A point can be nearer than the middle of its cell by half the cell's diagonal, not by more.
+//! The camera is aimed by an even selection of the points in cells that may be near. If that finds few near points,
+//! all points are asked: no contact is too small to be found.
 
 use super::columns::rect_of;
 use super::fold::{SpaceFold, is_coarse};
@@ -19,12 +18,12 @@ use glamx::{Pose3, Vec3};
 /// Fewest near points of a selection that stand for all.
 const ENOUGH: usize = 32;
 
-/// Share of its reach by which a surface is farther away that counts as nothing: a march toward it would not
-/// end.
+/// A march ends where the surface is beyond its reach by less than this share of it. Without this, it would take ever
+/// smaller steps.
 const LEAST_FREE: f32 = 0.05;
 
-/// Least distances of what is in the cells, in metres, not a number where nothing was asked yet; kept from
-/// call to call.
+/// For each cell, the least distance that a point in it can have, metres. It is not a number until it is asked for. Kept
+/// from call to call.
 #[derive(Default)]
 pub(super) struct CellDistances {
     least: Vec<f32>,
@@ -58,8 +57,8 @@ impl Placed<'_> {
         Some(rect_of(first, last)?.grown(border))
     }
 
-    /// Whether it comes within `reach` metres of a column of pixels: of one through `[u, v]`, between two depths.
-    /// Marches along it, each time as far as nothing can be near.
+    /// Whether the surface comes within `reach` metres of the column of pixels through `[u, v]`, between two depths.
+    /// Marches along the column. Each step is as long as nothing can be near.
     pub(super) fn meets(
         &self,
         camera: &VirtualCamera,

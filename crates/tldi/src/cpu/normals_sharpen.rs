@@ -15,7 +15,8 @@ use glamx::Vec3;
 /// a pixel, which contacts may err by.
 const ON_PLANE: f32 = 0.1;
 
-/// Variance that noise explains, in its own: that of 20 points scatters by a third.
+/// Largest ratio of a measured variance to the noise's own that noise alone explains. Over 20 points, a variance scatters
+/// by a third.
 const OF_NOISE: f32 = 2.0;
 
 /// Variance at which neighbours are plainly not on a plane, in units of that up to which they are.
@@ -90,9 +91,9 @@ impl FlatPlanes {
     }
 }
 
-/// Sharpens the normals that were just estimated; `radius` is that of the neighbourhood and `noise` the told
-/// standard deviation of the points, in metres. Cost: less than that of estimating, for each point whose
-/// neighbours are not on a plane.
+/// Sharpens the normals that were just estimated. `radius` is the neighbourhood's, `noise` the standard deviation of the
+/// points that the user gave, both in metres. Cost: less than estimating, and only for points whose neighbours lie on
+/// no plane.
 pub(crate) fn sharpen(radius: f32, noise: f32, scratch: &mut NormalScratch, normals: &mut [Vec3]) {
     let NormalScratch {
         sorted,
@@ -139,8 +140,8 @@ pub(crate) fn sharpen(radius: f32, noise: f32, scratch: &mut NormalScratch, norm
     }
 }
 
-/// The mean plane at `point` of the flat ones around it, and their weight; its normal is on the side of that of its
-/// `own`. Limits are those of the square distance and of the misfit.
+/// The mean, at `point`, of the flat planes around it, and their total weight. Its normal is on the side of the point's
+/// `own`. `limits` bound the square distance and the misfit.
 fn mean(point: Vec3, own: &Plane, limits: [f32; 2], flat: &FlatPlanes) -> Option<(Plane, f32)> {
     let [weight, x, y, z, variance, height] = sums(point, own.normal, limits, flat);
     let plane = Plane {

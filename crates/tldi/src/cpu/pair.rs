@@ -132,7 +132,7 @@ impl Scratch {
         self.patches.reduce_culled(result, query, culled);
     }
 
-    /// Compares with pixels larger by a factor of `coarser`, since there are too many of those asked for.
+    /// Compares with pixels that are `coarser` times as large: there would be too many of the size asked for.
     fn compare_coarser(&mut self, query: &PairQuery, coarser: f32, result: &mut PairResult) {
         let pixel_size = coarser * query.params.pixel_size;
         let view = match query.view {
@@ -191,7 +191,7 @@ impl Scratch {
         result.gap = found.gap;
     }
 
-    /// Fills both sides' culled points, every so many of theirs; `false` where a cloud has no point in reach.
+    /// Fills the culled points of both sides, one in as many as `strides` says. `false` if a cloud has no point in reach.
     pub(super) fn cull(&mut self, query: &PairQuery, plan: &PairPlan, strides: [usize; 2]) -> bool {
         let cull = |side: &mut Side, surface: Surface, plan: &SidePlan, stride| {
             side.near.clear();

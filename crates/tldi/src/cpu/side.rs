@@ -61,7 +61,7 @@ pub(super) struct CloudView<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct ExactView<'a> {
     pub(super) exact: Placed<'a>,
-    /// How far beyond the cloud the surface is of interest, metres.
+    /// Distance beyond the cloud up to which the surface is drawn, metres.
     pub(super) reach: f32,
     pub(super) scope: Scope,
 }
@@ -69,7 +69,7 @@ pub(super) struct ExactView<'a> {
 /// Where an exact surface is looked at.
 #[derive(Clone, Copy)]
 pub(super) enum Scope {
-    /// Where the cloud is, in columns in which it is within so many metres of it.
+    /// In the cloud's columns, if the surface is within this many metres of it there.
     Near(f32),
     /// Where the cloud is.
     Cloud,
@@ -123,7 +123,7 @@ impl Side {
         })
     }
 
-    /// Mean of the cloud's near points, of which there are some, in the frame of the query, metres.
+    /// Mean of the cloud's near points, in the frame of the query, metres. There must be some.
     pub(super) fn mean_of_near(&self) -> Vec3 {
         let near = self.near.iter().map(|&i| self.points.point(i as usize));
         (near.map(|p| p.as_dvec3()).sum::<DVec3>() / self.near.len() as f64).as_vec3()

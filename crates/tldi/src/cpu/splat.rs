@@ -1,10 +1,9 @@
 //! Stages `mark`, `alloc` and `splat`: oriented splats become fragments, sorted by pixel.
 //!
-//! A splat is the tangent disc of a point. It covers the pixels whose centre lies within its
-//! radius, and always the pixel it projects into; its depth at a pixel is that of the tangent
-//! plane along the pixel's ray. `mark` counts fragments per pixel, `alloc` turns counts into
-//! offsets, `splat` writes the fragments: a counting sort, linear in fragments and pixels. It goes
-//! by bands of rows, whose fragments stay in a core's cache.
+//! A splat is the tangent disc of a point. It covers the pixel that its centre falls into, and all pixels whose centres
+//! lie within its radius. Its depth at a pixel is the depth of the tangent plane there. `mark` counts the fragments
+//! of each pixel, `alloc` turns counts into offsets, `splat` writes the fragments: a counting sort, linear in fragments
+//! and pixels. It works on one band of rows at a time, so that the fragments stay in a core's cache.
 
 use super::columns::{Columns, Tiles};
 use super::cull::PointRadii;
@@ -13,24 +12,23 @@ use super::rect::Rect;
 use crate::{Params, Projection, VirtualCamera};
 use glamx::Vec3;
 
-/// Least radius of a splat in pixels: a disc must reach its neighbours' centres (half a pixel's
-/// diagonal and a bit), or a cloud finer than the image would leave pixels to single points.
+/// Least radius of a splat in pixels: half a pixel's diagonal and a bit. A smaller disc may reach no pixel's centre but its
+/// own, and each pixel of a fine cloud would then show a single point. A larger one blurs edges.
 const LEAST_RADIUS_PX: f32 = 0.75;
 
-/// |n·v| under which a surface is seen edge-on (78°): its tangent plane says nothing about depth.
+/// |n·v| below which a surface is seen edge-on (78°). There, its tangent plane says nothing about depth.
 pub(crate) const EDGE_ON: f32 = 0.2;
 
-/// |n·v| under which (37°) a splat is steep: how deep its surface is within a pixel is uncertain by so much
-/// that what follows within a thickness is of one layer.
+/// |n·v| below which a splat is steep (37°). Its depth varies so much within a pixel that fragments within one thickness
+/// of each other count as one layer.
 const STEEP: f32 = 0.8;
 
-/// Depth steps in a surface's thickness: depths are summed as integers, so that sums do not depend on the
-/// order of the points.
+/// Depth steps in a surface's thickness. Depths are summed as integers, so that the order of the points does not change
+/// a sum.
 pub(super) const DEPTH_STEPS: u32 = 4096;
 
-/// By how much of a cloud's noise its fragments may follow each other more widely in depth and still be one
-/// layer: with noise of r̄ as widely as a surface is thick, since narrower gaps tear noisy sheets apart (`accuracy
-/// --variant told`).
+/// The share of a cloud's noise by which the merge gap grows. With noise of r̄ the gap is then as wide as a surface is
+/// thick. Narrower gaps tear noisy sheets apart (`accuracy --variant told`).
 const NOISE_MERGED: f32 = 0.8;
 
 /// Steps of a normal's component in the integer sums.
@@ -39,14 +37,14 @@ pub(crate) const NORMAL_STEPS: f32 = 16384.0;
 /// Largest weight of a fragment.
 const MAX_WEIGHT: f32 = 255.0;
 
-/// Rows of a band. A band of a thousand columns with eight fragments a pixel takes a megabyte:
-/// what a core's second cache holds.
+/// Rows of a band. With a thousand columns and eight fragments a pixel, a band takes a megabyte, as much as a core's
+/// second cache holds.
 const BAND_ROWS: u32 = 16;
 
-/// Bits of a fragment's key that hold the depth; the class is above them.
+/// Bits of a fragment's key that hold the depth. The bits above them hold the class.
 const DEPTH_BITS: u32 = 30;
 
-/// Largest depth in steps: 2 to that power less what an `f32` is precise to there.
+/// Largest depth in steps: 2 to the power of [`DEPTH_BITS`], less the step of an `f32` there.
 const MAX_DEPTH: f32 = ((1 << DEPTH_BITS) - 64) as f32;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
@@ -64,12 +62,12 @@ pub(crate) const CONSTANTS: [(&str, f64); 8] = [
 /// One splat in one pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Fragment {
-    /// Class, then depth at the pixel's centre in [`DepthScale::step`]s from [`DepthScale::zero`]; in the
-    /// lowest bit whether it is steep.
+    /// The class in the highest bits, then the depth at the pixel's centre in [`DepthScale::step`]s from
+    /// [`DepthScale::zero`]. The lowest bit says whether it is steep.
     pub(crate) key: u32,
     /// Index of the splat.
     pub(crate) splat: u32,
-    /// 1 to 255: falls off with the distance from the centre and with the slope.
+    /// 1 to 255. It falls with the distance from the centre, and with the slope.
     pub(crate) weight: u32,
 }
 
@@ -112,14 +110,13 @@ impl DepthScale {
         }
     }
 
-    /// Depths, metres, of which the scale and an `f32` tell those that lie `middle` metres away: by so much they are
-    /// on either side.
+    /// How far from the middle depth the scale reaches on either side, metres. Within it, an `f32` tells its steps apart.
     pub(crate) fn reach(params: &Params) -> f32 {
         0.5 * MAX_DEPTH * params.thickness / DEPTH_STEPS as f32
     }
 
-    /// Depths in one layer that follow each other are at most this many steps apart, of a cloud whose noise
-    /// has a standard deviation of `noise` metres.
+    /// The merge gap in steps: fragments of one layer are at most this far apart in depth. `noise` is the standard
+    /// deviation of the cloud's noise, metres.
     pub fn merge_steps(&self, params: &Params, noise: f32) -> u32 {
         ((params.merge_gap + NOISE_MERGED * noise) * self.inv_step) as u32
     }
@@ -134,7 +131,7 @@ pub(crate) fn splat_radius(radius: f32, pixel_size: f32) -> f32 {
     radius.max(LEAST_RADIUS_PX * pixel_size)
 }
 
-/// The points that become fragments: a view's selection of the culled points.
+/// The points that become fragments: those of the culled points that a view keeps.
 #[derive(Clone, Copy)]
 pub(crate) struct SplatPoints<'a> {
     pub(crate) columns: &'a Columns,
@@ -153,7 +150,7 @@ pub(crate) struct Imaging<'a> {
     pub(crate) camera: &'a VirtualCamera,
     pub(crate) params: &'a Params,
     pub(crate) rect: Rect,
-    /// Those that the points were sorted into.
+    /// The tiles that the points were sorted into.
     pub(crate) tiles: Tiles,
     pub(crate) scale: DepthScale,
 }
@@ -171,12 +168,12 @@ pub(crate) struct Splat {
     depth: f32,
     /// Depth steps per pixel of (damped) rise.
     steps: f32,
-    /// |n·v|: the share of the disc's area that the view sees.
+    /// |n·v|: the share of the disc's area that is left in the view.
     facing: f32,
     /// First and last column and row that may be covered, within the image.
     first: [i32; 2],
     last: [i32; 2],
-    /// The class and whether it is steep, where a fragment's key has them.
+    /// The class, and whether it is steep, in the bits of a fragment's key.
     class: u32,
     /// Which of the kept points this is.
     pub(crate) kept: u32,
@@ -278,7 +275,7 @@ impl Fragments {
         self.ends.len()
     }
 
-    /// The fragments of a pixel of the current band, and what their `splat` is an index into.
+    /// The fragments of a pixel of the current band, and the list that their `splat` is an index of.
     pub(crate) fn of_pixel(&mut self, pixel: usize) -> (&mut [Fragment], &[Splat]) {
         let range = self.offsets[pixel] as usize..self.ends[pixel] as usize;
         (&mut self.fragments[range], &self.splats)
@@ -292,12 +289,12 @@ impl SplatPoints<'_> {
     }
 }
 
-/// Splats that are made before they go to their places: so many lines on their way to memory that
-/// is far from the core are waited for together.
+/// Splats that are made before they are written to their places. The core then waits for that many cache lines at once,
+/// and not for one after the other.
 const CHUNK: usize = 64;
 
 multiversioned! {
-/// Writes the splats; each of `tiles` goes from its end to its first splat.
+/// Writes the splats. Each entry of `tiles` starts at the end of its tile and counts down to its first splat.
 fn make_splats(
     points: &SplatPoints,
     imaging: &Imaging,
@@ -323,13 +320,14 @@ fn make_splats(
 }
 }
 
-/// First and last pixel of an axis of the image whose middles are within `radius` of `centre`, or that hold it.
+/// First and last pixel along an axis of the image whose centres lie within `radius` of `centre`, or the one that holds
+/// it.
 #[inline(always)]
 fn covered(centre: f32, radius: f32, origin: i32, size: u32) -> (i32, i32) {
     let own = centre.floor();
     let lo = (centre - radius - 0.5).ceil().min(own);
     let hi = (centre + radius - 0.5).floor().max(own);
-    // Both within the image but for an empty range: beyond its end, or before its start.
+    // Both lie within the image, or the range is empty: beyond its end, or before its start.
     let first = truncated(lo - origin as f32, size as f32) as i32;
     let end = truncated(hi - origin as f32 + 1.0, size as f32) as i32;
     (origin + first, origin + end - 1)
@@ -363,10 +361,10 @@ impl Splat {
         let (first_column, last_column) = covered(centre[0], radius, rect.origin[0], rect.size[0]);
         let (first_row, mut last_row) = covered(centre[1], radius, rect.origin[1], rect.size[1]);
         if last_column < first_column {
-            // Beside the image: no rows either.
+            // It lies beside the image. It then has no rows, either.
             last_row = first_row - 1;
         }
-        // Unoriented normals are taken as facing the camera.
+        // Normals of unknown side are taken to face the camera.
         let sign = if !oriented && normal.z > 0.0 {
             -1.0
         } else {
@@ -438,8 +436,8 @@ fn fill_orthographic(splats: &[Splat], rows: &Rect, out: Out) {
 }
 }
 
-/// Writes the fragments of `splats`. `rise(splat, [u, v], [dx, dy])` tells how many pixels a
-/// splat's tangent plane rises from its centre to the pixel coordinates (u, v), (dx, dy) from it.
+/// Writes the fragments of `splats`. `rise(splat, [u, v], [dx, dy])` is the rise of a splat's tangent plane, in pixels,
+/// from its centre to the pixel coordinates (u, v), which are (dx, dy) away.
 #[inline(always)]
 fn fill(splats: &[Splat], rows: &Rect, out: Out, rise: impl Fn(&Splat, [f32; 2], [f32; 2]) -> f32) {
     let width = rows.size[0] as usize;

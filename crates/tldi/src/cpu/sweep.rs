@@ -18,8 +18,8 @@ const CREASED: f32 = 0.97;
 /// Cosine of the largest angle (35°) between normals of one face, or of two that face each other.
 pub(crate) const SAME_FACE: f32 = 0.82;
 
-/// How finely a bend is summed: steps of a pixel, up to so many pixels, and bits of the normals that are left out. Of
-/// 1,024 fragments it is in the range of an `i32`, which WGSL has.
+/// How finely a bend is summed: steps in a pixel, the most pixels aside, and bits of the normals that are dropped. So the
+/// sum over 1,024 fragments fits an `i32`, the widest integer of WGSL.
 const BEND_STEPS: f32 = 16.0;
 const MOST_ASIDE: f32 = 4.0;
 const BEND_SHIFT: u32 = 6;
@@ -208,7 +208,7 @@ mod tests {
         image.layers.iter().filter(creased).copied().collect()
     }
 
-    /// An edge counts less than its faces do, seen from outside; a groove has those of both.
+    /// Seen from outside, an edge agrees less than its faces do. A groove agrees as they do: both faces touch.
     #[test]
     fn edges_count_less_than_faces_and_grooves_do_not() {
         let params = Params::for_radius(0.1);

@@ -1,11 +1,11 @@
 //! Stage `zone`: which of the culled points are near the other cloud.
 //!
-//! One bit per cell of a coarse grid over the overlap, dilated by one cell: whatever is within one
-//! cell edge of the other cloud is found, at a cost linear in points and cells. If nothing is
-//! found the pair is rejected before any image is built.
+//! A coarse grid over the overlap has one bit per cell. Each cloud marks its cells, and the marks grow by one cell.
+//! The other cloud's points in marked cells are near: none within one cell edge is missed. The cost is linear in points
+//! and cells. If nothing is near, the pair is rejected before any image is built.
 //!
-//! Of a cloud with coarser points the octaves of its radii ([`reach`](crate::reach)) are taken one by one, with
-//! cells as large as the points of both sides reach: two points are near by their own radii.
+//! An uneven cloud is split into octaves of its radii ([`reach`](crate::reach)). Each pair of octaves has its own grid,
+//! with cells as large as the points of both reach. So two points are near by their own radii.
 
 use super::cull::Survivors;
 use super::fold::{SpaceFold, is_coarse};
@@ -14,12 +14,12 @@ use crate::Aabb;
 use crate::cloud::reach::{Class, classes};
 use glamx::Vec3;
 
-/// Most cells of the grid: 4 Mi bits are 512 KiB, which stays in a core's cache. Larger overlaps
-/// get larger cells, which only makes the stage less selective.
+/// Most cells of the grid. 4 Mi bits are 512 KiB, which stays in a core's cache; twice as many do not. Larger overlaps
+/// get larger cells, and the stage then keeps more points.
 const MAX_CELLS: f32 = (1 << 22) as f32;
 
-/// Most pairs of points of two octaves that are measured, about a millisecond. Of more, cells decide alone, and a body
-/// may seem to be near what is up to 3.5 times as far as the points reach. Twice as many take twice the time.
+/// Most pairs of points, of two octaves, whose distance is measured: about a millisecond. Beyond it, cells alone decide,
+/// and a body may count as near at up to 3.5 times the reach of the points. Twice as many take twice the time.
 const MOST_PAIRS: usize = 1 << 20;
 
 /// The grid and its bits, kept from call to call.
@@ -30,9 +30,9 @@ pub(crate) struct ZoneScratch {
     cells_a: Vec<u32>,
     cells_b: Vec<u32>,
     fold: SpaceFold,
-    /// Of both sides, on folded axes.
+    /// Points of both sides, on folded axes.
     folded: [Survivors; 2],
-    /// Which points are near in some octave, 1 or 0.
+    /// For each point 1 if it is near in some octave, else 0.
     is_near_a: Vec<u8>,
     is_near_b: Vec<u8>,
 }
@@ -46,17 +46,17 @@ pub struct ZoneGrid {
     pub inv_cell: f32,
     /// Cells along x, y, z.
     pub dims: [usize; 3],
-    /// Words of 64 bits that a row along x takes here.
+    /// Length of a row along x, in words of 64 bits.
     row_words: usize,
 }
 
 impl ZoneGrid {
-    /// Cells of `reach` metres, or larger where `bounds` would have too many.
+    /// Cells of `reach` metres. They are larger if `bounds` would hold too many.
     pub fn new(bounds: &Aabb, reach: f32) -> Self {
         Self::with_cells(bounds, reach, MAX_CELLS)
     }
 
-    /// The same with `most` cells, of which there is one at least.
+    /// The same with at most `most` cells, and at least one.
     pub(super) fn with_cells(bounds: &Aabb, reach: f32, most: f32) -> Self {
         let extents = bounds.extents().max(Vec3::ZERO);
         let mut cell = reach;
@@ -65,7 +65,7 @@ impl ZoneGrid {
             n.x * n.y * n.z
         };
         while count(cell) > most {
-            cell *= 1.26; // a third of an octave: twice fewer cells
+            cell *= 1.26; // the cube root of 2: half as many cells
         }
         let dims = (extents / cell).floor() + Vec3::ONE;
         let dims = [dims.x as usize, dims.y as usize, dims.z as usize];
@@ -173,9 +173,9 @@ pub(crate) struct ZoneSide<'a> {
     pub(crate) mean_radius: f32,
 }
 
-/// Fills `near_a` and `near_b` with the indices of the culled points that have a point of the
-/// other cloud within `reach` metres, or as much farther as both reach farther than their clouds' mean radii. A few
-/// farther ones (up to two cell diagonals) are included; none nearer is missed. `bounds` hold the points.
+/// Fills `near_a` and `near_b` with the indices of the culled points that are near the other cloud. Two points are near
+/// within `reach` metres, and farther by as much as their own reaches exceed those of their clouds' mean radii. No near
+/// point is missed. A few farther ones, up to two cell diagonals away, are included. All points lie in `bounds`.
 pub(crate) fn zone(
     [a, b]: [ZoneSide; 2],
     bounds: &Aabb,
@@ -243,12 +243,12 @@ fn of_one_octave(
 #[derive(Debug, Default)]
 pub(crate) struct AroundPlaces {
     grid: ZoneGrid,
-    /// Cells of the places and those next to them; those and the next ones again.
+    /// The cells of the places with their neighbours, and the same grown by one more cell.
     near: Vec<u64>,
     around: Vec<u64>,
     spare: Vec<u64>,
     cells: Vec<u32>,
-    /// Indices of the points in the latter.
+    /// Indices of the points in the second.
     pub(crate) found: Vec<u32>,
 }
 
@@ -256,7 +256,7 @@ impl AroundPlaces {
     /// Finds at least the points within `2 · reach` metres of `places`. Cost: linear in points.
     pub(crate) fn find(&mut self, points: &Survivors, places: &[Vec3], reach: f32) {
         let bounds = (places.iter().copied()).fold(Aabb::EMPTY, Aabb::including);
-        // What is outside counts to the outermost cells, which no place is near.
+        // Points outside count to the outermost cells. No place is near these.
         self.grid = ZoneGrid::new(&bounds.loosened(3.0 * reach), reach);
         self.near.clear();
         self.near.resize(self.grid.words(), 0);
@@ -270,14 +270,15 @@ impl AroundPlaces {
         select(&self.cells, &self.around, &mut self.found);
     }
 
-    /// Whether all points within `reach` metres of `place` were found; so it is within `reach` of the places.
+    /// Whether all points within `reach` metres of `place` were found. They were if it is itself within `reach` of one
+    /// of the places.
     pub(crate) fn knows(&self, place: Vec3) -> bool {
         let bit = self.grid.bit(place);
         bit.is_some_and(|bit| self.near[bit / 64] >> (bit % 64) & 1 > 0)
     }
 }
 
-/// Cost: that of [`of_one_octave`] for each pair of octaves that the culled points are of.
+/// Cost: that of [`of_one_octave`], once for each pair of octaves among the culled points.
 fn of_all_octaves(
     [a, b]: [ZoneSide; 2],
     bounds: &Aabb,
@@ -310,7 +311,7 @@ fn of_all_octaves(
             grid.mark(b.of_class(class_b).map(|k| &cells_b[k]), bits);
             grid.dilate(bits, dilated);
             a.marked(class_a, cells_a, bits, near_a);
-            // Coarse cells are wide: what is in the next one may be far beyond the reach of the points.
+            // Coarse cells are wide. A point in the next cell may lie far beyond the reach of the points.
             let is_exact = class_a.further + class_b.further > 0.0
                 && near_a.len() * near_b.len() <= MOST_PAIRS;
             let in_reach = |i: u32, j: u32| {
@@ -335,7 +336,7 @@ fn of_all_octaves(
 }
 
 impl ZoneSide<'_> {
-    /// By how much a point reaches farther than the mean radius at most, metres.
+    /// The most by which a point's reach exceeds that of the mean radius, metres.
     fn farthest(&self) -> f32 {
         self.points.further.iter().fold(0.0, |a: f32, &b| a.max(b))
     }
@@ -358,8 +359,8 @@ impl ZoneSide<'_> {
 mod tests {
     use super::*;
 
-    /// Every pair within reach is found and nothing beyond the dilated cells, or beyond the reach of coarser points, by
-    /// brute force.
+    /// Brute force says: every pair within reach is found. Nothing is found beyond the grown cells, or beyond the reach
+    /// of coarser points.
     #[test]
     fn selects_what_brute_force_selects() {
         for seed in 0..80 {

@@ -11,7 +11,7 @@ const LEAST_PLAIN: f32 = 0.2;
 const PLAINLY: f32 = 0.5;
 
 /// Least cosine between a motion and an axis at which the motion tells from which side `b` came.
-/// One that passes along the surface more than it crosses it does not: a slope may lean either way.
+/// A motion that runs along the surface more than across it does not tell: a slope may lean either way.
 const CROSSING: f32 = 0.5;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).

@@ -1,10 +1,9 @@
 //! Where a cloud is nearest to another surface: branch and bound over the cloud's tree.
 //!
-//! First the samples, without discs, that are nearest: their distance D is no less than that of the
-//! surfaces, d. Where smooth surfaces are nearest they face each other: the discs that meet there
-//! lie across the line between the nearest points, so that their samples are at most √(d² + l²)
-//! apart, with the sum of their radii for l. So only pairs of samples at most √(D² + l²) apart are
-//! looked at; which these are does not depend on the order of the search.
+//! The search first finds the nearest samples, without their discs. Their distance D is at least the distance d of the
+//! surfaces. Smooth surfaces face each other where they are nearest, so the two discs there lie across the line between
+//! the nearest points. With l the sum of their radii, their samples are at most √(d² + l²) apart. So only samples at most
+//! √(D² + l²) apart can decide, and only these are looked at. The order of the search does not change which they are.
 
 use super::discs::{Disc, DiscSurface};
 use crate::ExactShape;
@@ -19,7 +18,7 @@ const DESCENT_STEPS: usize = 4;
 /// Sine of the angle between a disc and a surface below which they are taken to be parallel.
 const FLAT: f32 = 1e-3;
 
-/// Part of its radius by which a disc may miss a surface without inside that it meets: rounding.
+/// Share of its radius by which a disc may seem to miss a surface without inside that it meets, by rounding.
 const ROUNDING: f32 = 1e-3;
 
 /// Points in which two surfaces are nearest to each other, in the frame of the target.
@@ -32,8 +31,8 @@ pub(super) struct Nearest {
     pub(super) on_target: Vec3,
     /// Unit normal of the target at its point; of a cloud without oriented normals, either way.
     pub(super) normal: Vec3,
-    /// Whether each point lies inside the other surface, as far as the normals tell. Of the nearest
-    /// points of all this says that the surfaces have passed through each other as a whole.
+    /// Whether each point lies inside the other surface, by the normals. If that holds for the nearest points of all, the
+    /// surfaces have passed through each other as a whole.
     overlap: bool,
 }
 

@@ -1,6 +1,6 @@
 //! Normals of unknown sign turned outward.
 
-use super::surfels::Surfel;
+use super::surfel::Surfel;
 use rapier3d::glamx::DVec3;
 
 /// Neighbours that a normal is compared with.

@@ -1,17 +1,13 @@
-//! The cloud as small flat patches: position, area, outward normal.
+//! Turns a cloud into small flat patches.
 
 use super::orient::orient;
-use arrayvec::ArrayVec;
+use super::surfel::{NEIGHBORS, Surfel};
 use rapier3d::glamx::{DMat3, DSymmetricEigen3, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use tldi::{KdTree, Neighbor, PointCloud};
 
 /// Most points, about, whose patches are computed.
 const MAX_SAMPLES: usize = 100_000;
-
-/// Neighbours that bound a Voronoi cell. A cell in the plane has 6 on average; twice that many
-/// neighbours miss none on an even sample, and few on a random one.
-const NEIGHBORS: usize = 16;
 
 /// Points, with the point itself, that a normal is fitted to.
 const FITTED_POINTS: usize = 13;
@@ -26,20 +22,6 @@ const REACH: f64 = 1.5;
 
 /// Corners of the polygon that stands for the disc of `REACH` radii.
 const CORNERS: usize = 16;
-
-/// A patch of the surface around a point.
-pub(super) struct Surfel {
-    /// In metres, in the cloud's frame.
-    pub(super) position: DVec3,
-    /// Outward unit normal.
-    pub(super) normal: DVec3,
-    /// How far the patch reaches at most, in metres.
-    reach: f64,
-    /// In square metres.
-    pub(super) area: f64,
-    /// Indices of the nearest patches, nearest first.
-    pub(super) neighbors: ArrayVec<u32, NEIGHBORS>,
-}
 
 /// Indices of at most about [`MAX_SAMPLES`] points at distinct positions.
 fn thinned(cloud: &PointCloud<'_>) -> Vec<usize> {

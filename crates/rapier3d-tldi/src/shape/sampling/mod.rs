@@ -13,6 +13,13 @@ use tldi::{CloudError, PointCloud};
 const MOST_SQUARES: f64 = 8_388_608.0; // 2²³
 
 /// Why a shape could not be sampled.
+///
+/// ```
+/// use rapier3d::prelude::SharedShape;
+/// use rapier3d_tldi::{SampleError, sample_shape};
+/// let error = sample_shape(&*SharedShape::ball(1.0), 0.0).unwrap_err();
+/// assert_eq!(error, SampleError::BadSpacing { spacing: 0.0 });
+/// ```
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SampleError {

@@ -21,6 +21,28 @@ impl TldiPipeline {
     /// # Errors
     /// [`TldiError::NoSuchCollider`], [`TldiError::NotACloud`], and [`TldiError::Cloud`] where the
     /// points are refused: the collider then keeps the old ones.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// let sunk: Vec<Vector> = points.iter().map(|p| *p - 0.5 * Vector::Y).collect();
+    /// tldi.set_points(&mut world, scan, &sunk, None)?;
+    /// for _ in 0..60 {
+    ///     tldi.step(&mut world)?;
+    /// }
+    /// assert!(world.bodies[ball].translation().y < -0.25);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn set_points(
         &mut self,
         world: &mut PhysicsWorld,
@@ -73,6 +95,26 @@ impl TldiPipeline {
     ///
     /// # Errors
     /// [`TldiError::NoSuchCollider`], [`TldiError::NotACloud`].
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// let half = PointCloud::builder(points[..200].to_vec()).radius(0.1).build()?;
+    /// tldi.set_cloud(&mut world, scan, half)?;
+    /// tldi.step(&mut world)?;
+    /// # let _ = ball;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn set_cloud(
         &mut self,
         world: &mut PhysicsWorld,

@@ -1,6 +1,7 @@
 //! Lights the front layers of a picture.
 
-use crate::render::{FrontLayers, Paint, Scene};
+use crate::front_layers::FrontLayers;
+use crate::scene::{Paint, Scene};
 use tldi::glamx::Vec3;
 use tldi::{Layer, Tldi, VirtualCamera};
 
@@ -15,6 +16,8 @@ const SHADOW_REACH: f32 = 6.0;
 const BACKGROUND: [[f32; 3]; 2] = [[0.93, 0.94, 0.96], [0.80, 0.83, 0.87]];
 /// Samples of a pixel's surroundings.
 const OPENNESS_SAMPLES: usize = 16;
+/// Radius in pixels of a pixel's surroundings, at most: samples farther apart show as a pattern.
+const MOST_OPENNESS_PIXELS: f32 = 160.0;
 /// Spirals of samples, each turned differently: one for each pixel of a block of 4 × 4.
 const SPIRALS: usize = 16;
 
@@ -94,16 +97,25 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Red, green and blue of a pixel.
-    pub(crate) fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
-        let linear = match self.layer(x as i32, y as i32) {
+    /// Red, green and blue of `samples` × `samples` pixels that make one of a picture.
+    pub(crate) fn mean(&self, x: u32, y: u32, samples: u32) -> [u8; 3] {
+        let mut sum = [0.0; 3];
+        for (j, i) in (0..samples).flat_map(|j| (0..samples).map(move |i| (j, i))) {
+            let color = self.pixel(samples * x + i, samples * y + j);
+            sum = [0, 1, 2].map(|c| sum[c] + color[c].clamp(0.0, 1.0));
+        }
+        sum.map(|c| (255.0 * c / (samples * samples) as f32).round() as u8)
+    }
+
+    /// Red, green and blue of a pixel, 0 to 1 where nothing is overexposed.
+    fn pixel(&self, x: u32, y: u32) -> [f32; 3] {
+        match self.layer(x as i32, y as i32) {
             None => {
                 let t = y as f32 / self.front.size[1] as f32;
                 mix(BACKGROUND[0], BACKGROUND[1], t)
             }
             Some((item, layer)) => self.shaded(x, y, item, &layer),
-        };
-        linear.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8)
+        }
     }
 
     fn layer(&self, x: i32, y: i32) -> Option<(u16, Layer)> {
@@ -150,7 +162,7 @@ impl<'a> Frame<'a> {
     /// Ambient Obscurance Algorithm").
     fn openness(&self, x: u32, y: u32, view: Vec3, normal: Vec3) -> f32 {
         let reach = 0.5 * self.scene.detail;
-        let reach_px = (reach / self.camera.pixel_size_at(view.z)).min(80.0);
+        let reach_px = (reach / self.camera.pixel_size_at(view.z)).min(MOST_OPENNESS_PIXELS);
         let [width, height] = self.front.size.map(|n| n as i32);
         let mut obscured = 0.0;
         for [dx, dy] in self.spirals[((x % 4) * 4 + y % 4) as usize] {

@@ -3,8 +3,8 @@
 use std::f32::consts::FRAC_PI_2;
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi::{PointCloud, VirtualCamera};
-use tldi_examples::render::{Item, Paint, Picture, Scene};
-use tldi_examples::viewpoint;
+use tldi_pictures::viewpoint;
+use tldi_pictures::{Item, Paint, Picture, Scene};
 
 const SIZE: [u32; 2] = [320, 180];
 /// Distance of neighbouring points, metres.

@@ -1,7 +1,6 @@
 //! Chooses where to look at bodies from.
 
-use crate::load;
-use crate::render::{Item, Paint, Scene, pixels_of};
+use crate::{Item, Paint, Scene, pixels_of, thinned};
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi::{PointCloud, Projection, VirtualCamera};
 
@@ -26,7 +25,7 @@ pub fn choose(scene: &Scene<'_>, also_at: &[Vec3], size: [u32; 2]) -> VirtualCam
             // The fewer points, the larger their discs, so that they cover as much.
             let step = item.cloud.len().div_ceil(TRIAL_POINTS);
             let grown = |radius| radius * (step as f32).sqrt();
-            let cloud = load::derived(item.cloud, step, |p| p, grown).ok()?;
+            let cloud = thinned(item.cloud, step, grown).ok()?;
             Some((cloud, item.scene_from_cloud, item.paint))
         })
         .collect();

@@ -1,6 +1,6 @@
 //! Panels side by side on one sheet, with captions and a legend.
 
-use crate::render::Picture;
+use crate::Picture;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
 /// Space between panels and around the sheet in picture pixels.
@@ -14,19 +14,24 @@ const LINE: u32 = 20;
 const SAMPLE: u32 = 12;
 
 /// A picture with what it is.
-pub(crate) struct Panel {
-    pub(crate) picture: Picture,
-    pub(crate) caption: String,
+pub struct Panel {
+    /// What is seen.
+    pub picture: Picture,
+    /// The line above it, in ASCII.
+    pub caption: String,
 }
 
 /// A colour and what it means.
-pub(crate) struct Key {
-    pub(crate) color: [u8; 3],
-    pub(crate) meaning: String,
+pub struct Key {
+    /// Red, green, blue.
+    pub color: [u8; 3],
+    /// In ASCII.
+    pub meaning: String,
 }
 
 impl Key {
-    pub(crate) fn new(color: [u8; 3], meaning: impl Into<String>) -> Self {
+    /// A row of the legend.
+    pub fn new(color: [u8; 3], meaning: impl Into<String>) -> Self {
         Self {
             color,
             meaning: meaning.into(),
@@ -35,7 +40,7 @@ impl Key {
 }
 
 /// Rows of panels under their captions, and below them the legend. Text is ASCII.
-pub(crate) fn sheet(rows: &[Vec<Panel>], legend: &[Key]) -> Picture {
+pub fn sheet(rows: &[Vec<Panel>], legend: &[Key]) -> Picture {
     let panel_width = |panel: &Panel| panel.picture.size[0].max(text_width(&panel.caption));
     let row_width = |row: &Vec<Panel>| row.iter().map(|p| panel_width(p) + SPACE).sum::<u32>();
     let row_height = |row: &Vec<Panel>| {

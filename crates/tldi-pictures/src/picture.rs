@@ -1,0 +1,72 @@
+//! An image, the marks on it, and its file.
+
+use tldi::VirtualCamera;
+use tldi::glamx::Vec3;
+
+const CONTACT_COLOR: [u8; 3] = [255, 230, 40];
+const CONTACT_RIM: [u8; 3] = [40, 20, 20];
+/// Radius of a contact's dot as a share of the picture's height, and in pixels at least: below two pixels its
+/// colour is lost in its rim.
+const DOT_SHARE: f32 = 0.006;
+const LEAST_DOT: f32 = 2.8;
+/// Half the width in pixels of the ring of a hidden contact. At half of this it is lost on bright surfaces.
+const HIDDEN_RING: f32 = 1.1;
+/// Width of a dot's rim in pixels.
+const DOT_RIM: f32 = 1.3;
+/// An image of 8-bit colours.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Red, green and blue of each pixel, row by row.
+    pub rgb: Vec<[u8; 3]>,
+}
+
+impl Picture {
+    /// Draws a dot with a dark rim over a point of the scene, or a faint ring if it `is_hidden`, if it is in view.
+    pub(crate) fn mark(&mut self, camera: &VirtualCamera, point: Vec3, is_hidden: bool) {
+        let radius = (DOT_SHARE * self.size[1] as f32).max(LEAST_DOT);
+        let view = camera.view_from_point(point);
+        if view.z <= 0.0 {
+            return;
+        }
+        let [u, v] = camera.pixel_from_view(view);
+        let reach = (radius + DOT_RIM).ceil() as i32;
+        for y in v.floor() as i32 - reach..=v.floor() as i32 + reach {
+            for x in u.floor() as i32 - reach..=u.floor() as i32 + reach {
+                let distance = (x as f32 + 0.5 - u).hypot(y as f32 + 0.5 - v);
+                let inside =
+                    (0..self.size[0] as i32).contains(&x) && (0..self.size[1] as i32).contains(&y);
+                if !inside {
+                    continue;
+                }
+                let pixel = &mut self.rgb[(y as u32 * self.size[0] + x as u32) as usize];
+                if is_hidden {
+                    if (distance - radius).abs() < HIDDEN_RING {
+                        *pixel = [0, 1, 2].map(|c| pixel[c].midpoint(CONTACT_COLOR[c]));
+                    }
+                } else if distance < radius {
+                    *pixel = CONTACT_COLOR;
+                } else if distance < radius + DOT_RIM {
+                    *pixel = CONTACT_RIM;
+                }
+            }
+        }
+    }
+
+    /// The picture as a PNG file.
+    ///
+    /// # Errors
+    /// Those of the encoder.
+    pub fn to_png(&self) -> Result<Vec<u8>, png::EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.size[0], self.size[1]);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::High);
+        encoder
+            .write_header()?
+            .write_image_data(self.rgb.as_flattened())?;
+        Ok(bytes)
+    }
+}
