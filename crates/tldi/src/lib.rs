@@ -22,6 +22,7 @@ pub use contact::bowl::Lowest;
 pub use contact::patch_types::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS};
 pub use contact::patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};
 pub use contact::supports::{Supports, supports};
+pub use cpu::room::Room;
 pub use cpu::{CpuBackend, build};
 pub use glamx;
 pub use pair::backend::{Backend, BackendError, PairQuery, PairResult, View};

@@ -23,6 +23,11 @@ const ENOUGH: usize = 32;
 /// end.
 const LEAST_FREE: f32 = 0.05;
 
+/// Steps of a march along a column, after which a surface counts as near. Spheres that grow past a surface leave it in
+/// about ten; a march along a plane that is hardly farther than the reach would take as many as the column is long.
+/// Half as many draw a few columns more in which nothing meets; twice as many cost as much again.
+const MOST_STEPS: usize = 64;
+
 /// Least distances of what is in the cells, in metres, not a number where nothing was asked yet; kept from
 /// call to call.
 #[derive(Default)]
@@ -59,7 +64,7 @@ impl Placed<'_> {
     }
 
     /// Whether it comes within `reach` metres of a column of pixels: of one through `[u, v]`, between two depths.
-    /// Marches along it, each time as far as nothing can be near.
+    /// Marches along it, each time as far as nothing can be near; where that does not end, it may come so near.
     pub(super) fn meets(
         &self,
         camera: &VirtualCamera,
@@ -67,7 +72,10 @@ impl Placed<'_> {
         [mut depth, end]: [f32; 2],
         reach: f32,
     ) -> bool {
-        while depth <= end {
+        for _ in 0..MOST_STEPS {
+            if depth > end {
+                return false;
+            }
             let (distance, _) = self.project(camera.point_at(u, v, depth));
             let free = distance - reach;
             // A depth so great that it does not grow is no reason to march for ever.
@@ -76,7 +84,7 @@ impl Placed<'_> {
             }
             depth += free;
         }
-        false
+        true
     }
 }
 
