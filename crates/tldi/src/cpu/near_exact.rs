@@ -213,6 +213,7 @@ mod tests {
     use crate::cloud::reach::Ring;
     use crate::cpu::cull::{self, Region};
     use fastrand::Rng;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// A ball of one metre.
     struct Ball;
@@ -333,6 +334,46 @@ mod tests {
         let camera = VirtualCamera::along(Vec3::Z, 0.1);
         let [.., depth] = camera.view_from_point(pose.translation).to_array();
         assert!(ball.meets(&camera, [12.0, 0.0], [depth, depth + 1e6], 0.01));
+    }
+
+    /// The plane x = 0, which counts what it is asked.
+    #[derive(Default)]
+    struct Wall(AtomicUsize);
+
+    impl RaySurface for Wall {
+        fn bounds(&self) -> Aabb {
+            Aabb {
+                min: Vec3::NEG_INFINITY,
+                max: Vec3::INFINITY,
+            }
+        }
+
+        fn crossings(&self, _: Vec3, _: Vec3, _: f32, _: &mut Vec<RayHit>) {}
+
+        fn project(&self, point: Vec3) -> (f32, Vec3) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            (point.x, Vec3::X)
+        }
+
+        fn is_closed(&self) -> bool {
+            false
+        }
+    }
+
+    /// Along a plane that is hardly farther than the reach.
+    #[test]
+    fn marches_along_a_plane_end() {
+        let wall = Wall::default();
+        let exact = here(&wall);
+        let camera = VirtualCamera::along(Vec3::Z, 0.1);
+        let across = |x: f32| {
+            let view = camera.view_from_point(x * Vec3::X);
+            camera.pixel_from_view(view)
+        };
+        assert!(exact.meets(&camera, across(1.06 * REACH), [0.0, 1e4], REACH));
+        assert!(wall.0.load(Ordering::Relaxed) <= MOST_STEPS);
+        // What is far enough is passed within them.
+        assert!(!exact.meets(&camera, across(3.0 * REACH), [0.0, REACH], REACH));
     }
 
     /// Three of 5,000 that are all in cells that can be near.
