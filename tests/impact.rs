@@ -3,7 +3,7 @@
 use rapier3d::prelude::{Ball, Cuboid, HalfSpace, SharedShape, Vector};
 use rapier3d_tldi::ExactShape;
 use tldi::glamx::{Pose3, Quat, Vec3};
-use tldi::{CpuBackend, Impact, ImpactQuery, Params, Penetration, PointCloud, Surface};
+use tldi::{CpuBackend, Impact, ImpactQuery, Params, Penetration, PointCloud, Room, Surface};
 use tldi_tests::{Samples, random_pose, random_unit, sampled_box, sampled_plane, sampled_sphere};
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
@@ -83,6 +83,42 @@ fn balls() {
                 }
             }
         }
+    }
+}
+
+/// Pieces of a motion share a room: with pixels of a 500th of a radius each gets less of it than the one before, and tells
+/// so. The distances stay within a pixel of the truth.
+#[test]
+fn pieces_share_a_room() {
+    let (ra, rb) = (0.1, 0.07);
+    let (a, b) = (sampled_sphere(ra, R), sampled_sphere(rb, R));
+    let (a, b) = (a.cloud(R), b.cloud(R));
+    let exact = Ball::new(ra);
+    let exact = ExactShape(&exact);
+    let above = Pose3::from_translation(0.5 * Vec3::Y);
+    for a in [Surface::Cloud(&a), Surface::Exact(&exact)] {
+        let usual = query(a, Surface::Cloud(&b), above, -Vec3::Y);
+        let tiny = ImpactQuery {
+            params: Params::for_radius(R).with_pixel_size(R / 500.0),
+            ..usual
+        };
+        let (backend, mut room) = (CpuBackend::new(), Room::default());
+        let coarser: Vec<f32> = (0..4)
+            .map(|_| {
+                let found = backend.impact_within(&tiny, &mut room);
+                let found = found.expect("it is supported").expect("the balls meet");
+                let error = found.distance - (0.5 - ra - rb);
+                assert!(error.abs() < R, "{error}");
+                found.coarser.expect("there is no room for such pixels")
+            })
+            .collect();
+        assert!(
+            coarser.is_sorted() && coarser[3] > 1.2 * coarser[0],
+            "{coarser:?}"
+        );
+        assert_eq!(room.coarser(), Some(coarser[3]));
+        // A motion of its own has a room of its own, with enough of the usual pixels.
+        assert_eq!(impact(&usual).expect("the balls meet").coarser, None);
     }
 }
 

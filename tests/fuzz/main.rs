@@ -2,8 +2,8 @@
 //!
 //! - `PROPTEST_CASES` is the number of cases of each property (default: [`CASES`]).
 //! - `PROPTEST_RNG_SEED` is the seed (default: 1). A failure prints the smallest case that still fails.
-//! - `FUZZ_CASE_SECONDS` ends the run, with the case, where one takes longer. Not for `cargo test`: time depends
-//!   on the machine.
+//! - `FUZZ_CASE_SECONDS` ends the run, with the case, where one takes more processor time, and tells what the slowest
+//!   took. For `--test-threads=1`, and not for `cargo test`: time depends on the machine.
 //!
 //! Readers have theirs in `crates/tldi-sources/tests/hostile_generated.rs`. What ran, and what was found:
 //! `docs/robustness.md`.
@@ -15,11 +15,19 @@ mod shapes;
 mod spec;
 mod worlds;
 
+use cpu_time::ProcessTime;
 use proptest::strategy::Strategy;
 use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
+use std::cell::Cell;
 use std::fmt::Debug;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// How many limits of processor time a case may wait, if it does nothing: a machine has other work, too.
+const WAITING: u32 = 30;
+
+/// How often the watchdog looks.
+const LOOK: Duration = Duration::from_millis(100);
 
 /// Cases of each property where `PROPTEST_CASES` is not set.
 const CASES: u32 = 1000;
@@ -45,17 +53,22 @@ where
         ..from_environment
     };
     let watch = case_limit().map(watchdog);
+    let slowest = Cell::new(Duration::ZERO);
     let outcome = TestRunner::new(config).run(strategy, |case| {
-        if let Some(watch) = &watch {
-            // The watchdog lives as long as the process.
-            let _ = watch.send(Some(format!("{case:?}")));
-        }
+        let Some(watch) = &watch else {
+            return property(case);
+        };
+        // The watchdog lives as long as the process.
+        let _ = watch.send(Some(format!("{case:?}")));
+        let start = ProcessTime::now();
         let outcome = property(case);
-        if let Some(watch) = &watch {
-            let _ = watch.send(None);
-        }
+        slowest.set(slowest.get().max(start.elapsed()));
+        let _ = watch.send(None);
         outcome
     });
+    if watch.is_some() {
+        eprintln!("the slowest case took {:?}", slowest.get());
+    }
     if let Err(failure) = outcome {
         panic!("{failure}");
     }
@@ -67,15 +80,19 @@ fn case_limit() -> Option<Duration> {
     Some(Duration::from_secs(seconds))
 }
 
-/// Gets the case that begins, or `None` where it ended; ends the process where the next message is late.
+/// Gets the case that begins, or `None` where it ended; ends the process where a case takes more than `limit` of its
+/// processor time, or hangs.
 fn watchdog(limit: Duration) -> Sender<Option<String>> {
     let (sender, receiver) = channel::<Option<String>>();
     std::thread::spawn(move || {
         while let Ok(message) = receiver.recv() {
             let Some(case) = message else { continue };
-            if receiver.recv_timeout(limit) == Err(RecvTimeoutError::Timeout) {
-                eprintln!("still running after {limit:?}: {case}");
-                std::process::abort();
+            let (worked, begun) = (ProcessTime::now(), Instant::now());
+            while receiver.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+                if worked.elapsed() > limit || begun.elapsed() > WAITING * limit {
+                    eprintln!("still running after {limit:?}: {case}");
+                    std::process::abort();
+                }
             }
         }
     });

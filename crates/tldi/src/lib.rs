@@ -21,6 +21,7 @@ pub use cloud::recipe::{CloudRecipe, RadiusRule};
 pub use contact::patch_types::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS};
 pub use contact::patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};
 pub use contact::supports::supports;
+pub use cpu::room::Room;
 pub use cpu::{CpuBackend, build};
 pub use glamx;
 pub use pair::backend::{Backend, BackendError, PairQuery, PairResult, View};

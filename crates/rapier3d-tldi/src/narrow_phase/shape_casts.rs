@@ -6,7 +6,8 @@
 //! than too late. Some points do not lie in the way and only turn towards the other shape. Contacts
 //! within reach at the beginning of the piece find them. Most motions meet only what touches
 //! already. So pieces are long at first: as far as a body may turn that rapier calls slow. Only
-//! pieces in which something is met are cast again in short ones.
+//! pieces in which something is met are cast again in short ones. The images of all pieces share one
+//! [`Room`]. Once it is used up, no piece is cast again.
 
 use super::queries;
 use crate::TldiConfig;
@@ -22,7 +23,8 @@ use rapier3d::parry::query::{
     Unsupported,
 };
 use rapier3d::parry::shape::Shape;
-use tldi::{BackendError, Impact, ImpactQuery, Params, Penetration};
+use std::cell::RefCell;
+use tldi::{BackendError, Impact, ImpactQuery, Params, Penetration, Room};
 
 /// Most pieces of the motion of a body that turns.
 const MAX_PIECES: f32 = 64.0;
@@ -192,8 +194,10 @@ pub(crate) fn cast_shapes_nonlinear(
                 params,
                 penetration,
                 end,
+                room: RefCell::default(),
             };
             let hit = turning.impact(start);
+            shared.tell_coarser(turning.room.borrow().coarser());
             if let Some(hit) = hit.filter(|hit| turning.is_blocked(start, hit)) {
                 let world_from_a = motions[0].position_at_time(hit.time_of_impact);
                 let blocked = Blocked {
@@ -286,7 +290,7 @@ fn straight_impact(
     let length = (speed * max_time + target_distance).min(f64::from(f32::MAX));
     let way = StraightWay::new(moving.parts, &a_from_b, length * direction, &params)?;
     let [a, b] = moving.parts.map(ExactShape);
-    let impact = shared.impact_on_the_spot(&ImpactQuery {
+    let query = ImpactQuery {
         a: surface(&a),
         b: surface(&b),
         a_from_b: way.begin(&a_from_b),
@@ -298,7 +302,11 @@ fn straight_impact(
         core_only: !options.stop_at_penetration,
         penetration: None,
         params,
-    })?;
+    };
+    let mut room = Room::default();
+    let impact = shared.impact_on_the_spot(&query, &mut room);
+    shared.tell_coarser(room.coarser());
+    let impact = impact?;
     let cosine = -impact.normal.dot(way.direction);
     let early = target_distance / f64::from(cosine.max(LEAST_COSINE));
     let time = (way.from + f64::from(impact.distance) - early).max(0.0) / speed;
@@ -316,6 +324,8 @@ struct Turning<'a> {
     penetration: Option<Penetration>,
     /// The time until which it lasts.
     end: f32,
+    /// Of the images of all pieces.
+    room: RefCell<Room>,
 }
 
 /// A piece of such a motion.
@@ -383,7 +393,7 @@ impl Turning<'_> {
         self.pieces(start, self.end, coarse).find_map(|piece| {
             let hit = self.hit_in(piece)?;
             let mut finer = self.pieces(piece.from, piece.to, fine);
-            if finer.len() == 1 {
+            if finer.len() == 1 || self.room.borrow().is_used_up() {
                 return Some(hit);
             }
             finer.find_map(|piece| self.hit_in(piece))
@@ -425,7 +435,7 @@ impl Turning<'_> {
         let longer = way + f64::from(beyond) * way.try_normalize()?;
         let way = StraightWay::new(self.moving.parts, &frozen, longer, &self.params)?;
         let [a, b] = self.moving.parts.map(ExactShape);
-        let impact = self.shared.impact_on_the_spot(&ImpactQuery {
+        let query = ImpactQuery {
             a: surface(&a),
             b: surface(&b),
             a_from_b: way.begin(&frozen),
@@ -434,7 +444,8 @@ impl Turning<'_> {
             core_only: true,
             penetration: self.penetration,
             params: self.params,
-        })?;
+        };
+        let impact = (self.shared).impact_on_the_spot(&query, &mut self.room.borrow_mut())?;
         // Not at the very start, which a solver takes for a contact that it has.
         let distance = way.from + f64::from(impact.distance);
         let early = (distance - f64::from(displacement))
@@ -449,54 +460,56 @@ impl Turning<'_> {
         let touching = TOUCHING * self.params.pixel_size;
         let poses = [from, to].map(|time| self.a_from_b(time, time));
         let goes_on = to < self.end;
-        let (share, impact) = met_by_turning(self.shared, self.moving, poses, touching, goes_on)?;
+        let (share, impact) = self.closed_by_turning(poses, touching, goes_on)?;
         let time = from + (to - from) * share;
         Some(hit_of(&impact, time, &self.a_from_b(time, time)))
     }
-}
 
-/// Of the contacts that a piece of the motion closes, the first one, and the share of the piece until then: what
-/// only a turning brings together. What touches at its beginning is the solver's.
-fn met_by_turning(
-    shared: &Shared,
-    moving: &Moving<'_>,
-    [before, after]: [Pose; 2],
-    touching: f32,
-    goes_on: bool,
-) -> Option<(f32, Impact)> {
-    let from_before = before.inverse();
-    let way_of = |point: Vector| after * (from_before * point) - point;
-    let bounds = moving.parts[1].compute_local_aabb();
-    let longest = bounds
-        .vertices()
-        .into_iter()
-        .map(|corner| way_of(before * corner).as_dvec3().length() as f32);
-    // What is farther than the part is large, its motion brings it to and not its turning.
-    let diameter = 2.0 * bounds.half_extents().length();
-    let pair = ShapePair {
-        shape1: moving.parts[0],
-        shape2: moving.parts[1],
-        pos12: before,
-        prediction: touching + longest.fold(0.0, f32::max).min(diameter),
-    };
-    shared.contacts_on_the_way(pair, &shared.config(), |patches| {
-        let meetings = patches.iter().flat_map(|patch| {
-            patch.points.iter().filter_map(move |point| {
-                let way = way_of(point.point_b);
-                let approach = -patch.normal.dot(way);
-                let is_fast = goes_on && approach >= touching;
-                let met = if is_fast { CLOSING } else { 1.0 } * touching;
-                let meets = point.gap > touching && point.gap - approach <= met;
-                let impact = Impact {
-                    distance: point.gap,
-                    point: point.point_a,
-                    normal: patch.normal,
-                };
-                meets.then(|| (((point.gap - 0.5 * touching) / approach).min(1.0), impact))
-            })
-        });
-        meetings.min_by(|m, n| m.0.total_cmp(&n.0))
-    })
+    /// Of the contacts that a piece of the motion closes, the first one, and the share of the piece until then: what
+    /// only a turning brings together. What touches at its beginning is the solver's.
+    fn closed_by_turning(
+        &self,
+        [before, after]: [Pose; 2],
+        touching: f32,
+        goes_on: bool,
+    ) -> Option<(f32, Impact)> {
+        let Self { shared, moving, .. } = *self;
+        let from_before = before.inverse();
+        let way_of = |point: Vector| after * (from_before * point) - point;
+        let bounds = moving.parts[1].compute_local_aabb();
+        let longest = bounds
+            .vertices()
+            .into_iter()
+            .map(|corner| way_of(before * corner).as_dvec3().length() as f32);
+        // What is farther than the part is large, its motion brings it to and not its turning.
+        let diameter = 2.0 * bounds.half_extents().length();
+        let pair = ShapePair {
+            shape1: moving.parts[0],
+            shape2: moving.parts[1],
+            pos12: before,
+            prediction: touching + longest.fold(0.0, f32::max).min(diameter),
+        };
+        let room = &mut self.room.borrow_mut();
+        shared.contacts_on_the_way(pair, &shared.config(), room, |patches| {
+            let meetings = patches.iter().flat_map(|patch| {
+                patch.points.iter().filter_map(move |point| {
+                    let way = way_of(point.point_b);
+                    let approach = -patch.normal.dot(way);
+                    let is_fast = goes_on && approach >= touching;
+                    let met = if is_fast { CLOSING } else { 1.0 } * touching;
+                    let meets = point.gap > touching && point.gap - approach <= met;
+                    let impact = Impact {
+                        distance: point.gap,
+                        point: point.point_a,
+                        normal: patch.normal,
+                        coarser: None,
+                    };
+                    meets.then(|| (((point.gap - 0.5 * touching) / approach).min(1.0), impact))
+                })
+            });
+            meetings.min_by(|m, n| m.0.total_cmp(&n.0))
+        })
+    }
 }
 
 /// The hit of an impact; `a_from_b` maps from the second part's frame as it is then.

@@ -14,7 +14,10 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
-use tldi::{Backend, BackendError, ContactPatch, CpuBackend, Impact, ImpactQuery, PairResult};
+use tldi::{
+    Backend, BackendError, ContactPatch, CpuBackend, Impact, ImpactQuery, PairQuery, PairResult,
+    Room,
+};
 
 /// A distance that no other dispatcher gives.
 pub(crate) const PROBE_ANSWER: f32 = -1.0;
@@ -299,29 +302,34 @@ impl Shared {
         }
         self.spot_pairs.fetch_add(1, Ordering::Relaxed);
         self.on_the_spot(|spot| {
-            spot.compare(pair, config)?;
+            spot.compare(pair, config, |backend, queries, results| {
+                backend.compare(queries, results)
+            })?;
             let pixels = count_pixels(&spot.parts, &spot.results);
             self.spot_pixels.fetch_add(pixels, Ordering::Relaxed);
-            if let Some(coarser) = coarser_pixels(&spot.parts, &spot.results) {
-                self.spot_coarser
-                    .fetch_max(coarser.to_bits(), Ordering::Relaxed);
-            }
+            self.tell_coarser(coarser_pixels(&spot.parts, &spot.results));
             Ok(read(&spot.parts, &spot.results))
         })
     }
 
-    /// Hands the contacts of a pair of parts on its way to `read`, which no batch could hold.
+    /// Hands the contacts of a pair of parts on its way to `read`, which no batch could hold; `room` is that of the
+    /// motion.
     pub(crate) fn contacts_on_the_way<R>(
         &self,
         pair: ShapePair<'_>,
         config: &TldiConfig,
+        room: &mut Room,
         read: impl FnOnce(&[ContactPatch]) -> Option<R>,
     ) -> Option<R> {
         if !within_reach(pair.shape1, pair.shape2, &pair.pos12, pair.prediction) {
             return None;
         }
         self.on_the_spot(|spot| {
-            spot.compare(pair, config)?;
+            spot.compare(pair, config, |backend, queries, results| {
+                results.resize_with(queries.len(), PairResult::default);
+                let mut pairs = queries.iter().zip(results);
+                pairs.try_for_each(|(query, result)| backend.compare_within(query, room, result))
+            })?;
             Ok(spot
                 .results
                 .first()
@@ -330,11 +338,23 @@ impl Shared {
         .flatten()
     }
 
-    /// The impact of a motion; `None` also if the comparison failed, which is kept for
+    /// The impact in a motion, whose pieces share `room`; `None` also if the comparison failed, which is kept for
     /// [`take_failures`](Self::take_failures).
-    pub(crate) fn impact_on_the_spot(&self, query: &ImpactQuery) -> Option<Impact> {
-        self.on_the_spot(|spot| spot.backend.impact(query))
+    pub(crate) fn impact_on_the_spot(
+        &self,
+        query: &ImpactQuery,
+        room: &mut Room,
+    ) -> Option<Impact> {
+        self.on_the_spot(|spot| spot.backend.impact_within(query, room))
             .flatten()
+    }
+
+    /// Keeps by how much pixels were made larger for [`take_spot_counts`](Self::take_spot_counts).
+    pub(crate) fn tell_coarser(&self, coarser: Option<f32>) {
+        if let Some(coarser) = coarser {
+            self.spot_coarser
+                .fetch_max(coarser.to_bits(), Ordering::Relaxed);
+        }
     }
 
     fn on_the_spot<R>(&self, run: impl FnOnce(&mut Spot) -> Result<R, BackendError>) -> Option<R> {
@@ -374,7 +394,16 @@ pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Spot {
-    fn compare(&mut self, pair: ShapePair<'_>, config: &TldiConfig) -> Result<(), BackendError> {
+    fn compare(
+        &mut self,
+        pair: ShapePair<'_>,
+        config: &TldiConfig,
+        run: impl FnOnce(
+            &mut CpuBackend,
+            &[PairQuery],
+            &mut Vec<PairResult>,
+        ) -> Result<(), BackendError>,
+    ) -> Result<(), BackendError> {
         let mut sides = Vec::new();
         self.parts.clear();
         append_part_pairs(pair, config, &mut self.parts, &mut sides, |_, _, _| {
@@ -382,6 +411,6 @@ impl Spot {
         });
         let mut queries = Vec::with_capacity(sides.len());
         append_queries(&self.parts, &sides, &mut queries);
-        self.backend.compare(&queries, &mut self.results)
+        run(&mut self.backend, &queries, &mut self.results)
     }
 }

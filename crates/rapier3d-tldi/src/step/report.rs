@@ -46,7 +46,7 @@ pub struct StepReport {
     /// The largest factor by which the pixels of a pair exceed [`Resolution`](crate::Resolution),
     /// over all pairs that were compared and that rapier asked for. Deep contacts and coarse places
     /// need no smaller pixels, and widely strewn points leave no room for them
-    /// ([`PairResult::coarser`](tldi::PairResult::coarser)). `None` if all pixels have the size
+    /// ([`PairResult::coarser`](tldi::PairResult::coarser)). Casts and sweeps count, too. `None` if all pixels have the size
     /// that was asked for.
     pub coarser_pixels: Option<f32>,
     /// Deepest penetration before the step over all contacts of clouds, sleeping ones included, in

@@ -184,8 +184,6 @@ impl Scratch {
             }
             next = large_pixel(query, depth, DEEP).filter(|next| *next < pixel);
         }
-        // There may be room for the pixels of the fine look, which thins nothing out.
-        self.fold.coarser = None;
         result.clear();
         came_to
     }

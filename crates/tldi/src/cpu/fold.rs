@@ -9,30 +9,16 @@
 //! a folded axis is found again by adding what was cut.
 
 use super::rect::Rect;
+use super::room::PER_POINT;
 use glamx::Vec3;
 
 /// Empty quanta that remain of a gap: one belongs to the points before it, one to the points behind it, and one lies
 /// between. With fewer, points on both sides could meet.
 const LEFT: i64 = 3;
 
-/// Axes are folded if there are more pixels, or cells, than this for each point: several times as many as the points of
-/// a surface cover.
-pub(super) const PER_POINT: usize = 16;
-
-/// Images of up to this many pixels (256 × 256) are never folded. They take less time than the stages before
-/// them.
+/// Pixels up to which an image is not folded, whatever the number of points: 256 × 256, which takes less time
+/// than the stages before it.
 const SMALL: usize = 1 << 16;
-
-/// Pixels that any image may have, even of few points: 16 MiB of offsets. A ring 2,000 pixels wide cannot be folded, and
-/// still gets all of its pixels. Twice as many would double a pair's memory and its longest step.
-const LARGE: usize = 1 << 22;
-
-/// Fragments that an image may have whatever the number of points: a quarter of a second. Pixels that are much
-/// smaller than points show no more of them.
-const MANY: usize = 1 << 24;
-
-/// Fragments for each point beyond these: pixels of a sixth of a radius.
-const FRAGMENTS_PER_POINT: usize = 128;
 
 /// Edges of a cell in reaches beyond which its grid is folded. The cells of surfaces, which fill little of their
 /// bounds, are up to three times as large as the reach.
@@ -159,8 +145,6 @@ pub(crate) struct ViewFold {
     axes: [AxisFold; 2],
     /// Pixels.
     quantum: i32,
-    /// By how much pixels must be larger, since the image would have too many even when it is folded.
-    pub(super) coarser: Option<f32>,
 }
 
 impl ViewFold {
@@ -171,19 +155,6 @@ impl ViewFold {
     /// Whether an image of this many `points` is worth folding.
     pub(super) fn is_wanted(rect: &Rect, points: usize) -> bool {
         rect.pixels() > SMALL + PER_POINT * points
-    }
-
-    /// Whether there is no room for an image of this many `points`, or no time for this many `fragments`;
-    /// [`coarser`](Self::coarser) then says what pixels it needs.
-    pub(super) fn refuses(&mut self, rect: &Rect, points: usize, fragments: f32) -> bool {
-        let most = |whatever: usize, per_point: usize| (whatever + per_point * points) as f32;
-        let of_pixels = rect.pixels() as f32 / most(LARGE, PER_POINT);
-        let of_fragments = fragments / most(MANY, FRAGMENTS_PER_POINT);
-        let share = of_pixels.max(of_fragments);
-        if share > 1.0 {
-            self.coarser = Some(share.sqrt().max(std::f32::consts::SQRT_2));
-        }
-        share > 1.0
     }
 
     /// Folds the gaps between view coordinates `[x, y]`, metres, of points that reach out by `reach` pixels.

@@ -81,6 +81,11 @@ impl Meeting {
 impl Scratch {
     /// The first meeting.
     pub(super) fn impact(&mut self, query: &ImpactQuery) -> Option<Impact> {
+        self.impact_coarser(query, 1.0)
+    }
+
+    /// The first meeting, with pixels that are larger than asked for by a factor of `coarser` already.
+    fn impact_coarser(&mut self, query: &ImpactQuery, coarser: f32) -> Option<Impact> {
         let length = query.motion.length();
         if !(length > 0.0 && length.is_finite()) {
             return None;
@@ -88,12 +93,15 @@ impl Scratch {
         let camera = VirtualCamera::along(query.motion, query.params.pixel_size);
         self.cull_swept(query, &camera)?;
         let seen = self.images_of_motion(query, &camera, length);
-        if let Some(coarser) = self.fold.coarser.take() {
-            let pixel_size = coarser * query.params.pixel_size;
-            return self.impact(&ImpactQuery {
+        if let Some(by) = self.room.take_wanted() {
+            let coarser = by * coarser;
+            self.room.tell(coarser);
+            let pixel_size = by * query.params.pixel_size;
+            let larger = ImpactQuery {
                 params: query.params.with_pixel_size(pixel_size),
                 ..*query
-            });
+            };
+            return self.impact_coarser(&larger, coarser);
         }
         seen?;
         let (a, b) = (&self.a.image, &self.b.image);
@@ -182,6 +190,7 @@ impl Scratch {
             distance: first.distance,
             point: place(first.pixel, first.depth),
             normal: (frame_from_view * normal).normalize_or(-camera.axis()),
+            coarser: (coarser > 1.0).then_some(coarser),
         })
     }
 
@@ -272,7 +281,8 @@ impl Scratch {
             sharpens: false,
         };
         let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
-        let (hits, touching, fold) = (&mut self.hits, &mut self.touching, &mut self.fold);
+        let (hits, touching) = (&mut self.hits, &mut self.touching);
+        let (fold, room) = (&mut self.fold, &mut self.room);
         match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
                 let reach = length + query.params.thickness;
@@ -293,6 +303,7 @@ impl Scratch {
                     &exact,
                     touching,
                     fold,
+                    room,
                     hits,
                     image,
                 )
@@ -312,6 +323,7 @@ impl Scratch {
                     &exact,
                     touching,
                     fold,
+                    room,
                     hits,
                     image,
                 )

@@ -20,6 +20,7 @@ pub(crate) mod normals_sharpen;
 mod pair;
 pub(crate) mod planes;
 mod rect;
+pub(crate) mod room;
 mod side;
 pub(crate) mod splat;
 pub(crate) mod sweep;
@@ -31,10 +32,10 @@ use crate::{
     Tldi, Variant, VirtualCamera, Work, paper,
 };
 use cull::Region;
-use fold::ViewFold;
 use glamx::{Pose3, Vec3};
 use pair::Scratch;
 use rayon::prelude::*;
+use room::{Cost, Room};
 use side::{CloudView, Side};
 use std::sync::Mutex;
 
@@ -130,10 +131,76 @@ impl CpuBackend {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn impact(&self, query: &ImpactQuery) -> Result<Option<Impact>, BackendError> {
+        self.impact_within(query, &mut Room::default())
+    }
+
+    /// The same for a piece of a motion, all pieces of which share a [`Room`]. The example is there.
+    ///
+    /// # Errors
+    /// As [`impact`](Self::impact).
+    pub fn impact_within(
+        &self,
+        query: &ImpactQuery,
+        room: &mut Room,
+    ) -> Result<Option<Impact>, BackendError> {
         query
             .check()
             .map_err(|reason| BackendError::Unsupported { pair: 0, reason })?;
-        Ok(self.with_scratch(|scratch| scratch.impact(query)))
+        Ok(self.with_room(room, |scratch| scratch.impact(query)))
+    }
+
+    /// Compares a pair in a piece of a motion, all pieces of which share a [`Room`].
+    /// [`compare`](Backend::compare) gives each pair a room of its own.
+    ///
+    /// # Errors
+    /// [`BackendError::Unsupported`] with pair 0, as [`compare`](Backend::compare).
+    ///
+    /// ```
+    /// use tldi::{CpuBackend, PairQuery, PairResult, Params, PointCloud, Room, Surface, View};
+    /// use tldi::glamx::{Pose3, Vec3};
+    ///
+    /// let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.6).build()?;
+    /// let (mut result, mut room) = (PairResult::default(), Room::default());
+    /// let query = PairQuery {
+    ///     a: Surface::Cloud(&cloud),
+    ///     b: Surface::Cloud(&cloud),
+    ///     a_from_b: Pose3::translation(0.0, 0.3, 0.0),
+    ///     view: View::aimed(),
+    ///     params: Params::for_radius(0.6),
+    /// };
+    /// CpuBackend::new().compare_within(&query, &mut room, &mut result)?;
+    /// assert_eq!(result.coarser, room.coarser());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn compare_within(
+        &self,
+        query: &PairQuery<'_>,
+        room: &mut Room,
+        result: &mut PairResult,
+    ) -> Result<(), BackendError> {
+        query
+            .check()
+            .map_err(|reason| BackendError::Unsupported { pair: 0, reason })?;
+        self.compare_checked(query, room, result);
+        Ok(())
+    }
+
+    fn compare_checked(&self, query: &PairQuery, room: &mut Room, result: &mut PairResult) {
+        result.clear();
+        self.with_room(room, |scratch| {
+            scratch.work = Work::default();
+            scratch.compare(query, !self.is_without_first_look, result);
+            result.work = scratch.work;
+        });
+    }
+
+    fn with_room<R>(&self, room: &mut Room, run: impl FnOnce(&mut Scratch) -> R) -> R {
+        self.with_scratch(|scratch| {
+            scratch.room = room.clone();
+            let result = run(scratch);
+            *room = scratch.room.clone();
+            result
+        })
     }
 
     fn with_scratch<R>(&self, run: impl FnOnce(&mut Scratch) -> R) -> R {
@@ -181,12 +248,7 @@ impl Backend for CpuBackend {
             .par_iter()
             .zip(results.par_iter_mut())
             .for_each(|(query, result)| {
-                result.clear();
-                this.with_scratch(|scratch| {
-                    scratch.work = Work::default();
-                    scratch.compare(query, !this.is_without_first_look, result);
-                    result.work = scratch.work;
-                });
+                this.compare_checked(query, &mut Room::default(), result);
             });
         Ok(())
     }
@@ -247,7 +309,7 @@ pub fn build(
         &mut side.points,
     );
     let mut camera = *camera;
-    let mut room = ViewFold::default();
+    let mut room = Room::default();
     loop {
         let view = CloudView {
             cloud,
@@ -258,9 +320,13 @@ pub fn build(
             sharpens: true,
         };
         if let Some(seen) = side.project(&view) {
-            let fragments = side.fragments_in(&view, &seen.rect);
-            if camera.size.is_none() && room.refuses(&seen.rect, side.points.len(), fragments) {
-                camera = camera.coarser(room.coarser.unwrap_or(1.0));
+            let points = side.points.len();
+            let fragments = side.fragments_in(&view, &seen.rect, points);
+            if camera.size.is_none()
+                && room.refuses(Cost::new(&seen.rect, points, fragments))
+                && let Some(coarser) = room.take_wanted()
+            {
+                camera = camera.coarser(coarser);
                 continue;
             }
             side.whole_image(&view, &seen, seen.rect);

@@ -22,6 +22,11 @@ const ENOUGH: usize = 32;
 /// smaller steps.
 const LEAST_FREE: f32 = 0.05;
 
+/// Steps of a march along a column, after which a surface counts as near. Spheres that grow past a surface leave it in
+/// about ten; a march along a plane that is hardly farther than the reach would take as many as the column is long.
+/// Half as many draw a few columns more in which nothing meets; twice as many cost as much again.
+const MOST_STEPS: usize = 64;
+
 /// For each cell, the least distance that a point in it can have, metres. It is not a number until it is asked for. Kept
 /// from call to call.
 #[derive(Default)]
@@ -57,8 +62,8 @@ impl Placed<'_> {
         Some(rect_of(first, last)?.grown(border))
     }
 
-    /// Whether the surface comes within `reach` metres of the column of pixels through `[u, v]`, between two depths.
-    /// Marches along the column. Each step is as long as nothing can be near.
+    /// Whether it comes within `reach` metres of a column of pixels: of one through `[u, v]`, between two depths.
+    /// Marches along it, each time as far as nothing can be near; where that does not end, it may come so near.
     pub(super) fn meets(
         &self,
         camera: &VirtualCamera,
@@ -66,7 +71,10 @@ impl Placed<'_> {
         [mut depth, end]: [f32; 2],
         reach: f32,
     ) -> bool {
-        while depth <= end {
+        for _ in 0..MOST_STEPS {
+            if depth > end {
+                return false;
+            }
             let (distance, _) = self.project(camera.point_at(u, v, depth));
             let free = distance - reach;
             // A depth so great that it does not grow is no reason to march for ever.
@@ -75,7 +83,7 @@ impl Placed<'_> {
             }
             depth += free;
         }
-        false
+        true
     }
 }
 
@@ -204,6 +212,7 @@ mod tests {
     use crate::cloud::reach::Ring;
     use crate::cpu::cull::{self, Region};
     use fastrand::Rng;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// A ball of one metre.
     struct Ball;
@@ -324,6 +333,46 @@ mod tests {
         let camera = VirtualCamera::along(Vec3::Z, 0.1);
         let [.., depth] = camera.view_from_point(pose.translation).to_array();
         assert!(ball.meets(&camera, [12.0, 0.0], [depth, depth + 1e6], 0.01));
+    }
+
+    /// The plane x = 0, which counts what it is asked.
+    #[derive(Default)]
+    struct Wall(AtomicUsize);
+
+    impl RaySurface for Wall {
+        fn bounds(&self) -> Aabb {
+            Aabb {
+                min: Vec3::NEG_INFINITY,
+                max: Vec3::INFINITY,
+            }
+        }
+
+        fn crossings(&self, _: Vec3, _: Vec3, _: f32, _: &mut Vec<RayHit>) {}
+
+        fn project(&self, point: Vec3) -> (f32, Vec3) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            (point.x, Vec3::X)
+        }
+
+        fn is_closed(&self) -> bool {
+            false
+        }
+    }
+
+    /// Along a plane that is hardly farther than the reach.
+    #[test]
+    fn marches_along_a_plane_end() {
+        let wall = Wall::default();
+        let exact = here(&wall);
+        let camera = VirtualCamera::along(Vec3::Z, 0.1);
+        let across = |x: f32| {
+            let view = camera.view_from_point(x * Vec3::X);
+            camera.pixel_from_view(view)
+        };
+        assert!(exact.meets(&camera, across(1.06 * REACH), [0.0, 1e4], REACH));
+        assert!(wall.0.load(Ordering::Relaxed) <= MOST_STEPS);
+        // What is far enough is passed within them.
+        assert!(!exact.meets(&camera, across(3.0 * REACH), [0.0, REACH], REACH));
     }
 
     /// Three of 5,000 that are all in cells that can be near.

@@ -8,6 +8,7 @@ use super::fold::ViewFold;
 use super::impact::{CoreScratch, Meeting};
 use super::near_exact::Placed;
 use super::rect::Rect;
+use super::room::{Cost, Room};
 use super::side::{CloudView, ExactView, Scope, Side};
 use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneScratch, ZoneSide};
@@ -44,6 +45,8 @@ pub(super) struct Scratch {
     pub(super) touching: Touching,
     /// Of the current view.
     pub(super) fold: ViewFold,
+    /// Of the images of the current motion.
+    pub(super) room: Room,
     crossings: Crossings,
     paper: [paper::Scratch; 2],
     pub(super) patches: PatchScratch,
@@ -74,15 +77,19 @@ impl Scratch {
         };
         let pixel = query.params.pixel_size;
         let strides = [query.a, query.b].map(|surface| stride(surface.mean_radius(), pixel));
+        let left = self.room.left();
         let first_look = match has_first_look {
             true => self.settle(query, &plan, result),
             false => FirstLook::Nothing,
         };
+        // There may be room for the pixels of the fine look, which thins nothing out.
+        self.room.take_wanted();
         let is_found = match first_look {
             FirstLook::Settled => return,
             FirstLook::Culled(taken) => taken == strides,
             FirstLook::Nothing => false,
         };
+        self.room.put_back(left);
         let is_near = is_found || self.cull(query, &plan, strides) && self.zone(query, &plan);
         if !is_near {
             return;
@@ -122,7 +129,8 @@ impl Scratch {
                 }
             }
         }
-        if let Some(coarser) = self.fold.coarser.take() {
+        if let Some(coarser) = self.room.take_wanted() {
+            self.room.put_back(left);
             self.compare_coarser(query, coarser, result);
             return;
         }
@@ -146,7 +154,9 @@ impl Scratch {
             ..*query
         };
         self.compare(&larger, false, result);
-        result.coarser = Some(coarser * result.coarser.unwrap_or(1.0));
+        let coarser = coarser * result.coarser.unwrap_or(1.0);
+        self.room.tell(coarser);
+        result.coarser = Some(coarser);
     }
 
     fn compare_paper(
@@ -361,7 +371,8 @@ impl Scratch {
             scope: Scope::Near(plan.column_reach),
         };
         let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
-        let (hits, touching, fold) = (&mut self.hits, &mut self.touching, &mut self.fold);
+        let (hits, touching) = (&mut self.hits, &mut self.touching);
+        let (fold, room) = (&mut self.fold, &mut self.room);
         let looked = match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
                 let (a, b) = (view_of(a, a_from_a, merge_a), view_of(b, a_from_b, merge_b));
@@ -371,13 +382,13 @@ impl Scratch {
                 let exact = exact_view(surface, a_from_b, self.a.deepest);
                 let (cloud, image) = (view_of(cloud, a_from_a, merge_a), &mut self.b.image);
                 self.a
-                    .look_with(&cloud, &exact, touching, fold, hits, image)
+                    .look_with(&cloud, &exact, touching, fold, room, hits, image)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
                 let exact = exact_view(surface, a_from_a, self.b.deepest);
                 let (cloud, image) = (view_of(cloud, a_from_b, merge_b), &mut self.a.image);
                 self.b
-                    .look_with(&cloud, &exact, touching, fold, hits, image)
+                    .look_with(&cloud, &exact, touching, fold, room, hits, image)
             }
             _ => None, // refused
         };
@@ -434,7 +445,16 @@ impl Scratch {
             || side_a.image(a, &imaging, Some(touching)),
             || side_b.image(b, &imaging, Some(touching)),
         );
+        let [drawn_a, drawn_b] = [&self.a, &self.b].map(|side| side.kept.len());
+        self.room.take(self.cost([a, b], &rect, [drawn_a, drawn_b]));
         Some(())
+    }
+
+    /// What the images of two clouds take, of so many drawn points each.
+    fn cost(&self, [a, b]: [&CloudView; 2], rect: &Rect, drawn: [usize; 2]) -> Cost {
+        let fragments =
+            self.a.fragments_in(a, rect, drawn[0]) + self.b.fragments_in(b, rect, drawn[1]);
+        Cost::new(rect, self.a.points.len() + self.b.points.len(), fragments)
     }
 
     /// Moves what was culled into the view and finds the tiles in which `a` is less than `reach` metres behind
@@ -463,10 +483,12 @@ impl Scratch {
             side_b.columns.fold(&self.fold, camera, &mut seen_b);
             rect = seen_a.rect.intersection(&seen_b.rect)?;
         }
-        let fragments = side_a.fragments_in(a, &rect) + side_b.fragments_in(b, &rect);
-        if camera.size.is_none() && self.fold.refuses(&rect, count, fragments) {
+        let all = [side_a.points.len(), side_b.points.len()];
+        let cost = self.cost([a, b], &rect, all);
+        if camera.size.is_none() && self.room.refuses(cost) {
             return None;
         }
+        let (side_a, side_b) = (&mut self.a, &mut self.b);
         for (seen, side) in [(&mut seen_a, &*side_a), (&mut seen_b, &*side_b)] {
             seen.limit_depths(DepthScale::reach(params), || side.columns.median_depth());
         }

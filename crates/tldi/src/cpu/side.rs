@@ -4,12 +4,13 @@ use super::cast::{self, Rays};
 use super::cells::{CellImaging, Cells};
 use super::columns::{Columns, Tiles, Touching};
 use super::cull::{CullScratch, PointRadii, Survivors};
-use super::fold::ViewFold;
+use super::fold::{FARTHEST_PIXEL, ViewFold};
 use super::impact::BORDER;
 use super::near_exact::{CellDistances, Placed};
 use super::normals::{self, NormalScratch};
 use super::normals_sharpen::sharpen;
 use super::rect::{Footprint, Rect};
+use super::room::{Cost, Room};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
 use super::sweep;
 use crate::contact::lone_points::Culled;
@@ -152,10 +153,10 @@ impl Side {
         self.columns.project(&self.points, largest, view.camera)
     }
 
-    /// About how many fragments an image of the culled points has.
-    pub(super) fn fragments_in(&self, view: &CloudView, rect: &Rect) -> f32 {
+    /// About how many fragments an image has in which so many points are drawn.
+    pub(super) fn fragments_in(&self, view: &CloudView, rect: &Rect, drawn: usize) -> f32 {
         let edge = 2.0 * self.mean_radius(view.cloud) / view.camera.pixel_size_at(0.0);
-        self.points.len() as f32 * (edge * edge).min(rect.pixels() as f32)
+        drawn as f32 * (edge * edge).min(rect.pixels() as f32)
     }
 
     /// Radius in metres about a point in which others decide its normal; 0 where it is given.
@@ -172,11 +173,23 @@ impl Side {
             camera: view.camera,
             params: view.params,
             rect,
-            tiles: Tiles::new(&seen.rect, seen.reach),
+            tiles: Tiles::new(&self.around(view, seen, Some(rect)).rect, seen.reach),
             scale: DepthScale::new(seen.near, view.params),
         };
         self.columns.sort(&imaging.tiles, view.camera);
         self.image(view, &imaging, None);
+    }
+
+    /// The part of what is seen that decides the pixels of `rect`: these, and where splats and neighbours of their
+    /// points are. The rest may be as large as coordinates go.
+    fn around(&self, view: &CloudView, seen: &Footprint, rect: Option<Rect>) -> Footprint {
+        let support = self.support_radius(view.cloud) / seen.pixel_size;
+        let border = (seen.reach + support).ceil().min(FARTHEST_PIXEL) as i32;
+        let part = rect.and_then(|rect| rect.grown(border).intersection(&seen.rect));
+        Footprint {
+            rect: part.unwrap_or(seen.rect),
+            ..*seen
+        }
     }
 
     /// The image of the projected points, in the columns in which they are within `reach` metres of
@@ -193,6 +206,7 @@ impl Side {
         touching: &mut Touching,
         fold: &ViewFold,
     ) -> Option<Rect> {
+        let seen = &self.around(view, seen, covered);
         let tiles = Tiles::new(&seen.rect, seen.reach);
         self.columns.sort(&tiles, view.camera);
         let margin = view.params.slope_damping * seen.radius;
@@ -316,14 +330,27 @@ impl Side {
         }
     }
 
+    /// What the images of this cloud, of which so many points are drawn, and of an exact surface take.
+    fn cost_with(&self, view: &CloudView, look: &ExactView, rect: &Rect, drawn: usize) -> Cost {
+        let fragments = self.fragments_in(view, rect, drawn);
+        let pixels = rect.pixels() as f32;
+        let rays = match look.scope {
+            Scope::Everywhere => pixels,
+            Scope::Near(_) | Scope::Cloud => pixels.min(fragments),
+        };
+        Cost::new(rect, self.points.len(), fragments).with_rays(rays)
+    }
+
     /// Image of this cloud, and of an exact surface into `image` over the same pixels; `None`
-    /// where nothing is in view.
+    /// where nothing is in view, or there is no room for it.
+    #[expect(clippy::too_many_arguments, reason = "a stage's parts of one look")]
     pub(super) fn look_with(
         &mut self,
         view: &CloudView,
         look: &ExactView,
         touching: &mut Touching,
         fold: &mut ViewFold,
+        room: &mut Room,
         hits: &mut Vec<RayHit>,
         image: &mut Tldi,
     ) -> Option<()> {
@@ -350,7 +377,7 @@ impl Side {
             covered = None;
             rect = seen.rect;
         }
-        if follows && fold.refuses(&rect, self.points.len(), self.fragments_in(view, &rect)) {
+        if follows && room.refuses(self.cost_with(view, look, &rect, self.points.len())) {
             return None;
         }
         let reach = DepthScale::reach(view.params);
@@ -388,6 +415,7 @@ impl Side {
             cover: (!matches!(look.scope, Scope::Everywhere)).then_some(&self.image),
         };
         cast::cast(surface, frame_from_surface, &rays, hits, image);
+        room.take(self.cost_with(view, look, &rays.rect, self.kept.len()));
         Some(())
     }
 }

@@ -50,4 +50,7 @@ pub struct Impact {
     /// Unit normal there, from the first surface towards the second; within 90° of against the
     /// motion.
     pub normal: Vec3,
+    /// The factor by which pixels are larger than [`Params::pixel_size`], since there was no
+    /// [`Room`](crate::Room) for them. `None` if they have the size that was asked for.
+    pub coarser: Option<f32>,
 }
