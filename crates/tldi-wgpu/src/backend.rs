@@ -15,7 +15,7 @@ use crate::resident::Resident;
 use crate::sources::{DepthCamera, Sources};
 use crate::timer::Timer;
 use crate::upload::Upload;
-use crate::{Gpu, GpuError, StageTime};
+use crate::{Gpu, GpuError, StageTime, Traffic};
 use std::sync::mpsc;
 use tldi::{Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult, PatchScratch};
 
@@ -78,6 +78,7 @@ pub struct WgpuBackend {
     pairs_on_cpu: usize,
     /// What the last batch, or its last part, needed.
     last: Counters,
+    traffic: Traffic,
     timer: Option<Timer>,
     times: Vec<StageTime>,
 }
@@ -89,6 +90,7 @@ impl WgpuBackend {
     /// [`GpuError::Failed`] where the device refuses a stage, [`GpuError::TooLarge`] where it
     /// allows no buffers.
     pub fn new(gpu: Gpu) -> Result<Self, GpuError> {
+        let gpu = gpu.with_own_tally();
         gpu.pipelines();
         let resident = Resident::new(&gpu)?;
         gpu.check()?;
@@ -109,6 +111,7 @@ impl WgpuBackend {
             cpu: CpuBackend::new(),
             pairs_on_cpu: 0,
             last: Counters::default(),
+            traffic: Traffic::default(),
             timer: None,
             times: Vec::new(),
         })
@@ -181,6 +184,16 @@ impl WgpuBackend {
         self.last.bytes(&self.upload)
     }
 
+    /// How many elements of each kind the last batch needed, or its last part where it was halved.
+    pub fn needed_elements(&self) -> [(&'static str, u32); 7] {
+        self.last.named()
+    }
+
+    /// What was sent and submitted for the last batch.
+    pub fn traffic(&self) -> Traffic {
+        self.traffic
+    }
+
     /// Compares the batch if at least so many points are in blocks that both sides of a pair reach;
     /// else returns `false`.
     pub(crate) fn compare_if_large(
@@ -224,6 +237,7 @@ impl WgpuBackend {
             buffers,
             bind_groups,
             timer,
+            traffic,
             ..
         } = self;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -241,6 +255,7 @@ impl WgpuBackend {
             (&buffers.found, pairs_found),
         ] {
             if let Some(buffer) = buffer.get() {
+                traffic.filled += bytes;
                 encoder.clear_buffer(buffer, 0, Some(bytes));
             }
         }
@@ -279,6 +294,7 @@ impl WgpuBackend {
             data.cells > 0 || !pipelines[*k].stage.name.starts_with("normals")
         };
         let stages = (0..pipelines.len()).filter(needed);
+        traffic.dispatches += stages.clone().count() as u32;
         match timer {
             None => {
                 let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -304,6 +320,8 @@ impl WgpuBackend {
             encoder.copy_buffer_to_buffer(found, 0, readback, counters, pairs_found + contacts);
         }
         gpu.queue.submit([encoder.finish()]);
+        traffic.submissions += 1;
+        traffic.read_back += 4 * u64::from(COUNTERS) + pairs_found + contacts;
         gpu.check()
     }
 

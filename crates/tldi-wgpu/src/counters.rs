@@ -53,6 +53,12 @@ impl Counters {
         contacts: 1 << 11,
     };
 
+    /// Each with its name.
+    pub(crate) fn named(&self) -> [(&'static str, u32); 7] {
+        let words: [u32; 7] = bytemuck::cast(*self);
+        std::array::from_fn(|k| (ELEMENT_NAMES[k], words[k]))
+    }
+
     /// What each stage that runs must read and write at least, bytes.
     pub(crate) fn bytes(&self, upload: &Upload) -> Vec<(&'static str, u64)> {
         let times = |count: u32, bytes: u64| u64::from(count) * bytes;

@@ -23,6 +23,7 @@ mod sources;
 #[cfg(test)]
 mod testing;
 mod timer;
+mod traffic;
 mod upload;
 
 pub use auto::AutoBackend;
@@ -33,4 +34,5 @@ pub use device::{AdapterChoice, Gpu};
 pub use error::GpuError;
 pub use sources::DepthCamera;
 pub use timer::StageTime;
+pub use traffic::Traffic;
 pub use wgpu;

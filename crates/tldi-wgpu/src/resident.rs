@@ -139,8 +139,7 @@ impl Resident {
             self.staging
                 .extend(normals.iter().flat_map(|n| n.to_array()));
             let bytes = bytemuck::cast_slice(&self.staging);
-            gpu.queue
-                .write_buffer(&self.normals.buffer, 12 * u64::from(first_normal), bytes);
+            gpu.write(&self.normals.buffer, 12 * u64::from(first_normal), bytes);
         }
         let radius = |i: usize| match cloud.radii() {
             Radii::Global(r) => *r,
@@ -151,8 +150,7 @@ impl Resident {
         self.staging
             .extend((0..cloud.len()).flat_map(|i| [x[i], y[i], z[i], radius(i)]));
         let bytes = bytemuck::cast_slice(&self.staging);
-        gpu.queue
-            .write_buffer(&self.points.buffer, 16 * u64::from(first), bytes);
+        gpu.write(&self.points.buffer, 16 * u64::from(first), bytes);
         Ok([first, first_normal])
     }
 

@@ -2,8 +2,8 @@
 //! too small.
 
 use super::WgpuBackend;
-use crate::GpuError;
 use crate::layout::lives_on_device;
+use crate::{GpuError, Traffic};
 use tldi::{Backend, BackendError, PairQuery, PairResult};
 
 /// Times that a part is redone with larger buffers before that counts as a fault: every time at
@@ -43,6 +43,7 @@ impl WgpuBackend {
     ) -> Result<(), BackendError> {
         self.gpu.check()?;
         self.pairs_on_cpu = 0;
+        self.traffic = Traffic::default();
         let mut parts = vec![self.upload.pairs_of.clone()];
         while let Some(part) = parts.pop() {
             if part.is_empty() {
@@ -66,6 +67,7 @@ impl WgpuBackend {
                 }
             }
         }
+        self.traffic.uploaded = self.gpu.take_uploaded();
         self.compare_on_cpu(batch, results, left_to_cpu)
     }
 
@@ -104,6 +106,7 @@ impl WgpuBackend {
                 return Ok(());
             }
             self.capacities = self.capacities.grown(&needed, &self.most)?;
+            self.traffic.redos += 1;
         }
         Err(self
             .gpu
