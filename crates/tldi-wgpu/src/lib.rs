@@ -17,6 +17,7 @@ mod device;
 mod error;
 mod layout;
 mod pipelines;
+mod prediction;
 mod readback;
 mod resident;
 mod sources;

@@ -80,6 +80,8 @@ impl WgpuBackend {
     ) -> Result<(), Stop> {
         let (resident, sources) = (&mut self.resident, &mut self.sources);
         self.upload.place(batch, &self.gpu, resident, sources)?;
+        let predicted = self.upload.predicted.min(&self.most);
+        self.capacities = self.capacities.grown(&predicted, &self.most)?;
         let mut fitting = None;
         for _ in 0..MOST_TRIES {
             if let Err(error) = self.submit() {
