@@ -142,4 +142,5 @@ fn only_what_is_used_is_filled() {
         return;
     };
     assert_eq!(expected, compare_on(&mut other, &[slight]));
+    assert_eq!(backend.needed_elements(), other.needed_elements());
 }
