@@ -174,6 +174,17 @@ fn columns_tiles(@builtin(local_invocation_index) lane: u32) {
     }
 }
 
+// Nothing is known of any tile.
+@compute @workgroup_size(256)
+fn columns_clear(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let tile = group_index(group) * GROUP + lane;
+    if tile < min(atomicLoad(&work[TILES]), batch.tiles) {
+        for (var k = 0u; k < 3u; k++) {
+            atomicStore(&work[batch.tiles_at + k * batch.tiles + tile], 0u);
+        }
+    }
+}
+
 fn tile_of(view: u32, p: vec3f, pixel_size: f32) -> u32 {
     let scale = 1.0 / (pixel_size * f32(views[view].tile_edge));
     let t = p.xy * scale - vec2f(views[view].tile_origin) / f32(views[view].tile_edge);
@@ -322,5 +333,16 @@ fn columns_pixels(@builtin(local_invocation_index) lane: u32) {
         let fitting = select(cursor, 0u, cursor > batch.pixels);
         set_groups(PIXEL_GROUPS, 2u * fitting);
         set_groups(IMAGE_GROUPS, fitting);
+    }
+}
+
+// No pixel has a fragment yet.
+@compute @workgroup_size(256)
+fn pixels_clear(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let k = group_index(group) * GROUP + lane;
+    let pixels = min(atomicLoad(&work[PIXELS]), batch.pixels);
+    if k < 2u * pixels {
+        let s = k / pixels;
+        atomicStore(&work[batch.pixels_at + s * batch.pixels + k - s * pixels], 0u);
     }
 }

@@ -245,15 +245,14 @@ fn contact_pixels(look: ptr<function, Look>, a: Column, b: Column, view: u32, pi
         atomicStore(&found[at], view);
         atomicStore(&found[at + 1u], u32(pixel.x));
         atomicStore(&found[at + 2u], u32(pixel.y));
-        atomicStore(&found[at + 3u], kb - b.begin);
-        atomicStore(&found[at + 4u], bitcast<u32>(layers[ka].depth));
-        atomicStore(&found[at + 5u], bitcast<u32>(layers[kb].depth));
-        atomicStore(&found[at + 6u], bitcast<u32>(gap));
+        atomicStore(&found[at + 3u], bitcast<u32>(layers[ka].depth));
+        atomicStore(&found[at + 4u], bitcast<u32>(layers[kb].depth));
+        atomicStore(&found[at + 5u], bitcast<u32>(gap));
         let shortened_a = share_of(ka, -1.0) * normal_a;
         let shortened_b = share_of(kb, 1.0) * normal_b;
         for (var k = 0u; k < 3u; k++) {
-            atomicStore(&found[at + 7u + k], bitcast<u32>(shortened_a[k]));
-            atomicStore(&found[at + 10u + k], bitcast<u32>(shortened_b[k]));
+            atomicStore(&found[at + 6u + k], bitcast<u32>(shortened_a[k]));
+            atomicStore(&found[at + 9u + k], bitcast<u32>(shortened_b[k]));
         }
     }
 }

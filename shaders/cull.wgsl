@@ -5,7 +5,7 @@
 @group(0) @binding(2) var<storage, read> sides: array<Side>;
 // Side, and first point in its cloud.
 @group(0) @binding(3) var<storage, read> items: array<vec2u>;
-@group(0) @binding(4) var<storage, read> points: array<vec4f>;
+@group(0) @binding(4) var<storage, read> points: array<f32>;
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
 
@@ -32,13 +32,18 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     var position = vec3f();
     var radius = 0.0;
     if is_kept {
-        let point = points[sides[side_index].first_point + index];
-        radius = point.w;
+        let at = sides[side_index].first_point + index * sides[side_index].point_step;
+        let step = sides[side_index].coordinate_step;
+        // Where radii are equal, the points have none of their own.
+        radius = sides[side_index].max_radius;
+        if (sides[side_index].flags & RADII_DIFFER) != 0u {
+            radius = points[at + 3u * step];
+        }
         position = moved(
             sides[side_index].frame_from_cloud_x,
             sides[side_index].frame_from_cloud_y,
             sides[side_index].frame_from_cloud_z,
-            point.xyz,
+            vec3f(points[at], points[at + step], points[at + 2u * step]),
         );
         let in_other = moved(
             sides[side_index].other_from_frame_x,

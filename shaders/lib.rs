@@ -117,9 +117,11 @@ pub const STAGES: &[Stage] = &[
     stage("aim", AIM, &[0, 1, 2, 7, 8, 10, 14]),
     stage("columns_bounds", COLUMNS, &[0, 6, 7, 8]),
     stage("columns_tiles", COLUMNS, &[0, 1, 2, 7, 8, 15]),
+    stage("columns_clear", COLUMNS, &[0, 8]),
     stage("columns_depths", COLUMNS, &[0, 1, 2, 6, 7, 8]),
     stage("columns_touch", COLUMNS, &[0, 1, 7, 8]),
     stage("columns_pixels", COLUMNS, &[0, 7, 8, 15]),
+    stage("pixels_clear", COLUMNS, &[0, 8]),
     stage("normals", NORMALS, &[0, 1, 2, 6, 7, 8, 9, 17]),
     stage(
         "normals_sharpen",

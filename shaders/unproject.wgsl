@@ -11,6 +11,7 @@ struct DepthCamera {
     far: f32,
     // Radius of a point in pixels.
     radius_px: f32,
+    // Word of the first point.
     first_point: u32,
     padding: u32,
 }
@@ -18,7 +19,8 @@ struct DepthCamera {
 @group(0) @binding(0) var<uniform> camera: DepthCamera;
 // Two depths in a word, the first in the lower half.
 @group(0) @binding(1) var<storage, read> depths: array<u32>;
-@group(0) @binding(2) var<storage, read_write> points: array<vec4f>;
+// x, y, z and radius of each.
+@group(0) @binding(2) var<storage, read_write> points: array<f32>;
 
 // What no bounds hold.
 const NOWHERE: f32 = 1.0e30;
@@ -37,5 +39,7 @@ fn unproject(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_inde
         let plane = (pixel - camera.principal_px) / camera.focal_px;
         point = vec4f(plane * depth, depth, camera.radius_px * depth / camera.focal_px.x);
     }
-    points[camera.first_point + k] = point;
+    for (var c = 0u; c < 4u; c++) {
+        points[camera.first_point + 4u * k + c] = point[c];
+    }
 }

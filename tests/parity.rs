@@ -6,16 +6,16 @@
 
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
-    Backend, CameraPolicy, ContactPixel, CpuBackend, PairQuery, PairResult, Params, PointCloud,
-    Surface, View, VirtualCamera,
+    Backend, CameraPolicy, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View,
+    VirtualCamera,
 };
 use tldi_tests::{
-    HalfSpace, Samples, aimed, compare_on, gpu_backend, random_pose, random_unit, sampled_box,
-    sampled_plane, sampled_sphere,
+    Difference, HalfSpace, PARITY_RADIUS, aimed, compare_on, gpu_backend, pair_queries,
+    random_pairs, random_unit, sampled_plane, sampled_sphere,
 };
 use tldi_wgpu::{AdapterChoice, AutoBackend, Gpu, WgpuBackend, wgpu};
 
-const R: f32 = 0.02;
+const R: f32 = PARITY_RADIUS;
 
 /// As a GPU does it: with small pixels only.
 fn on_cpu(batch: &[PairQuery<'_>]) -> Vec<PairResult> {
@@ -27,98 +27,6 @@ fn by_default(batch: &[PairQuery<'_>]) -> Vec<PairResult> {
     compare_on(&mut CpuBackend::new(), batch)
 }
 
-/// A ball, a box or a sheet, with or without normals, with equal radii or not.
-fn random_cloud(rng: &mut fastrand::Rng) -> PointCloud<'static> {
-    let samples = match rng.u8(..3) {
-        0 => sampled_sphere(0.2 + 0.2 * rng.f32(), R),
-        1 => sampled_box(Vec3::new(0.2, 0.15, 0.25), R, rng),
-        _ => sampled_plane(0.5, R, rng),
-    };
-    let Samples { points, normals } = samples;
-    let radii: Vec<f32> = points.iter().map(|_| R * (0.8 + 0.4 * rng.f32())).collect();
-    let builder = PointCloud::builder(points);
-    let builder = match rng.bool() {
-        true => builder.radius(R),
-        false => builder.radii(radii),
-    };
-    let builder = match rng.bool() {
-        true => builder.normals(normals),
-        false => builder,
-    };
-    builder.build().expect("the samples are valid")
-}
-
-/// Two clouds, and the pose of the second in the frame of the first.
-type Pair = (PointCloud<'static>, PointCloud<'static>, Pose3);
-
-/// Pairs from apart to deep in each other.
-fn random_pairs(seeds: std::ops::Range<u64>) -> Vec<Pair> {
-    seeds
-        .map(|seed| {
-            let mut rng = fastrand::Rng::with_seed(seed);
-            let (a, b) = (random_cloud(&mut rng), random_cloud(&mut rng));
-            let mut pose = random_pose(&mut rng, 0.0);
-            pose.translation = 0.6 * rng.f32() * random_unit(&mut rng);
-            (a, b, pose)
-        })
-        .collect()
-}
-
-fn queries(pairs: &[Pair]) -> Vec<PairQuery<'_>> {
-    pairs
-        .iter()
-        .map(|(a, b, pose)| {
-            let (a, b) = (Surface::Cloud(a), Surface::Cloud(b));
-            aimed(a, b, *pose, Params::for_radius(R))
-        })
-        .collect()
-}
-
-/// How far two backends' results of many pairs are apart.
-#[derive(Debug, Default)]
-struct Difference {
-    pairs: usize,
-    /// Pairs whose answers to `collides`, or whose numbers of views, differ.
-    answers: usize,
-    contacts: usize,
-    /// Contact pixels that only one has, or whose gaps differ by more than 0.01 mean radii.
-    other_contacts: usize,
-    /// Greatest difference of the least gaps, in mean radii.
-    gap: f32,
-    /// Greatest angle between axes, in radians.
-    axis: f32,
-}
-
-impl Difference {
-    fn between(cpu: &[PairResult], gpu: &[PairResult]) -> Self {
-        let mut all = Self::default();
-        for (c, g) in cpu.iter().zip(gpu) {
-            all.pairs += 1;
-            if c.collides != g.collides || c.axes.len() != g.axes.len() {
-                all.answers += 1;
-                continue;
-            }
-            for (axis, other) in c.axes.iter().zip(&g.axes) {
-                all.axis = all.axis.max(axis.distance(*other));
-            }
-            if let (Some(gap), Some(other)) = (c.gap, g.gap) {
-                all.gap = all.gap.max((gap - other).abs() / R);
-            }
-            let is_like = |p: &ContactPixel, q: &ContactPixel| {
-                (p.view, p.pixel) == (q.view, q.pixel) && (p.gap - q.gap).abs() <= 0.01 * R
-            };
-            let only = |own: &[ContactPixel], other: &[ContactPixel]| {
-                let is_missing = |p: &&ContactPixel| !other.iter().any(|q| is_like(p, q));
-                own.iter().filter(is_missing).count()
-            };
-            all.contacts += c.contacts.len();
-            all.other_contacts +=
-                only(&c.contacts, &g.contacts).max(only(&g.contacts, &c.contacts));
-        }
-        all
-    }
-}
-
 /// Clouds much finer than the pixels, of which both take the same points.
 #[test]
 fn thinned_clouds_are_those_of_the_cpu() {
@@ -126,7 +34,7 @@ fn thinned_clouds_are_those_of_the_cpu() {
         return;
     };
     let pairs = random_pairs(200..220);
-    let mut batch = queries(&pairs);
+    let mut batch = pair_queries(&pairs);
     for query in &mut batch {
         // Every third point.
         query.params = Params::for_radius(5.5 * R);
@@ -143,7 +51,7 @@ fn contacts_are_those_of_the_cpu() {
         return;
     };
     let pairs = random_pairs(0..120);
-    let batch = queries(&pairs);
+    let batch = pair_queries(&pairs);
     let found = Difference::between(&on_cpu(&batch), &compare_on(&mut gpu, &batch));
     eprintln!("{found:?}");
     assert!(found.pairs == 120 && found.contacts > 10_000, "{found:?}");
@@ -217,7 +125,7 @@ fn policies_are_those_of_the_cpu() {
         CameraPolicy::LastNormal,
     ] {
         let mut rng = fastrand::Rng::with_seed(7);
-        let batch: Vec<PairQuery> = queries(&pairs)
+        let batch: Vec<PairQuery> = pair_queries(&pairs)
             .into_iter()
             .map(|query| PairQuery {
                 view: View::Aim {
@@ -247,7 +155,7 @@ fn results_are_the_same_every_time() {
         return;
     };
     let pairs = random_pairs(300..316);
-    let batch = queries(&pairs);
+    let batch = pair_queries(&pairs);
     let first = compare_on(&mut gpu, &batch);
     assert_eq!(first, compare_on(&mut gpu, &batch));
     for (query, expected) in batch.iter().zip(&first) {
@@ -356,7 +264,7 @@ fn a_lost_device_loses_nothing() {
     };
     drop(shared);
     let pairs = random_pairs(400..404);
-    let batch = queries(&pairs);
+    let batch = pair_queries(&pairs);
     let open = || Gpu::open(AdapterChoice::Any).and_then(WgpuBackend::new);
     let mut alone = open().expect("there is a device");
     let before = compare_on(&mut alone, &batch);
@@ -387,7 +295,7 @@ fn small_batches_stay_on_the_cpu() {
         return;
     };
     let pairs = random_pairs(500..502);
-    let batch = queries(&pairs);
+    let batch = pair_queries(&pairs);
     let mut auto = AutoBackend::with_gpu(gpu, 1_000_000);
     assert_eq!(by_default(&batch), compare_on(&mut auto, &batch));
     assert_eq!((auto.name(), auto.fallback()), ("cpu", None));
@@ -439,7 +347,7 @@ fn bad_queries_are_refused_as_by_the_cpu() {
         return;
     };
     let pairs = random_pairs(700..702);
-    let good = queries(&pairs);
+    let good = pair_queries(&pairs);
     let moving = |motion| View::Aim {
         policy: CameraPolicy::ContactZone,
         motion,
@@ -490,7 +398,7 @@ fn a_device_without_room_for_a_batch_takes_it_in_parts() {
         return;
     };
     let pairs = random_pairs(600..648);
-    let mut batch = queries(&pairs);
+    let mut batch = pair_queries(&pairs);
     let whole = compare_on(&mut large, &batch);
     assert_eq!(large.pairs_on_cpu(), 0);
     // Four megabytes a buffer: enough for any of these pairs, and less than all of them need.

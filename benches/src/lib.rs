@@ -5,6 +5,7 @@ pub mod args;
 pub mod charts;
 pub mod contact_quality;
 pub mod floor;
+pub mod gpu_day;
 pub mod mesh_truth;
 pub mod model;
 pub mod peers;

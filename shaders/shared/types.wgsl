@@ -160,6 +160,7 @@ struct Side {
     len: u32,
     middle: vec3f,
     flags: u32,
+    // Word of the first point's x.
     first_point: u32,
     first_normal: u32,
     // Of every n-th point: they are scaled to cover the surface.
@@ -173,6 +174,11 @@ struct Side {
     merge_steps: u32,
     // Told standard deviation of the points, metres.
     noise: f32,
+    // Words from a point to the next one, and from a coordinate to the next one; the radius is the fourth.
+    point_step: u32,
+    coordinate_step: u32,
+    padding_a: u32,
+    padding_b: u32,
 }
 
 // Bits of `Side.flags`.
@@ -299,7 +305,7 @@ const PLACE_STEPS: f32 = 65535.0;
 
 // Words of a pair in what is read back, and of a contact.
 const PAIR_WORDS: u32 = 16u;
-const CONTACT_WORDS: u32 = 16u;
+const CONTACT_WORDS: u32 = 12u;
 const CROSSINGS: u32 = 0u;
 const GAP: u32 = 1u;
 const CROWDED: u32 = 2u;

@@ -1,6 +1,7 @@
 //! One submission: upload, dispatch, read back.
 
 mod parts;
+mod results;
 
 use crate::batch_buffers::BatchBuffers;
 use crate::buffers::{Growable, most_bytes};
@@ -10,13 +11,11 @@ use crate::layout::{
     lives_on_device,
 };
 use crate::pipelines::Pipeline;
-use crate::readback::Readback;
 use crate::resident::Resident;
 use crate::sources::{DepthCamera, Sources};
 use crate::timer::Timer;
 use crate::upload::Upload;
-use crate::{Gpu, GpuError, StageTime};
-use std::sync::mpsc;
+use crate::{Gpu, GpuError, StageTime, Traffic};
 use tldi::{Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult, PatchScratch};
 
 /// Workgroups along x of a dispatch.
@@ -78,6 +77,9 @@ pub struct WgpuBackend {
     pairs_on_cpu: usize,
     /// What the last batch, or its last part, needed.
     last: Counters,
+    /// Contacts that are read back with the rest: about as many as the last batch had.
+    expected_contacts: u32,
+    traffic: Traffic,
     timer: Option<Timer>,
     times: Vec<StageTime>,
 }
@@ -89,6 +91,7 @@ impl WgpuBackend {
     /// [`GpuError::Failed`] where the device refuses a stage, [`GpuError::TooLarge`] where it
     /// allows no buffers.
     pub fn new(gpu: Gpu) -> Result<Self, GpuError> {
+        let gpu = gpu.with_own_tally();
         gpu.pipelines();
         let resident = Resident::new(&gpu)?;
         gpu.check()?;
@@ -109,6 +112,8 @@ impl WgpuBackend {
             cpu: CpuBackend::new(),
             pairs_on_cpu: 0,
             last: Counters::default(),
+            expected_contacts: results::LEAST_EXPECTED,
+            traffic: Traffic::default(),
             timer: None,
             times: Vec::new(),
         })
@@ -181,6 +186,16 @@ impl WgpuBackend {
         self.last.bytes(&self.upload)
     }
 
+    /// How many elements of each kind the last batch needed, or its last part where it was halved.
+    pub fn needed_elements(&self) -> [(&'static str, u32); 7] {
+        self.last.named()
+    }
+
+    /// What was sent and submitted for the last batch.
+    pub fn traffic(&self) -> Traffic {
+        self.traffic
+    }
+
     /// Compares the batch if at least so many points are in blocks that both sides of a pair reach;
     /// else returns `false`.
     pub(crate) fn compare_if_large(
@@ -224,13 +239,15 @@ impl WgpuBackend {
             buffers,
             bind_groups,
             timer,
+            traffic,
+            expected_contacts,
             ..
         } = self;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         sources.encode(gpu, &mut encoder, resident.points())?;
-        // Only what is counted must be zero: the counters up to the ends of pixels, the views, and
-        // what is read back of the pairs.
-        let counted = 4 * (u64::from(data.pixels_at) + 2 * u64::from(data.pixels));
+        // Only what is counted must be zero: the counters up to the tiles, the views, and what is
+        // read back of the pairs. Tiles and pixels are cleared by stages, which know how many there are.
+        let counted = 4 * u64::from(data.tiles_at);
         let pairs_found = 4 * u64::from(data.pairs) * u64::from(PAIR_WORDS);
         for (buffer, bytes) in [
             (&buffers.work, counted),
@@ -241,6 +258,7 @@ impl WgpuBackend {
             (&buffers.found, pairs_found),
         ] {
             if let Some(buffer) = buffer.get() {
+                traffic.filled += bytes;
                 encoder.clear_buffer(buffer, 0, Some(bytes));
             }
         }
@@ -259,8 +277,8 @@ impl WgpuBackend {
                 }
             };
             match stage.name {
-                "columns_touch" => return indirect(&buffers.groups, 0),
-                "alloc" | "sweep" => return indirect(&buffers.groups, 3),
+                "columns_clear" | "columns_touch" => return indirect(&buffers.groups, 0),
+                "pixels_clear" | "alloc" | "sweep" => return indirect(&buffers.groups, 3),
                 "compare" => return indirect(&buffers.groups, 6),
                 "splat" => return indirect(&buffers.splat_groups, 0),
                 _ => {}
@@ -279,6 +297,7 @@ impl WgpuBackend {
             data.cells > 0 || !pipelines[*k].stage.name.starts_with("normals")
         };
         let stages = (0..pipelines.len()).filter(needed);
+        traffic.dispatches += stages.clone().count() as u32;
         match timer {
             None => {
                 let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -293,7 +312,8 @@ impl WgpuBackend {
                 timer.resolve(&mut encoder);
             }
         }
-        let contacts = 4 * u64::from(data.contacts) * u64::from(CONTACT_WORDS);
+        let contacts = (*expected_contacts).min(data.contacts);
+        let contacts = 4 * u64::from(contacts) * u64::from(CONTACT_WORDS);
         if let (Some(work), Some(found), Some(readback)) = (
             buffers.work.get(),
             buffers.found.get(),
@@ -304,6 +324,8 @@ impl WgpuBackend {
             encoder.copy_buffer_to_buffer(found, 0, readback, counters, pairs_found + contacts);
         }
         gpu.queue.submit([encoder.finish()]);
+        traffic.submissions += 1;
+        traffic.read_back += 4 * u64::from(COUNTERS) + pairs_found + contacts;
         gpu.check()
     }
 
@@ -334,78 +356,6 @@ impl WgpuBackend {
             );
         }
         self.bound = bound;
-    }
-
-    /// Waits for the batch; fills the results if the buffers held it, and returns what it needed.
-    fn read_back(
-        &mut self,
-        batch: &[PairQuery<'_>],
-        results: &mut [PairResult],
-        left_to_cpu: &mut Vec<usize>,
-    ) -> Result<Counters, GpuError> {
-        let failed = |reason| self.gpu.failed(reason);
-        let Some(buffer) = self.buffers.readback.get() else {
-            return Err(failed("nothing was submitted".to_owned()));
-        };
-        let slice = buffer.slice(..);
-        let (mapped, answer) = mpsc::channel();
-        slice.map_async(wgpu::MapMode::Read, move |result| {
-            // Nobody listens any more after an error, which is told already.
-            mapped.send(result).unwrap_or_default();
-        });
-        self.gpu.wait()?;
-        // Whoever shares the device may have been the one to see the end of the work.
-        let outcome = answer
-            .recv_timeout(self.gpu.patience)
-            .map_err(|_| self.gpu.give_up())?;
-        self.gpu.check()?;
-        outcome.map_err(|e| failed(e.to_string()))?;
-        let view = slice
-            .get_mapped_range()
-            .map_err(|e| failed(e.to_string()))?;
-        let taken = self.take(bytemuck::cast_slice(&view), batch, results, left_to_cpu);
-        drop(view);
-        buffer.unmap();
-        let needed = taken.map_err(|reason| GpuError::BadAnswer {
-            adapter: self.gpu.adapter().to_owned(),
-            reason,
-        })?;
-        if self.capacities.holds(&needed) {
-            for &pair in &self.upload.pairs_of {
-                self.patches.reduce_pair(&mut results[pair], &batch[pair]);
-            }
-        }
-        self.last = needed;
-        self.times.clear();
-        if let Some(timer) = &mut self.timer {
-            timer.read(&self.gpu, &mut self.times)?;
-        }
-        Ok(needed)
-    }
-
-    /// Fills the results from the words that came back, if the buffers held the batch; what it
-    /// needed, or what of the words makes no sense.
-    fn take(
-        &self,
-        words: &[u32],
-        batch: &[PairQuery<'_>],
-        results: &mut [PairResult],
-        left_to_cpu: &mut Vec<usize>,
-    ) -> Result<Counters, String> {
-        let pairs_of = &self.upload.pairs_of;
-        let readback = Readback::new(words, pairs_of.len())?;
-        let needed = readback.counters();
-        if self.capacities.holds(&needed) {
-            for (k, &pair) in pairs_of.iter().enumerate() {
-                if readback.is_crowded(k) {
-                    left_to_cpu.push(pair);
-                } else {
-                    readback.fill(k, &batch[pair], &mut results[pair])?;
-                }
-            }
-            readback.fill_contacts(pairs_of, batch, results)?;
-        }
-        Ok(needed)
     }
 }
 

@@ -46,7 +46,7 @@ impl Growable {
     ) -> Result<(), GpuError> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let buffer = self.ensure(gpu, bytes.len() as u64)?;
-        gpu.queue.write_buffer(buffer, 0, bytes);
+        gpu.write(buffer, 0, bytes);
         Ok(())
     }
 }

@@ -53,6 +53,12 @@ impl Counters {
         contacts: 1 << 11,
     };
 
+    /// Each with its name.
+    pub(crate) fn named(&self) -> [(&'static str, u32); 7] {
+        let words: [u32; 7] = bytemuck::cast(*self);
+        std::array::from_fn(|k| (ELEMENT_NAMES[k], words[k]))
+    }
+
     /// What each stage that runs must read and write at least, bytes.
     pub(crate) fn bytes(&self, upload: &Upload) -> Vec<(&'static str, u64)> {
         let times = |count: u32, bytes: u64| u64::from(count) * bytes;
@@ -67,7 +73,7 @@ impl Counters {
         let entries = times(if bare { self.survivors } else { 0 }, ENTRY_BYTES);
         let normals = times(self.survivors, if bare { PLANE_BYTES } else { 12 });
         let all = [
-            ("cull", 16 * upload.points() as u64 + survivors),
+            ("cull", 12 * upload.points() as u64 + survivors),
             ("zone", 2 * survivors),
             ("normals_alloc", upload.cell_bytes()),
             ("normals_sort", survivors + entries),
@@ -75,9 +81,11 @@ impl Counters {
             ("aim", 2 * 16 * SAMPLE_SLOTS * upload.pairs.len() as u64),
             ("columns_bounds", survivors),
             ("columns_tiles", 0),
+            ("columns_clear", 3 * tiles),
             ("columns_depths", survivors + 2 * tiles),
             ("columns_touch", 3 * tiles),
             ("columns_pixels", 0),
+            ("pixels_clear", pixels / 2),
             ("normals", survivors + entries + normals),
             ("normals_sharpen", survivors + entries + 2 * normals),
             ("normals_settle", survivors + entries + 2 * normals),
@@ -115,6 +123,14 @@ impl Counters {
         most.survivors = most.survivors.min(MOST_SURVIVORS);
         most.splats = most.splats.min(MOST_SPLATS);
         most
+    }
+
+    /// The sum of each, or the largest word.
+    pub(crate) fn plus(self, other: &Self) -> Self {
+        let words = |c: Self| -> [u32; 7] { bytemuck::cast(c) };
+        let (own, other) = (words(self), words(*other));
+        let sum: [u32; 7] = std::array::from_fn(|k| own[k].saturating_add(other[k]));
+        bytemuck::cast(sum)
     }
 
     /// The lesser of each.

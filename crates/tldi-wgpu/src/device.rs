@@ -3,6 +3,7 @@
 use crate::GpuError;
 use crate::layout::stage_constants;
 use crate::pipelines::{Pipeline, pipelines};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
@@ -29,6 +30,8 @@ pub struct Gpu {
     failure: Arc<Mutex<Option<GpuError>>>,
     pub(crate) patience: Duration,
     pipelines: Arc<OnceLock<Vec<Pipeline>>>,
+    /// Bytes that were written since they were last asked for.
+    uploaded: Arc<AtomicU64>,
 }
 
 impl Gpu {
@@ -117,6 +120,7 @@ impl Gpu {
             failure,
             patience: PATIENCE,
             pipelines: Arc::default(),
+            uploaded: Arc::default(),
         }
     }
 
@@ -145,6 +149,26 @@ impl Gpu {
     #[cfg(test)]
     pub(crate) fn set_pipelines(&self, stages: Vec<Pipeline>) {
         self.pipelines.set(stages).expect("they were not asked for");
+    }
+
+    /// The same device, whose uploads are counted apart.
+    pub(crate) fn with_own_tally(self) -> Self {
+        Self {
+            uploaded: Arc::default(),
+            ..self
+        }
+    }
+
+    /// Writes `bytes` into a buffer, from byte `offset` on.
+    pub(crate) fn write(&self, buffer: &wgpu::Buffer, offset: u64, bytes: &[u8]) {
+        self.uploaded
+            .fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        self.queue.write_buffer(buffer, offset, bytes);
+    }
+
+    /// Bytes that were written since this was last asked.
+    pub(crate) fn take_uploaded(&self) -> u64 {
+        self.uploaded.swap(0, Ordering::Relaxed)
     }
 
     /// An error that says what went wrong on this device.

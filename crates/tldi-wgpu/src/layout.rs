@@ -1,6 +1,7 @@
 //! What is uploaded with every batch, with the layout of `shared/types.wgsl`.
 
 use crate::GpuError;
+use crate::resident::Place;
 use bytemuck::{Pod, Zeroable};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
 use tldi::plan::{DepthScale, PairPlan, SidePlan, ZoneGrid};
@@ -21,7 +22,7 @@ pub(crate) const SAMPLE_SLOTS: u64 = 1024;
 pub(crate) const SIDE_WORDS: u32 = 16;
 pub(crate) const VIEW_WORDS: u32 = 16;
 pub(crate) const PAIR_WORDS: u32 = 16;
-pub(crate) const CONTACT_WORDS: u32 = 16;
+pub(crate) const CONTACT_WORDS: u32 = 12;
 pub(crate) const COUNTERS: u32 = 16;
 /// Counter that is not 0 where there are more fragments than a word counts.
 pub(crate) const FRAGMENTS_WRAPPED: u32 = 8;
@@ -238,11 +239,14 @@ pub(crate) struct SideData {
     mean_radius: f32,
     merge_steps: u32,
     noise: f32,
+    point_step: u32,
+    coordinate_step: u32,
+    padding_a: u32,
+    padding_b: u32,
 }
 
 impl SideData {
-    /// One side of a pair; its points are at `first_point` of the device's, its cells at
-    /// `cell_first`.
+    /// One side of a pair; its points are at `place`, its cells at `cell_first`.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] where the stages cannot number its points or cells.
@@ -250,7 +254,7 @@ impl SideData {
         cloud: &CloudFacts,
         side: &SidePlan,
         params: &Params,
-        [first_point, first_normal]: [u32; 2],
+        place: &Place,
         cell_first: u64,
     ) -> Result<Self, GpuError> {
         let stride = plan::stride(cloud.mean_radius, params.pixel_size);
@@ -275,8 +279,8 @@ impl SideData {
             len: numbered("points", cloud.len as u64)?,
             middle: side.middle.unwrap_or(Vec3::ZERO).to_array(),
             flags,
-            first_point,
-            first_normal,
+            first_point: place.first_point,
+            first_normal: place.first_normal,
             radius_scale,
             max_radius: cloud.max_radius,
             cell_dims,
@@ -285,6 +289,10 @@ impl SideData {
             mean_radius: cloud.mean_radius,
             merge_steps: DepthScale::new(0.0, params).merge_steps(params, cloud.noise),
             noise: cloud.noise,
+            point_step: place.point_step,
+            coordinate_step: place.coordinate_step,
+            padding_a: 0,
+            padding_b: 0,
         })
     }
 
@@ -424,7 +432,7 @@ mod tests {
             flags flags, first_point first_point, first_normal first_normal,
             radius_scale radius_scale, max_radius max_radius, cell_dims cell_dims,
             cell_first cell_first, cell_inv cell_inv, mean_radius mean_radius,
-            merge_steps merge_steps, noise noise,
+            merge_steps merge_steps, noise noise, point_step point_step, coordinate_step coordinate_step,
         ]);
     }
 

@@ -17,12 +17,14 @@ mod device;
 mod error;
 mod layout;
 mod pipelines;
+mod prediction;
 mod readback;
 mod resident;
 mod sources;
 #[cfg(test)]
 mod testing;
 mod timer;
+mod traffic;
 mod upload;
 
 pub use auto::AutoBackend;
@@ -33,4 +35,5 @@ pub use device::{AdapterChoice, Gpu};
 pub use error::GpuError;
 pub use sources::DepthCamera;
 pub use timer::StageTime;
+pub use traffic::Traffic;
 pub use wgpu;

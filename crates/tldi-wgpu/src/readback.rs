@@ -49,6 +49,11 @@ impl<'a> Readback<'a> {
         counters
     }
 
+    /// Whether as many contacts came back as were counted.
+    pub(crate) fn has_all_contacts(&self) -> bool {
+        self.counters().contacts as usize <= self.contacts.len()
+    }
+
     /// Whether the `k`-th pair on the device has a pixel with too many fragments.
     pub(crate) fn is_crowded(&self, k: usize) -> bool {
         self.pairs[k][CROWDED] != 0
@@ -121,7 +126,7 @@ impl<'a> Readback<'a> {
                 View::Aim { .. } => VirtualCamera::along(*axis, query.params.pixel_size),
             };
             let number = |at: usize| f32::from_bits(words[at]);
-            all_finite((4..13).map(number))
+            all_finite((3..12).map(number))
                 .ok_or_else(|| format!("contact {at} has a place or a normal that is no number"))?;
             let vector = |at: usize| Vec3::new(number(at), number(at + 1), number(at + 2));
             let pixel = [words[1] as i32, words[2] as i32];
@@ -130,11 +135,11 @@ impl<'a> Readback<'a> {
             result.contacts.push(ContactPixel {
                 pixel,
                 view,
-                point_a: camera.point_at(u, v, number(4)),
-                point_b: camera.point_at(u, v, number(5)),
-                normal_a: frame_from_view * vector(7),
-                normal_b: frame_from_view * vector(10),
-                gap: number(6),
+                point_a: camera.point_at(u, v, number(3)),
+                point_b: camera.point_at(u, v, number(4)),
+                normal_a: frame_from_view * vector(6),
+                normal_b: frame_from_view * vector(9),
+                gap: number(5),
             });
         }
         Ok(())
@@ -208,9 +213,9 @@ mod tests {
             (CONTACT, 1, "contact 0 is in view 1 of 1"),
             (CONTACT, 3, "contact 0 is of pair 1 of 1"),
             (CONTACT, u32::MAX, "contact 0 is of pair"),
-            (CONTACT + 6, nan, "contact 0 has a place"),
+            (CONTACT + 3, nan, "contact 0 has a place"),
             (
-                CONTACT + 12,
+                CONTACT + 11,
                 f32::INFINITY.to_bits(),
                 "contact 0 has a place",
             ),

@@ -83,11 +83,45 @@ impl Pool {
     }
 }
 
+/// Where the points and normals of a cloud are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Place {
+    /// Word of the first point's x.
+    pub(crate) first_point: u32,
+    /// Normals before the first one.
+    pub(crate) first_normal: u32,
+    /// Words from a point to the next one.
+    pub(crate) point_step: u32,
+    /// Words from a coordinate to the next one. The radius, where points have their own, is the fourth.
+    pub(crate) coordinate_step: u32,
+}
+
+impl Place {
+    /// Of points that have x, y, z and radius one after the other.
+    pub(crate) fn interleaved(first_point: u32) -> Self {
+        Self {
+            first_point,
+            first_normal: 0,
+            point_step: 4,
+            coordinate_step: 1,
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Slot {
+    /// First word, and number of words.
     points: (u32, u32),
-    normals: Option<u32>,
+    /// First of the normals, and their number.
+    normals: Option<(u32, u32)>,
     used: u64,
+}
+
+impl Slot {
+    /// First word of the points, and first normal.
+    fn firsts(&self) -> (u32, u32) {
+        (self.points.0, self.normals.map_or(0, |(first, _)| first))
+    }
 }
 
 /// The clouds on the device.
@@ -103,7 +137,7 @@ pub(crate) struct Resident {
 impl Resident {
     pub(crate) fn new(gpu: &Gpu) -> Result<Self, GpuError> {
         Ok(Self {
-            points: Pool::new(gpu, "points", 16)?,
+            points: Pool::new(gpu, "points", 4)?,
             normals: Pool::new(gpu, "normals", 12)?,
             slots: HashMap::new(),
             batch: 0,
@@ -124,71 +158,77 @@ impl Resident {
         &self.normals.buffer
     }
 
-    /// First point and first normal of a cloud; uploads it if its content is new.
-    pub(crate) fn place(&mut self, gpu: &Gpu, cloud: &PointCloud) -> Result<[u32; 2], GpuError> {
+    /// Where the points of a cloud are; uploads them if its content is new. Coordinates lie as in the cloud: all x, all
+    /// y, all z, then all radii if they are not equal.
+    pub(crate) fn place(&mut self, gpu: &Gpu, cloud: &PointCloud) -> Result<Place, GpuError> {
         let id = cloud.content_id();
+        let count = numbered("points", cloud.len() as u64)?;
+        let at = |(first_point, first_normal)| Place {
+            first_point,
+            first_normal,
+            point_step: 1,
+            coordinate_step: count,
+        };
         if let Some(slot) = self.slots.get_mut(&id) {
             slot.used = self.batch;
-            return Ok([slot.points.0, slot.normals.unwrap_or(0)]);
+            return Ok(at(slot.firsts()));
         }
         let normals = cloud.normals();
-        let count = numbered("points", cloud.len() as u64)?;
-        let [first, first_normal] = self.reserve(gpu, id, count, normals.is_some())?;
+        let radii = match cloud.radii() {
+            Radii::Global(_) => None,
+            Radii::PerPoint(radii) => Some(&radii[..]),
+        };
+        let arrays = cloud.coordinates().into_iter().chain(radii);
+        let words = numbered("points", arrays.clone().count() as u64 * u64::from(count))?;
+        let normal_count = normals.map(|_| count);
+        let (first, first_normal) = self.reserve(gpu, id, words, normal_count)?;
         if let Some(normals) = normals {
             self.staging.clear();
             self.staging
                 .extend(normals.iter().flat_map(|n| n.to_array()));
             let bytes = bytemuck::cast_slice(&self.staging);
-            gpu.queue
-                .write_buffer(&self.normals.buffer, 12 * u64::from(first_normal), bytes);
+            gpu.write(&self.normals.buffer, 12 * u64::from(first_normal), bytes);
         }
-        let radius = |i: usize| match cloud.radii() {
-            Radii::Global(r) => *r,
-            Radii::PerPoint(r) => r[i],
-        };
-        let [x, y, z] = cloud.coordinates();
-        self.staging.clear();
-        self.staging
-            .extend((0..cloud.len()).flat_map(|i| [x[i], y[i], z[i], radius(i)]));
-        let bytes = bytemuck::cast_slice(&self.staging);
-        gpu.queue
-            .write_buffer(&self.points.buffer, 16 * u64::from(first), bytes);
-        Ok([first, first_normal])
+        for (k, array) in arrays.enumerate() {
+            let word = u64::from(first) + k as u64 * u64::from(count);
+            gpu.write(&self.points.buffer, 4 * word, bytemuck::cast_slice(array));
+        }
+        Ok(at((first, first_normal)))
     }
 
-    /// Room for the points of cloud `id`, and for its normals if it has any: where they are, or will
-    /// be written.
+    /// Room for the points of cloud `id`, of so many words, and for its normals if it has any: the first word and the
+    /// first normal, which are there or will be written.
     pub(crate) fn reserve(
         &mut self,
         gpu: &Gpu,
         id: u64,
-        count: u32,
-        has_normals: bool,
-    ) -> Result<[u32; 2], GpuError> {
+        words: u32,
+        normals: Option<u32>,
+    ) -> Result<(u32, u32), GpuError> {
         let known = self.slots.get_mut(&id);
-        if let Some(slot) = known.filter(|slot| slot.points.1 == count) {
+        if let Some(slot) = known.filter(|slot| slot.points.1 == words) {
             slot.used = self.batch;
-            return Ok([slot.points.0, slot.normals.unwrap_or(0)]);
+            return Ok(slot.firsts());
         }
         self.forget(id);
-        let first = self.room(gpu, count, |all| &mut all.points)?;
-        let normals = match has_normals {
-            true => match self.room(gpu, count, |all| &mut all.normals) {
-                Ok(first) => Some(first),
+        let first = self.room(gpu, words, |all| &mut all.points)?;
+        let normals = match normals {
+            Some(count) => match self.room(gpu, count, |all| &mut all.normals) {
+                Ok(first) => Some((first, count)),
                 Err(error) => {
-                    self.points.give_back(first, count);
+                    self.points.give_back(first, words);
                     return Err(error);
                 }
             },
-            false => None,
+            None => None,
         };
         let slot = Slot {
-            points: (first, count),
+            points: (first, words),
             normals,
             used: self.batch,
         };
         self.slots.insert(id, slot);
-        Ok([first, normals.unwrap_or(0)])
+        Ok(slot.firsts())
     }
 
     /// A range of `count` elements: free, else of clouds that are no longer used, else new.
@@ -222,8 +262,8 @@ impl Resident {
     fn forget(&mut self, id: u64) {
         if let Some(slot) = self.slots.remove(&id) {
             self.points.give_back(slot.points.0, slot.points.1);
-            if let Some(first) = slot.normals {
-                self.normals.give_back(first, slot.points.1);
+            if let Some((first, count)) = slot.normals {
+                self.normals.give_back(first, count);
             }
         }
     }
@@ -247,7 +287,7 @@ mod tests {
     /// beside those of its own batch is refused, and what is there stays.
     #[test]
     fn clouds_of_earlier_batches_give_their_place() {
-        // 4096 points.
+        // 5461 points.
         let Some(gpu) = testing::open_small(1 << 16) else {
             return;
         };
@@ -256,7 +296,7 @@ mod tests {
             let built = PointCloud::builder(positions).radius(1.0).build();
             built.expect("the points are valid")
         };
-        let (first, second, third) = (cloud(3000), cloud(3500), cloud(700));
+        let (first, second, third) = (cloud(3000), cloud(3500), cloud(2000));
         let mut resident = Resident::new(&gpu).expect("there is room");
         resident.begin();
         resident.place(&gpu, &first).expect("there is room");

@@ -1,7 +1,8 @@
 //! Clouds that are born on the device: in a buffer of the caller's, or from a depth image.
 
 use crate::buffers::Growable;
-use crate::resident::Resident;
+use crate::layout::numbered;
+use crate::resident::{Place, Resident};
 use crate::{Gpu, GpuError};
 use bytemuck::{Pod, Zeroable};
 use std::collections::HashMap;
@@ -9,8 +10,8 @@ use tldi::glamx::Vec3;
 use tldi::{Aabb, DeviceCloud};
 use wgpu::BufferUsages;
 
-/// Bytes of a point: x, y, z, radius.
-const POINT_BYTES: u64 = 16;
+/// Words of a point: x, y, z, radius.
+const POINT_WORDS: u64 = 4;
 
 /// A camera whose depth images become clouds, in its optical frame (x right, y down, z forward).
 ///
@@ -74,7 +75,7 @@ pub(crate) struct Sources {
     all: HashMap<u64, Source>,
     next_id: u64,
     unproject: Option<wgpu::ComputePipeline>,
-    /// Those of the current batch, and their first points.
+    /// Those of the current batch, with the first words of their points, and how many points they have.
     used: Vec<(u64, u32, u32)>,
 }
 
@@ -93,7 +94,7 @@ impl Sources {
         points: &wgpu::Buffer,
         mut cloud: DeviceCloud,
     ) -> Result<DeviceCloud, GpuError> {
-        let needed = POINT_BYTES * cloud.len as u64;
+        let needed = 4 * POINT_WORDS * cloud.len as u64;
         if points.size() < needed || !points.usage().contains(BufferUsages::COPY_SRC) {
             return Err(GpuError::BadSource {
                 reason: format!(
@@ -217,23 +218,24 @@ impl Sources {
         self.used.clear();
     }
 
-    /// First point of a cloud among the device's.
+    /// Where the points of a cloud will be.
     pub(crate) fn place(
         &mut self,
         gpu: &Gpu,
         cloud: &DeviceCloud,
         resident: &mut Resident,
-    ) -> Result<u32, GpuError> {
+    ) -> Result<Place, GpuError> {
         if !self.all.contains_key(&cloud.id) {
             return Err(GpuError::BadSource {
                 reason: format!("cloud {} is not of this backend, or was released", cloud.id),
             });
         }
-        let [first, _] = resident.reserve(gpu, cloud.id, cloud.len as u32, false)?;
+        let words = numbered("points", POINT_WORDS * cloud.len as u64)?;
+        let (first, _) = resident.reserve(gpu, cloud.id, words, None)?;
         if !self.used.iter().any(|(id, ..)| *id == cloud.id) {
             self.used.push((cloud.id, first, cloud.len as u32));
         }
-        Ok(first)
+        Ok(Place::interleaved(first))
     }
 
     /// Encodes what brings the points of the batch to their places.
@@ -246,10 +248,7 @@ impl Sources {
         for (id, first, len) in &self.used {
             match self.all.get_mut(id) {
                 Some(Source::Buffer(source)) => {
-                    let (at, bytes) = (
-                        POINT_BYTES * u64::from(*first),
-                        POINT_BYTES * u64::from(*len),
-                    );
+                    let (at, bytes) = (4 * u64::from(*first), 4 * POINT_WORDS * u64::from(*len));
                     encoder.copy_buffer_to_buffer(source, 0, points, at, bytes);
                 }
                 Some(Source::Depth {

@@ -5,6 +5,7 @@ use crate::layout::{
     BatchData, CONTACT_WORDS, COUNTERS, CloudFacts, MAX_VIEWS, PAIR_WORDS, PIXEL_BYTES, PairData,
     SIDE_WORDS, SideData, TILE_BYTES, VIEW_WORDS, is_for_device, numbered,
 };
+use crate::prediction::predicted;
 use crate::resident::Resident;
 use crate::sources::Sources;
 use crate::{Gpu, GpuError};
@@ -21,6 +22,8 @@ pub(crate) struct Upload {
     pub(crate) sides: Vec<SideData>,
     /// Side and first point of each block that may have points in reach.
     pub(crate) items: Vec<[u32; 2]>,
+    /// What the selected pairs will need, about.
+    pub(crate) predicted: Counters,
     zone_words: u64,
     cells: u64,
 }
@@ -32,6 +35,7 @@ impl Upload {
         self.pairs_of.clear();
         self.plans.clear();
         self.items.clear();
+        self.predicted = Counters::default();
         for pair in among {
             let query = &batch[pair];
             if !is_for_device(query) {
@@ -41,6 +45,7 @@ impl Upload {
                 continue;
             };
             let first_item = self.items.len();
+            let mut blocks = [0; 2];
             let is_reached = (0..2).all(|k| {
                 let side = &plan.sides[k];
                 let index = (2 * self.plans.len() + k) as u32;
@@ -62,9 +67,12 @@ impl Upload {
                     }
                     Surface::Exact(_) => {}
                 }
-                self.items.len() > before
+                blocks[k] = self.items.len() - before;
+                blocks[k] > 0
             });
             if is_reached {
+                let of_pair = predicted(query, &plan, blocks);
+                self.predicted = self.predicted.plus(&of_pair);
                 self.plans.push(plan);
                 self.pairs_of.push(pair);
             } else {
@@ -113,13 +121,13 @@ impl Upload {
             for (surface, side) in [query.a, query.b].iter().zip(&plan.sides) {
                 let place = match surface {
                     Surface::Cloud(cloud) => resident.place(gpu, cloud)?,
-                    Surface::Device(cloud) => [sources.place(gpu, cloud, resident)?, 0],
+                    Surface::Device(cloud) => sources.place(gpu, cloud, resident)?,
                     Surface::Exact(_) => continue,
                 };
                 let Some(facts) = CloudFacts::of(surface) else {
                     continue;
                 };
-                let side = SideData::new(&facts, side, &query.params, place, self.cells)?;
+                let side = SideData::new(&facts, side, &query.params, &place, self.cells)?;
                 self.cells += side.cells();
                 self.sides.push(side);
             }

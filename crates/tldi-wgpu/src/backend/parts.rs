@@ -2,8 +2,8 @@
 //! too small.
 
 use super::WgpuBackend;
-use crate::GpuError;
 use crate::layout::lives_on_device;
+use crate::{GpuError, Traffic};
 use tldi::{Backend, BackendError, PairQuery, PairResult};
 
 /// Times that a part is redone with larger buffers before that counts as a fault: every time at
@@ -43,6 +43,7 @@ impl WgpuBackend {
     ) -> Result<(), BackendError> {
         self.gpu.check()?;
         self.pairs_on_cpu = 0;
+        self.traffic = Traffic::default();
         let mut parts = vec![self.upload.pairs_of.clone()];
         while let Some(part) = parts.pop() {
             if part.is_empty() {
@@ -66,6 +67,7 @@ impl WgpuBackend {
                 }
             }
         }
+        self.traffic.uploaded = self.gpu.take_uploaded();
         self.compare_on_cpu(batch, results, left_to_cpu)
     }
 
@@ -78,6 +80,8 @@ impl WgpuBackend {
     ) -> Result<(), Stop> {
         let (resident, sources) = (&mut self.resident, &mut self.sources);
         self.upload.place(batch, &self.gpu, resident, sources)?;
+        let predicted = self.upload.predicted.min(&self.most);
+        self.capacities = self.capacities.grown(&predicted, &self.most)?;
         let mut fitting = None;
         for _ in 0..MOST_TRIES {
             if let Err(error) = self.submit() {
@@ -104,6 +108,7 @@ impl WgpuBackend {
                 return Ok(());
             }
             self.capacities = self.capacities.grown(&needed, &self.most)?;
+            self.traffic.redos += 1;
         }
         Err(self
             .gpu

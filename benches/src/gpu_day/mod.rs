@@ -1,0 +1,194 @@
+//! All that is to be known of the GPU backend on a machine, within a time budget: see `docs/gpu_day.md`.
+
+mod bodies;
+mod budget;
+mod card;
+mod correctness;
+mod floors;
+mod frames;
+mod host_costs;
+mod spread;
+mod table;
+mod workloads;
+
+pub use bodies::{Kind, Scene};
+pub use card::Card;
+pub use correctness::{Bin, Correctness, Counted, DefaultLimits, Element, Parity, Repeats};
+pub use floors::{Dispatches, Floors, Moved};
+pub use host_costs::HostCost;
+pub use spread::Spread;
+pub use table::print;
+pub use workloads::{StageTime, Workload};
+
+use crate::charts::gpu_day::draw;
+use crate::placements::{Placement, Source};
+use crate::stored::Provenance;
+use anyhow::Context;
+use budget::Budget;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use tldi::{Backend, ContactPixel, CpuBackend};
+use tldi_wgpu::{Gpu, WgpuBackend};
+use workloads::Workloads;
+
+/// Name of the results, as other benches name their rows.
+pub const KIND: &str = "gpu_day";
+
+/// How much is measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// What does not fit into so many seconds is left out.
+    pub seconds: f64,
+    /// Points of each body.
+    pub sizes: Vec<usize>,
+    /// Pairs of a batch.
+    pub batches: Vec<usize>,
+    /// Times that each is measured.
+    pub repeats: usize,
+    /// Random pairs that are compared with the CPU's.
+    pub parity_pairs: u64,
+    /// Equal batches.
+    pub equal_batches: usize,
+    /// Most bytes that are copied.
+    pub copy_bytes: u64,
+    /// Points of the bodies whose host costs are counted.
+    pub host_cost_points: usize,
+    /// Seed of everything random but the pairs of the parity, whose seeds are their numbers.
+    pub seed: u64,
+}
+
+impl Settings {
+    /// For a card: nine minutes at most.
+    pub fn full() -> Self {
+        Self {
+            seconds: 500.0,
+            sizes: vec![10_000, 100_000, 1_000_000, 5_000_000],
+            batches: vec![1, 100, 1000],
+            repeats: 20,
+            parity_pairs: 1000,
+            equal_batches: 50,
+            copy_bytes: 1_000_000_000,
+            host_cost_points: 100_000,
+            seed: 1,
+        }
+    }
+
+    /// For a driver that computes on the CPU: all parts, in about a minute.
+    pub fn small() -> Self {
+        Self {
+            sizes: vec![2_000, 10_000],
+            batches: vec![1, 10],
+            repeats: 3,
+            parity_pairs: 100,
+            equal_batches: 5,
+            copy_bytes: 16_000_000,
+            seconds: 240.0,
+            ..Self::full()
+        }
+    }
+}
+
+/// All that was measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// [`KIND`].
+    pub kind: String,
+    /// The machine and the code.
+    #[serde(flatten)]
+    pub provenance: Provenance,
+    /// How much was asked for.
+    pub settings: Settings,
+    /// How long all of it took.
+    pub seconds: f64,
+    /// What there was no time for, or what the device cannot do.
+    pub skipped: Vec<String>,
+    /// The device.
+    pub card: Card,
+    /// What it cannot do faster.
+    pub floors: Floors,
+    /// Its answers.
+    pub correctness: Correctness,
+    /// Bytes, dispatches and redos of a batch.
+    pub host_costs: Vec<HostCost>,
+    /// Times of batches.
+    pub workloads: Vec<Workload>,
+    /// Names of the files with points.
+    pub frames: Vec<String>,
+    /// What is wrong with the answers; empty where nothing is.
+    pub faults: Vec<String>,
+}
+
+impl Report {
+    /// Measures everything, and writes points of frames and pictures into `out`, if that is given.
+    ///
+    /// # Errors
+    /// Where there is no device, or it fails. Wrong answers are no error, but [`faults`](Self::faults).
+    pub fn measure(settings: Settings, out: Option<&Path>) -> anyhow::Result<Self> {
+        let mut budget = Budget::new(settings.seconds);
+        let (gpu, card) = card::open()?;
+        let floors = Floors::measure(&gpu, settings.copy_bytes, &mut budget)?;
+        let correctness = Correctness::measure(
+            &gpu,
+            settings.parity_pairs,
+            settings.equal_batches,
+            &mut budget,
+        )?;
+        let host_costs = host_costs::measure(&gpu, settings.host_cost_points, &mut budget)?;
+        let mut frames = Vec::new();
+        if let Some(out) = out
+            && budget.has_time("points of frames", 5.0)
+        {
+            let most = settings.sizes.iter().copied().filter(|n| *n <= 1_000_000);
+            let points = most.max().unwrap_or(10_000);
+            frames = frames::dump(&out.join("frames"), points, settings.seed)?;
+        }
+        let all = Workloads::new(&gpu, settings.repeats, settings.seed, floors.bandwidth())?;
+        let workloads = all.measure(&settings.sizes, &settings.batches, &mut budget)?;
+        let backend = WgpuBackend::new(gpu.clone())?;
+        let report = Self {
+            kind: KIND.to_owned(),
+            provenance: Provenance::now(Some(&backend)),
+            seconds: budget.elapsed(),
+            skipped: budget.skipped(),
+            card,
+            floors,
+            faults: correctness.faults(),
+            correctness,
+            host_costs,
+            workloads,
+            frames,
+            settings,
+        };
+        if let Some(out) = out {
+            let (contacts, radius) = contacts_of_both(gpu)?;
+            draw(&report, &contacts, radius, out)?;
+        }
+        Ok(report)
+    }
+
+    /// Writes it as JSON.
+    pub fn write(&self, path: &Path) -> anyhow::Result<()> {
+        let text = serde_json::to_string_pretty(self)?;
+        std::fs::write(path, text + "\n")
+            .with_context(|| format!("cannot write {}", path.display()))
+    }
+}
+
+/// Contact pixels of a small body in a scan on both backends, by their names, and the mean radius in metres.
+fn contacts_of_both(gpu: Gpu) -> anyhow::Result<([(&'static str, Vec<ContactPixel>); 2], f32)> {
+    let (placement, points) = (Placement::BodyOnScan, 100_000);
+    let scene = Scene::new(placement, points, Kind::Bare, 1)?;
+    let pixels = |backend: &mut dyn Backend| -> anyhow::Result<Vec<ContactPixel>> {
+        let mut results = Vec::new();
+        backend.compare(&[scene.query()], &mut results)?;
+        Ok(std::mem::take(&mut results[0].contacts))
+    };
+    let on_device = pixels(&mut WgpuBackend::new(gpu)?)?;
+    let on_cpu = pixels(&mut CpuBackend::without_first_look())?;
+    let radius = Source::Generated(points).radius(placement)?;
+    Ok(([("device", on_device), ("CPU", on_cpu)], radius))
+}
+
+#[cfg(test)]
+mod tests;

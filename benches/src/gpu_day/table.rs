@@ -1,0 +1,133 @@
+//! A run in short.
+
+#![allow(clippy::print_stdout, reason = "the table is the output")]
+
+use super::{Report, Spread};
+
+/// Prints what a reader wants to know first.
+pub fn print(report: &Report) {
+    let card = &report.card;
+    println!(
+        "{} ({}, {}, {} {}), subgroups {} to {}; stages compiled in {:.2} s, again in {:.2} s",
+        card.name,
+        card.device_type,
+        card.api,
+        card.driver,
+        card.driver_info,
+        card.subgroup_sizes[0],
+        card.subgroup_sizes[1],
+        card.compile_seconds,
+        card.compile_again_seconds
+    );
+    floors(report);
+    correctness(report);
+    println!(
+        "\n{:<14} {:>8} {:<11} {:>10} {:>10} {:>10} {:>6} {:>6}",
+        "host costs", "points", "frame", "kB up", "kB down", "kB filled", "disp.", "redos"
+    );
+    for row in &report.host_costs {
+        let kb = |bytes: u64| bytes as f64 * 1e-3;
+        println!(
+            "{:<14} {:>8} {:<11} {:>10.1} {:>10.1} {:>10.1} {:>6} {:>6}",
+            row.placement,
+            row.points,
+            row.frame,
+            kb(row.uploaded),
+            kb(row.read_back),
+            kb(row.filled),
+            row.dispatches,
+            row.redos
+        );
+    }
+    println!(
+        "\n{:<14} {:<8} {:>8} {:>6} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}",
+        "ms",
+        "kind",
+        "points",
+        "pairs",
+        "resident",
+        "p95",
+        "uploaded",
+        "p95",
+        "stages",
+        "CPU",
+        "one core"
+    );
+    for row in &report.workloads {
+        let times = row.stages.iter().filter_map(|stage| stage.ms);
+        let stages = times.fold(0.0, |sum, ms| sum + ms);
+        println!(
+            "{:<14} {:<8} {:>8} {:>6} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9} {:>9}",
+            row.placement,
+            row.kind,
+            row.points,
+            row.pairs,
+            row.resident.p50_ms,
+            row.resident.p95_ms,
+            row.uploaded.p50_ms,
+            row.uploaded.p95_ms,
+            stages,
+            optional(row.cpu),
+            optional(row.cpu_one_core)
+        );
+    }
+    for what in &report.skipped {
+        println!("skipped: {what}");
+    }
+    for fault in &report.faults {
+        println!("FAULT: {fault}");
+    }
+    println!(
+        "{:.0} s, {} skipped, {} faults",
+        report.seconds,
+        report.skipped.len(),
+        report.faults.len()
+    );
+}
+
+fn optional(spread: Option<Spread>) -> String {
+    spread.map_or("-".to_owned(), |s| format!("{:.3}", s.p50_ms))
+}
+
+fn floors(report: &Report) {
+    let floors = &report.floors;
+    for (name, all) in [
+        ("copies", &floors.copies),
+        ("uploads", &floors.uploads),
+        ("readbacks", &floors.readbacks),
+    ] {
+        let of = all.iter().map(|m| {
+            let (mb, rate) = (m.bytes as f64 * 1e-6, m.bytes_per_second * 1e-9);
+            format!("{mb} MB {rate:.2}")
+        });
+        println!("{name}, GB/s: {}", of.collect::<Vec<_>>().join(", "));
+    }
+    if let Some(submit) = floors.submit {
+        println!("submission until done: {:.1} us", submit.p50_ms * 1e3);
+    }
+    for row in &floors.dispatches {
+        println!(
+            "{} dependent dispatches: {:.1} us direct, {:.1} us indirect",
+            row.count,
+            row.direct.p50_ms * 1e3,
+            row.indirect.p50_ms * 1e3
+        );
+    }
+}
+
+fn correctness(report: &Report) {
+    let found = &report.correctness;
+    if let Some(parity) = &found.parity {
+        println!(
+            "parity: {} of {} pairs with other answers, {} of {} contact pixels differ",
+            parity.other_answers, parity.pairs, parity.other_contacts, parity.contacts
+        );
+    }
+    if let Some(repeats) = found.repeats {
+        println!("repeats: {} of {} equal", repeats.equal, repeats.runs);
+    }
+    if let Some(limits) = &found.default_limits {
+        let reason = limits.failure.as_deref().unwrap_or("");
+        println!("default limits: equal {} {reason}", limits.equal);
+    }
+}
