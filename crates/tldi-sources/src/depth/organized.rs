@@ -82,7 +82,7 @@ impl<'a> OrganizedCloud<'a> {
     /// - Radii cover the grid on surfaces up to 70° from facing the sensor; what is steeper is sampled too thinly.
     /// - Pixels that are on no surface are left out and counted: `flying`.
     ///
-    /// Cost: about 0.5 µs a pixel on one core, shared by all cores.
+    /// Cost: less than 1 µs a pixel on one core, shared by all cores.
     pub fn surface(&self, model: &SensorModel) -> DepthCloud {
         let rays: Vec<Vec3> = (self.points.iter())
             .map(|point| {
