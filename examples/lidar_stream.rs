@@ -8,9 +8,7 @@ use std::process::ExitCode;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{KdTree, PointCloud};
 use tldi_examples::cli::{Common, UpChoice};
-use tldi_examples::lidar::{
-    LidarReport, LidarScene, LidarSimulation, Scanner, Sweep, SweepSource, recipe, within,
-};
+use tldi_examples::lidar::{LidarReport, LidarScene, LidarSimulation, Scanner, Sweep, SweepSource};
 use tldi_examples::scan::positive;
 use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::NamedCloud;
@@ -151,13 +149,8 @@ fn scene(args: &Args, [first, last]: [&Sweep; 2]) -> anyhow::Result<LidarScene> 
 
 /// What a sweep sees near the scanner, in the frame of the world.
 fn near(args: &Args, sweep: &Sweep) -> anyhow::Result<PointCloud<'static>> {
-    let pose = sweep.world_from_scanner;
-    let points = within(&sweep.points, NEAR * args.range);
-    let points: Vec<Vec3> = points.iter().map(|p| pose * *p).collect();
-    PointCloud::builder(points)
-        .recipe(recipe())
-        .viewpoint(pose.translation)
-        .build()
+    (sweep.within(NEAR * args.range))
+        .cloud(sweep.world_from_scanner)
         .with_context(|| format!("sweep {} has no place for a body", sweep.name))
 }
 

@@ -79,7 +79,7 @@ pub use shape::sampling::{SampleError, sample_shape};
 pub use step::pipeline::TldiPipeline;
 pub use step::report::{Contact, StepReport};
 pub use step::resolution::Resolution;
-pub use stream::cloud_stream::{CloudStream, StreamFrame};
+pub use stream::cloud_stream::{CloudStream, SeenPoints, StreamFrame};
 pub use stream::own_points::points_on;
 pub use tldi::{
     self, CameraPolicy, CloudError, CloudRecipe, NonFinite, PointCloud, RadiusRule, RayHit,

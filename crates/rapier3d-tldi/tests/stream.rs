@@ -7,7 +7,7 @@ use common::{SPACING, square};
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
-use rapier3d_tldi::{CloudRecipe, RadiusRule, StreamFrame};
+use rapier3d_tldi::{CloudRecipe, RadiusRule, SeenPoints, StreamFrame};
 
 /// Neighbours for radii and normals, asked for once.
 const RECIPE: CloudRecipe = CloudRecipe {
@@ -43,13 +43,7 @@ fn every_frame_is_made_as_it_was_asked_for() -> TestResult {
         let sensor_from_world = world_from_sensor.inverse();
         let mut seen: Vec<Vector> = in_world.iter().map(|p| sensor_from_world * *p).collect();
         seen.push(Vector::splat(f32::NAN));
-        let taken = stream.frame(
-            &mut tldi,
-            &mut world.colliders,
-            &seen,
-            None,
-            &world_from_sensor,
-        )?;
+        let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, &world_from_sensor)?;
         let points = (n * n) as usize;
         assert_eq!(
             taken,
@@ -91,8 +85,10 @@ fn given_normals_are_turned_to_the_sensor() -> TestResult {
     stream.frame(
         &mut tldi,
         colliders,
-        &points,
-        Some(&normals),
+        SeenPoints {
+            normals: Some(&normals),
+            ..SeenPoints::from(&points)
+        },
         &world_from_sensor,
     )?;
     let cloud = cloud_of(&world, &stream);
@@ -102,8 +98,10 @@ fn given_normals_are_turned_to_the_sensor() -> TestResult {
     let refused = stream.frame(
         &mut tldi,
         &mut world.colliders,
-        &points,
-        Some(few),
+        SeenPoints {
+            normals: Some(few),
+            ..SeenPoints::from(&points)
+        },
         &world_from_sensor,
     );
     assert!(
@@ -138,14 +136,14 @@ fn an_empty_frame_holds_nothing() -> TestResult {
         tldi.contacts(&w.narrow_phase, &w.colliders).count()
     };
 
-    stream.frame(&mut tldi, &mut world.colliders, &floor(0.0), None, &sensor)?;
+    stream.frame(&mut tldi, &mut world.colliders, &floor(0.0), &sensor)?;
     settle(&mut world, &mut tldi)?;
     assert!((world.bodies[ball].translation().y - 0.1).abs() < REST_TOLERANCE);
     assert!(world.bodies[ball].is_sleeping() && contacts(&tldi, &world) > 0);
 
     let nothing = [Vector::splat(f32::NAN); 3];
     for empty in [&nothing[..0], &nothing[..]] {
-        let taken = stream.frame(&mut tldi, &mut world.colliders, empty, None, &sensor)?;
+        let taken = stream.frame(&mut tldi, &mut world.colliders, empty, &sensor)?;
         assert_eq!((taken.points, taken.dropped), (0, empty.len()));
         assert!(!world.colliders[stream.collider()].is_enabled());
         assert_eq!(cloud_of(&world, &stream).len(), 1, "no point is kept");
@@ -158,7 +156,7 @@ fn an_empty_frame_holds_nothing() -> TestResult {
     }
     // 20 steps of free fall are 0.57 m: the floor is back below it.
     assert!(world.bodies[ball].translation().y < -0.3);
-    stream.frame(&mut tldi, &mut world.colliders, &floor(-1.0), None, &sensor)?;
+    stream.frame(&mut tldi, &mut world.colliders, &floor(-1.0), &sensor)?;
     settle(&mut world, &mut tldi)?;
     assert!((world.bodies[ball].translation().y + 0.9).abs() < REST_TOLERANCE);
     Ok(())
@@ -171,7 +169,7 @@ fn a_single_point_is_taken() -> TestResult {
     let mut stream = CloudStream::new(&mut world.colliders, RECIPE)?;
     let sensor = Pose::from_translation(2.0 * Vector::Y);
     let one = [-2.0 * Vector::Y];
-    let refused = stream.frame(&mut tldi, &mut world.colliders, &one, None, &sensor);
+    let refused = stream.frame(&mut tldi, &mut world.colliders, &one[..], &sensor);
     assert!(
         matches!(
             refused,
@@ -182,9 +180,9 @@ fn a_single_point_is_taken() -> TestResult {
         ),
         "{refused:?}"
     );
-    stream.frame(&mut tldi, &mut world.colliders, &square(0.4), None, &sensor)?;
+    stream.frame(&mut tldi, &mut world.colliders, &square(0.4), &sensor)?;
     let mean = cloud_of(&world, &stream).mean_radius();
-    let taken = stream.frame(&mut tldi, &mut world.colliders, &one, None, &sensor)?;
+    let taken = stream.frame(&mut tldi, &mut world.colliders, &one[..], &sensor)?;
     assert_eq!(taken.points, 1);
     let cloud = cloud_of(&world, &stream);
     assert_eq!((cloud.len(), cloud.mean_radius()), (1, mean));
@@ -216,7 +214,7 @@ fn own_links_are_left_out_where_they_are() -> TestResult {
             seen.push(on_link);
         }
         seen.iter_mut().for_each(|p| *p -= 2.0 * Vector::Y);
-        let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, None, &sensor)?;
+        let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, &sensor)?;
         assert_eq!(
             taken,
             StreamFrame {
@@ -227,7 +225,7 @@ fn own_links_are_left_out_where_they_are() -> TestResult {
         );
     }
     world.remove_body(link);
-    let refused = stream.frame(&mut tldi, &mut world.colliders, &square(0.8), None, &sensor);
+    let refused = stream.frame(&mut tldi, &mut world.colliders, &square(0.8), &sensor);
     assert_eq!(refused, Err(TldiError::NoSuchCollider(collider)));
     Ok(())
 }
@@ -245,13 +243,7 @@ fn what_cannot_be_followed_is_refused() -> TestResult {
     ));
     let mut stream = CloudStream::new(&mut world.colliders, CloudRecipe::default())?;
     let nowhere = Pose::from_translation(Vector::new(0.0, f32::NAN, 0.0));
-    let refused = stream.frame(
-        &mut tldi,
-        &mut world.colliders,
-        &square(0.4),
-        None,
-        &nowhere,
-    );
+    let refused = stream.frame(&mut tldi, &mut world.colliders, &square(0.4), &nowhere);
     assert!(
         matches!(
             refused,
@@ -262,5 +254,53 @@ fn what_cannot_be_followed_is_refused() -> TestResult {
         ),
         "{refused:?}"
     );
+    Ok(())
+}
+
+/// Radii that a frame tells are those of its points, also where points are left out or not finite; and the recipe's again
+/// in a frame that tells none.
+#[test]
+fn radii_may_come_with_a_frame() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let link = world.colliders.insert(ColliderBuilder::ball(0.15));
+    let mut stream = CloudStream::new(&mut world.colliders, RECIPE)?.without([link], 0.0);
+    let mut points = square(0.4);
+    points[3] = Vector::NAN;
+    let radii: Vec<f32> = (0..points.len()).map(|i| 0.2 + 1e-4 * i as f32).collect();
+    let seen = SeenPoints {
+        radii: Some(&radii),
+        ..SeenPoints::from(&points)
+    };
+    let taken = stream.frame(&mut tldi, &mut world.colliders, seen, &Pose::IDENTITY)?;
+    assert!(taken.own > 0 && taken.dropped == 1);
+    let cloud = cloud_of(&world, &stream);
+    assert!(cloud.normals().is_some());
+    for (i, point) in cloud.points().enumerate() {
+        let given = points
+            .iter()
+            .position(|p| *p == point)
+            .expect("one of them");
+        assert_eq!(cloud.radius(i), radii[given]);
+    }
+    let few = SeenPoints {
+        radii: Some(&radii[1..]),
+        ..SeenPoints::from(&points)
+    };
+    let refused = stream.frame(&mut tldi, &mut world.colliders, few, &Pose::IDENTITY);
+    assert!(
+        matches!(
+            refused,
+            Err(TldiError::Cloud {
+                source: CloudError::LengthMismatch {
+                    attribute: "radii",
+                    ..
+                },
+                ..
+            })
+        ),
+        "{refused:?}"
+    );
+    stream.frame(&mut tldi, &mut world.colliders, &points, &Pose::IDENTITY)?;
+    assert!(cloud_of(&world, &stream).max_radius() < 0.1);
     Ok(())
 }

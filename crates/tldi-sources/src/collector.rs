@@ -273,6 +273,7 @@ impl Collector {
             faces: Vec::new(),
             origin: self.origin,
             viewpoint: None,
+            size: None,
         })
     }
 }

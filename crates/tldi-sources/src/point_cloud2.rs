@@ -96,7 +96,8 @@ impl PointCloud2<'_> {
     /// The fields have the same names as those of PCD files: `x`, `y`, `z`, which must be there, and
     /// `normal_x`, `normal_y`, `normal_z`, packed `rgb` or `rgba` of four bytes of any type, or `r`, `g`, `b`,
     /// `a`, and `radius`, with one value each; all others are passed over. Points that are NaN stay, as in
-    /// files: whoever builds a cloud drops and counts them.
+    /// files: whoever builds a cloud drops and counts them. Messages of several rows have a
+    /// [size](RawCloud::size).
     ///
     /// Where coordinates are `FLOAT64`, give [`ReadOptions::origin`], so that it is the same one in all
     /// messages.
@@ -132,7 +133,9 @@ impl PointCloud2<'_> {
                     .map_err(|kind| SourceError::new(kind, Position::Point(index)))?;
             }
         }
-        Ok(collector.finish()?)
+        let mut cloud = collector.finish()?;
+        cloud.size = (self.height > 1).then_some([self.width as usize, self.height as usize]);
+        Ok(cloud)
     }
 
     /// The fields that are kept.

@@ -1,5 +1,6 @@
 //! What a file holds, before it becomes a cloud.
 
+use crate::depth::OrganizedCloud;
 use std::fmt;
 use tldi::glamx::{DVec3, Vec3};
 use tldi::{CloudBuilder, PointCloud};
@@ -40,6 +41,9 @@ pub struct RawCloud {
     pub origin: DVec3,
     /// Where the sensor was, relative to `origin`, if the file tells it for all points together.
     pub viewpoint: Option<Vec3>,
+    /// Columns and rows, if the points come in several rows, one after the other: `WIDTH` and `HEIGHT` of PCD files,
+    /// `width` and `height` of messages. See [`organized`](Self::organized).
+    pub size: Option<[usize; 2]>,
 }
 
 impl RawCloud {
@@ -103,6 +107,13 @@ impl RawCloud {
         self
     }
 
+    /// The points as the frame of a sensor, if they come in rows and columns: seen from the viewpoint or, where the
+    /// file tells none, from `sensor`, which is relative to [`origin`](Self::origin). Messages of ROS are in the
+    /// frame of the sensor: zero.
+    pub fn organized(&self, sensor: Vec3) -> Option<OrganizedCloud<'_>> {
+        OrganizedCloud::new(&self.points, self.size?, self.viewpoint.unwrap_or(sensor))
+    }
+
     /// Hands points, colours, radii, normals and viewpoint to the builder of a cloud.
     ///
     /// The normals are those of the file or else, if there are faces, the
@@ -162,6 +173,7 @@ impl fmt::Debug for RawCloud {
             .field("faces", &self.faces.len())
             .field("origin", &self.origin)
             .field("viewpoint", &self.viewpoint)
+            .field("size", &self.size)
             .finish()
     }
 }

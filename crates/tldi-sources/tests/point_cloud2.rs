@@ -77,6 +77,7 @@ fn rows_fields_and_byte_orders_are_those_of_the_message() {
             .read(&options())
             .expect("sound");
         assert_eq!(cloud.points.len(), 6);
+        assert_eq!(cloud.size, Some([3, 2]));
         for (i, p) in cloud.points.iter().enumerate() {
             let k = i as f32;
             assert_eq!((p.x, p.y), (k + 0.25, -k), "{order:?}");

@@ -263,6 +263,7 @@ fn organised_pcd_keeps_its_order_and_its_holes() {
     for bytes in [&binary.bytes[..], ascii.as_bytes()] {
         let cloud = parse(bytes, Format::Pcd).expect("sound");
         assert_eq!(cloud.points.len(), 12);
+        assert_eq!(cloud.size, Some([4, 3]));
         for (i, p) in cloud.points.iter().enumerate() {
             let [x, y, z] = point(i);
             assert_eq!((p.x, p.y, p.z.is_nan()), (x, y, z.is_nan()));

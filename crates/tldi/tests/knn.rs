@@ -422,3 +422,35 @@ fn what_f32_tells_apart_is_several_points() {
         "{error:?}"
     );
 }
+
+/// Radii and normals that are asked for together are to the bit those that are asked for alone, also where a leaf of the
+/// tree spans dense and thin places.
+#[test]
+fn one_search_finds_what_two_do() {
+    let mut rng = Rng::with_seed(5);
+    let mut points: Vec<Vec3> = (0..4000)
+        .map(|i| random_vec(&mut rng) * if i % 3 == 0 { 1.0 } else { 0.01 })
+        .collect();
+    points.extend((0..40).map(|_| 100.0 * random_vec(&mut rng)));
+    points.extend(grid(20, 0.01, Vec3::X));
+    for (radius_neighbors, normal_neighbors) in [(7, 12), (24, 8), (300, 3)] {
+        let radii = || PointCloud::builder(&points).knn_radii(radius_neighbors, 0.65);
+        let both = radii()
+            .pca_normals(normal_neighbors)
+            .build()
+            .expect("valid");
+        let alone = radii().build().expect("valid");
+        assert!(both.radii() == alone.radii(), "{radius_neighbors}");
+        let normals = PointCloud::builder(&points)
+            .radius(1.0)
+            .pca_normals(normal_neighbors);
+        let normals = normals.build().expect("valid");
+        assert!(both.normals() == normals.normals(), "{normal_neighbors}");
+        for (i, point) in points.iter().enumerate().step_by(7) {
+            let radius = (brute_force_spacing(&points, *point, radius_neighbors)
+                * f64::from(0.65_f32)) as f32;
+            let cap = both.max_radius();
+            assert_eq!(both.radius(i), radius.min(cap), "{i}");
+        }
+    }
+}

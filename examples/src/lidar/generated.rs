@@ -14,7 +14,7 @@ const AZIMUTHS: usize = 1800;
 const HEIGHT: f32 = 1.73;
 /// Farthest return, metres.
 const RANGE: f32 = 80.0;
-/// Largest error of a range, metres, evenly distributed: a deviation of 1 cm.
+/// Largest error of a range, metres, evenly distributed.
 const ERROR: f32 = 0.017;
 /// Way of the car from sweep to sweep, metres: 1 m/s.
 const WAY: f32 = 0.1;
@@ -69,7 +69,10 @@ impl Scanner {
         Pose3::from_translation(Vec3::new(WAY * sweep as f32, 0.0, HEIGHT))
     }
 
-    /// The points of a sweep, in the frame of the scanner, metres.
+    /// Columns and rows of a sweep: places of a ring, and rings, the lowest first.
+    pub const SIZE: [usize; 2] = [AZIMUTHS, RINGS];
+
+    /// The points of a sweep, row by row, in the frame of the scanner, metres; NaN where there is no return.
     pub fn points(&self, sweep: usize) -> Vec<Vec3> {
         let mut rng = Rng::with_seed(self.seed ^ (sweep as u64 + 1) << 20);
         let origin = self.world_from_scanner(sweep).translation;
@@ -78,14 +81,18 @@ impl Scanner {
             let share = ring as f32 / (RINGS - 1) as f32;
             let [low, high] = ELEVATIONS.map(f32::to_radians);
             let (sin, cos) = (low + share * (high - low)).sin_cos();
-            let start = TAU * rng.f32();
+            // Rings are below each other up to the part of a column.
+            let start = rng.f32();
             for step in 0..AZIMUTHS {
-                let (y, x) = (start + TAU * step as f32 / AZIMUTHS as f32).sin_cos();
+                let (y, x) = (TAU * (start + step as f32) / AZIMUTHS as f32).sin_cos();
                 let direction = Vec3::new(cos * x, cos * y, sin);
                 let range = self.range(origin, direction);
-                if range < RANGE {
-                    points.push(direction * (range + ERROR * (2.0 * rng.f32() - 1.0)));
-                }
+                let seen = range + ERROR * (2.0 * rng.f32() - 1.0);
+                points.push(if range < RANGE {
+                    direction * seen
+                } else {
+                    Vec3::NAN
+                });
             }
         }
         points
@@ -121,9 +128,10 @@ mod tests {
         let scanner = Scanner::new(3, 5);
         let pose = scanner.world_from_scanner(2);
         let points = scanner.points(2);
-        assert!(points.len() > RINGS * AZIMUTHS / 2);
+        assert_eq!(points.len(), RINGS * AZIMUTHS);
+        let seen = points.into_iter().filter(|p| p.is_finite());
         let mut on_boxes = 0;
-        for p in points {
+        for p in seen {
             let p = pose * p;
             let off_box = |bounds: &Aabb| {
                 let [center, half] = [bounds.center(), 0.5 * bounds.extents()];

@@ -31,6 +31,8 @@ pub struct SweepReport {
     pub points: usize,
     /// Points that were not finite.
     pub dropped: usize,
+    /// Points that were left out since they are on no surface.
+    pub flying: usize,
     /// Points beyond the range.
     pub beyond: usize,
     /// Contact points in the first step with it.

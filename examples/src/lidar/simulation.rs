@@ -37,7 +37,7 @@ pub struct LidarScene {
     pub range: f32,
 }
 
-/// What is made of the points of a sweep.
+/// What is made of the points of a sweep that come in no order.
 pub fn recipe() -> CloudRecipe {
     CloudRecipe {
         radii: RadiusRule::NearestNeighbors {
@@ -103,20 +103,21 @@ impl LidarSimulation {
     /// Those of the stream and of the steps.
     pub fn take(&mut self, sweep: &Sweep) -> Result<(), TldiError> {
         let start = Instant::now();
-        let points = within(&sweep.points, self.scene.range);
+        let seen = sweep.within(self.scene.range);
         let taken = self.stream.frame(
             &mut self.tldi,
             &mut self.world.colliders,
-            &points,
-            None,
+            seen.as_points(),
             &sweep.world_from_scanner,
         )?;
         let update_ms = milliseconds(start);
+        let dropped = sweep.points.iter().filter(|p| !p.is_finite()).count();
         let mut report = SweepReport {
             name: sweep.name.clone(),
             points: taken.points,
-            dropped: taken.dropped,
-            beyond: sweep.points.len() - points.len(),
+            dropped,
+            flying: seen.flying,
+            beyond: sweep.points.len() - taken.points - dropped - seen.flying,
             contacts: 0,
             update_ms,
             step_ms: 0.0,
@@ -199,12 +200,6 @@ impl LidarSimulation {
             lost: height < -named.cloud.bounds().extents().max_element(),
         }
     }
-}
-
-/// The points up to `range` metres from the scanner, and those that are not finite.
-pub fn within(points: &[Vec3], range: f32) -> Vec<Vec3> {
-    let is_beyond = |p: &Vec3| p.length() > range;
-    points.iter().copied().filter(|p| !is_beyond(p)).collect()
 }
 
 fn milliseconds(since: Instant) -> f64 {

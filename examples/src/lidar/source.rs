@@ -2,10 +2,16 @@
 
 use super::Scanner;
 use anyhow::{Context, bail, ensure};
+use rapier3d_tldi::SeenPoints;
 use std::path::{Path, PathBuf};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
+use tldi::{CloudError, PointCloud};
+use tldi_sources::depth::{OrganizedCloud, SensorModel};
 use tldi_sources::{ReadOptions, read};
 
+/// Standard deviation of ranges, metres: what an HDL-64E is said to have at half of its reach. With half as much, noise
+/// counts as an edge here and there; with twice as much, normals are smoothed over twice as many columns.
+const DEVIATION: f32 = 0.01;
 /// Largest deviation of a pose's rotation from an orthonormal matrix: files round.
 const ROUNDING: f32 = 0.01;
 
@@ -15,8 +21,79 @@ pub struct Sweep {
     pub name: String,
     /// Points in the frame of the scanner, metres.
     pub points: Vec<Vec3>,
+    /// Columns and rows of the points, if they come in rows.
+    pub size: Option<[usize; 2]>,
     /// From the frame of the scanner into that of the world.
     pub world_from_scanner: Pose3,
+}
+
+/// What a sweep shows up to some range, in the frame of the scanner, metres.
+pub struct SeenSweep {
+    /// Points on surfaces, and those that are not finite where they come in no order.
+    pub points: Vec<Vec3>,
+    /// Normals and radii, where the points come in rows.
+    pub normals_and_radii: Option<(Vec<Vec3>, Vec<f32>)>,
+    /// Points that were left out since they are on no surface.
+    pub flying: usize,
+}
+
+impl Sweep {
+    /// The points up to `range` metres from the scanner.
+    pub fn within(&self, range: f32) -> SeenSweep {
+        let rows = self
+            .size
+            .and_then(|size| OrganizedCloud::new(&self.points, size, Vec3::ZERO));
+        if let Some(rows) = rows {
+            let seen = rows.surface(&SensorModel::time_of_flight(DEVIATION, [0.0, range]));
+            return SeenSweep {
+                points: seen.points,
+                normals_and_radii: Some((seen.normals, seen.radii)),
+                flying: seen.flying,
+            };
+        }
+        let is_beyond = |p: &Vec3| p.length() > range;
+        SeenSweep {
+            points: (self.points.iter().copied())
+                .filter(|p| !is_beyond(p))
+                .collect(),
+            normals_and_radii: None,
+            flying: 0,
+        }
+    }
+}
+
+impl SeenSweep {
+    /// For a stream.
+    pub fn as_points(&self) -> SeenPoints<'_> {
+        let told = self.normals_and_radii.as_ref();
+        SeenPoints {
+            points: &self.points,
+            normals: told.map(|(normals, _)| &normals[..]),
+            radii: told.map(|(_, radii)| &radii[..]),
+        }
+    }
+
+    /// The cloud of the points, in the frame of the world.
+    ///
+    /// # Errors
+    /// Those of the builder.
+    pub fn cloud(&self, world_from_scanner: Pose3) -> Result<PointCloud<'static>, CloudError> {
+        let points: Vec<Vec3> = self
+            .points
+            .iter()
+            .map(|p| world_from_scanner * *p)
+            .collect();
+        let mut builder = PointCloud::builder(points)
+            .recipe(super::recipe())
+            .viewpoint(world_from_scanner.translation);
+        if let Some((normals, radii)) = &self.normals_and_radii {
+            let normals = normals.iter().map(|n| world_from_scanner.rotation * *n);
+            builder = builder
+                .normals(normals.collect::<Vec<_>>())
+                .radii(radii.clone());
+        }
+        builder.build()
+    }
 }
 
 /// Sweeps in order.
@@ -109,12 +186,14 @@ impl SweepSource {
                 Ok(Sweep {
                     name: crate::load::stem(path),
                     points: read(path, &ReadOptions::default())?.points,
+                    size: None,
                     world_from_scanner: *world_from_scanner,
                 })
             }
             Self::Generated(scanner) => Ok(Sweep {
                 name: format!("{index:06}"),
                 points: scanner.points(index),
+                size: Some(Scanner::SIZE),
                 world_from_scanner: scanner.world_from_scanner(index),
             }),
         }

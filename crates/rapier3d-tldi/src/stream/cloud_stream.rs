@@ -37,7 +37,7 @@ const STAND_IN_RADIUS: f32 = 1.0;
 ///     let seen: Vec<Vector> = (0..n * n)
 ///         .map(|i| Vector::new((i % n) as f32 / n as f32 - 0.5, -2.0, (i / n) as f32 / n as f32 - 0.5))
 ///         .collect();
-///     let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, None, &world_from_sensor)?;
+///     let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, &world_from_sensor)?;
 ///     assert_eq!(taken.points, seen.len());
 ///     tldi.step(&mut world)?;
 /// }
@@ -53,7 +53,50 @@ pub struct CloudStream {
     /// Of the frame, in the frame of the collider; kept for their memory.
     points: Vec<Vector>,
     normals: Vec<Vector>,
+    radii: Vec<f32>,
     last_radius: Option<f32>,
+}
+
+/// What a sensor saw in a frame, in its own frame, metres; points alone become one by `into`.
+///
+/// What comes in rows and columns has radii and normals by its neighbours there
+/// (`tldi_sources::depth::OrganizedCloud` and `DepthCamera`), which costs less than a search for them.
+///
+/// ```
+/// use rapier3d::prelude::*;
+/// use rapier3d_tldi::{CloudRecipe, CloudStream, SeenPoints, prelude::*};
+/// let mut world = PhysicsWorld::default();
+/// let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// let mut stream = CloudStream::new(&mut world.colliders, CloudRecipe::default())?;
+/// let (points, radii) = ([Vector::Z, 1.1 * Vector::Z], [0.1, 0.11]);
+/// let seen = SeenPoints { radii: Some(&radii), ..SeenPoints::from(&points[..]) };
+/// let taken = stream.frame(&mut tldi, &mut world.colliders, seen, &Pose::IDENTITY)?;
+/// assert_eq!(taken.points, 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SeenPoints<'a> {
+    /// Positions.
+    pub points: &'a [Vector],
+    /// A normal for each point, of either sign; the recipe's where there are none.
+    pub normals: Option<&'a [Vector]>,
+    /// A radius for each point; the recipe's where there are none.
+    pub radii: Option<&'a [f32]>,
+}
+
+impl<'a> From<&'a [Vector]> for SeenPoints<'a> {
+    fn from(points: &'a [Vector]) -> Self {
+        Self {
+            points,
+            ..Self::default()
+        }
+    }
+}
+
+impl<'a> From<&'a Vec<Vector>> for SeenPoints<'a> {
+    fn from(points: &'a Vec<Vector>) -> Self {
+        Self::from(&points[..])
+    }
 }
 
 /// What became of the points of a frame. Together they are those given.
@@ -82,6 +125,7 @@ impl CloudStream {
             own_margin: 0.0,
             points: Vec::new(),
             normals: Vec::new(),
+            radii: Vec::new(),
             last_radius: None,
         })
     }
@@ -99,47 +143,47 @@ impl CloudStream {
         self.collider
     }
 
-    /// Replaces the points by those of a frame, in the frame of the sensor, in metres; call it before
-    /// the step. Normals, where given, are one for each point, in the same frame; of which sign does not
-    /// matter.
+    /// Replaces the points by those of a frame; call it before the step.
     ///
     /// Where all points are in one place and neighbours tell no radius, it is the mean one of
     /// the frame before.
     ///
-    /// Cost: a pass over the points, and what the recipe asks for. Radii and normals from neighbours take a tree
-    /// over all points: give a global radius, and no normals, where time is short. What the step
-    /// models of it is estimated there anyway, but does not know its side.
+    /// Cost: a pass over the points, and what the recipe asks for and the frame does not tell. Radii and normals from
+    /// neighbours take a tree over all points: give a global radius, and no normals, where time is short and the points
+    /// are in no order. What the step models of it is estimated there anyway, but does not know its side.
     ///
     /// # Errors
     /// [`TldiError::Cloud`] where the points are refused, or the pose is not finite;
     /// [`TldiError::NoSuchCollider`] if the collider, or one of those [without](Self::without) which
     /// the frame is taken, was removed. The collider then keeps the points of the frame before.
-    pub fn frame(
+    pub fn frame<'a>(
         &mut self,
         tldi: &mut TldiPipeline,
         colliders: &mut ColliderSet,
-        points: &[Vector],
-        normals: Option<&[Vector]>,
+        seen: impl Into<SeenPoints<'a>>,
         world_from_sensor: &Pose,
     ) -> Result<StreamFrame, TldiError> {
         let collider = self.collider;
         let refused = |source| TldiError::Cloud { collider, source };
-        check(points, normals, world_from_sensor).map_err(refused)?;
+        let seen = seen.into();
+        check(&seen, world_from_sensor).map_err(refused)?;
         let world_from_collider = get(colliders, collider)?.position();
         let collider_from_world = world_from_collider.inverse();
         let collider_from_sensor = collider_from_world * *world_from_sensor;
         self.points.clear();
         self.points
-            .extend(points.iter().map(|p| collider_from_sensor * *p));
+            .extend(seen.points.iter().map(|p| collider_from_sensor * *p));
         self.normals.clear();
         let turn = collider_from_sensor.rotation;
         self.normals
-            .extend(normals.unwrap_or_default().iter().map(|n| turn * *n));
+            .extend(seen.normals.unwrap_or_default().iter().map(|n| turn * *n));
+        self.radii.clear();
+        self.radii.extend(seen.radii.unwrap_or_default());
         self.remove_own(colliders, &collider_from_world)?;
 
-        let own = points.len() - self.points.len();
+        let own = seen.points.len() - self.points.len();
         self.recipe.viewpoint = Some(collider_from_sensor.translation);
-        let built = match self.build(normals.is_some(), self.recipe) {
+        let built = match self.build(&seen, self.recipe) {
             Err(CloudError::Empty { dropped }) => {
                 self.clear(tldi, colliders)?;
                 return Ok(StreamFrame {
@@ -153,7 +197,7 @@ impl CloudStream {
                     .last_radius
                     .map_or(self.recipe.radii, tldi::RadiusRule::Global);
                 self.build(
-                    normals.is_some(),
+                    &seen,
                     CloudRecipe {
                         radii,
                         ..self.recipe
@@ -176,7 +220,7 @@ impl CloudStream {
         Ok(taken)
     }
 
-    /// Takes what is on the own colliders out of the points and normals.
+    /// Takes what is on the own colliders out of all lists.
     fn remove_own(
         &mut self,
         colliders: &ColliderSet,
@@ -193,21 +237,24 @@ impl CloudStream {
         }
         let on = points_on(&self.points, &shapes, self.own_margin);
         for list in [&mut self.points, &mut self.normals] {
-            let mut on = on.iter();
-            list.retain(|_| !on.next().is_some_and(|on| *on));
+            remove(list, &on);
         }
+        remove(&mut self.radii, &on);
         Ok(())
     }
 
-    /// The cloud of the points.
+    /// The cloud of the points, with what was seen of them.
     fn build(
         &self,
-        with_normals: bool,
+        seen: &SeenPoints<'_>,
         recipe: CloudRecipe,
     ) -> Result<PointCloud<'static>, CloudError> {
         let mut builder = PointCloud::builder(&self.points[..]).recipe(recipe);
-        if with_normals {
+        if seen.normals.is_some() {
             builder = builder.unoriented_normals(&self.normals[..]);
+        }
+        if seen.radii.is_some() {
+            builder = builder.radii(&self.radii[..]);
         }
         Ok(builder.build()?.into_owned())
     }
@@ -239,18 +286,27 @@ fn get(
         .ok_or(TldiError::NoSuchCollider(handle))
 }
 
+/// Takes out what is marked; a list without entries stays so.
+fn remove<T>(list: &mut Vec<T>, marks: &[bool]) {
+    let mut marks = marks.iter();
+    list.retain(|_| !marks.next().is_some_and(|mark| *mark));
+}
+
 /// Checks what must hold before points are transformed.
-fn check(
-    points: &[Vector],
-    normals: Option<&[Vector]>,
-    world_from_sensor: &Pose,
-) -> Result<(), CloudError> {
-    if let Some(normals) = normals.filter(|normals| normals.len() != points.len()) {
-        return Err(CloudError::LengthMismatch {
-            attribute: "normals",
-            expected: points.len(),
-            actual: normals.len(),
-        });
+fn check(seen: &SeenPoints<'_>, world_from_sensor: &Pose) -> Result<(), CloudError> {
+    let expected = seen.points.len();
+    let lengths = [
+        ("normals", seen.normals.map(<[_]>::len)),
+        ("radii", seen.radii.map(<[_]>::len)),
+    ];
+    for (attribute, actual) in lengths {
+        if let Some(actual) = actual.filter(|actual| *actual != expected) {
+            return Err(CloudError::LengthMismatch {
+                attribute,
+                expected,
+                actual,
+            });
+        }
     }
     let translation = world_from_sensor.translation.to_array();
     let pose = translation

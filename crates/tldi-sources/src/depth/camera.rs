@@ -51,6 +51,17 @@ impl Default for SensorModel {
 }
 
 impl SensorModel {
+    /// A sensor whose error is the same at any range, as where light is timed: its standard deviation, and the
+    /// nearest and farthest range that is believed, metres.
+    pub fn time_of_flight(deviation: f32, range: [f32; 2]) -> Self {
+        Self {
+            noise: 0.0,
+            floor: deviation,
+            step: 0.0,
+            range,
+        }
+    }
+
     /// Standard deviation of the depth `z`, both in metres.
     ///
     /// ```
@@ -292,8 +303,11 @@ impl DepthCamera {
     }
 }
 
-/// One list of all rows together.
-fn gathered<T: Copy>(rows: &[DepthCloud], list: impl Fn(&DepthCloud) -> &Vec<T>) -> Vec<T> {
+/// One list of all parts together.
+pub(super) fn gathered<T: Copy>(
+    rows: &[DepthCloud],
+    list: impl Fn(&DepthCloud) -> &Vec<T>,
+) -> Vec<T> {
     let mut all = Vec::with_capacity(rows.iter().map(|row| list(row).len()).sum());
     for row in rows {
         all.extend_from_slice(list(row));

@@ -10,29 +10,29 @@ pub(super) const TILE: usize = 16;
 /// Columns of a window, and its rows, from its middle, in its spacing.
 const WINDOW: [i8; 5] = [-2, -1, 0, 1, 2];
 /// Widest spacing of a window in pixels.
-const WIDEST: usize = 10;
+pub(super) const WIDEST: usize = 10;
 /// Pixels that a window reaches to each side at most.
 pub(super) const REACH: usize = WINDOW.len() / 2 * WIDEST;
 /// Standard error of a slope, in radians, that a full window is made wide enough for. Half of its
 /// pixels leave 4°, of which nine in ten directions are within 9°.
-const SLOPE_ERROR: f32 = 0.05;
+pub(super) const SLOPE_ERROR: f32 = 0.05;
 /// Fewest pixels of a window, its middle included, that tell a plane: twice its unknowns.
-const FEWEST: f32 = 6.0;
+pub(super) const FEWEST: f32 = 6.0;
 /// Least variance of those pixels across their main direction, in squares of the spacing: fewer are a row.
-const LEAST_WIDTH: f32 = 0.1;
+pub(super) const LEAST_WIDTH: f32 = 0.1;
 /// Three standard errors of the slope of a first plane, of half of the window's pixels, over a spacing,
 /// as a part of what a single pixel may differ by.
-const ERROR_STEP: f32 = 0.2;
+pub(super) const ERROR_STEP: f32 = 0.2;
 /// Standard deviations of the difference of two pixels that a surface may show.
 pub(super) const DEVIATIONS: f32 = 3.0 * std::f32::consts::SQRT_2;
 /// Steepest surface, as the tangent of the angle between it and the image plane, that is not taken
 /// for a jump in depth (80°).
-const STEEPEST: f32 = 5.67;
+pub(super) const STEEPEST: f32 = 5.67;
 /// The same over the pixels of a window (70°): so few surfaces are steeper that pixels beyond are rather
 /// those of another one. The second fit follows what is steeper.
-const STEEPEST_IN_WINDOW: f32 = 2.75;
+pub(super) const STEEPEST_IN_WINDOW: f32 = 2.75;
 /// Radius that covers a square grid, in its spacing, with a little overlap.
-const COVER: f32 = 0.75;
+pub(super) const COVER: f32 = 0.75;
 
 /// √(x² + y²), without the care for overflow that makes `f32::hypot` slow.
 #[inline(always)]

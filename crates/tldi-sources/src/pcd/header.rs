@@ -38,6 +38,8 @@ pub(super) struct Header {
     pub(super) points: u64,
     /// Where the sensor was, unless at the default, which most files have whatever the truth.
     pub(super) viewpoint: Option<DVec3>,
+    /// Columns and rows, where there are several rows.
+    pub(super) size: Option<[usize; 2]>,
 }
 
 impl Header {
@@ -146,6 +148,7 @@ impl Parser {
             fields: Vec::new(),
             points: self.points()?,
             viewpoint: self.viewpoint,
+            size: self.size(),
         };
         // Together less than this, a record fits into the buffer.
         let mut left = BUFFER_SIZE;
@@ -167,6 +170,15 @@ impl Parser {
             });
         }
         Ok(header)
+    }
+
+    fn size(&self) -> Option<[usize; 2]> {
+        let [width, height] = [self.width?, self.height?].map(usize::try_from);
+        height
+            .ok()
+            .filter(|height| *height > 1)
+            .zip(width.ok())
+            .map(|(height, width)| [width, height])
     }
 
     fn points(&self) -> std::result::Result<u64, String> {

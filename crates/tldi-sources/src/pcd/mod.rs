@@ -38,6 +38,7 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
     cloud.viewpoint = header
         .viewpoint
         .map(|viewpoint| (viewpoint - cloud.origin).as_vec3());
+    cloud.size = header.size;
     Ok(cloud)
 }
 

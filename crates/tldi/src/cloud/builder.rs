@@ -2,13 +2,13 @@
 
 use crate::cloud::gather::{Gathered, block_bounds, non_finite_indices, without};
 use crate::cloud::morton::{morton_order, permuted};
+use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_cloud::{Spare, next_content_id};
-use crate::cloud::point_normals::{fill_from_nearest, normalize, pca_normals, turn_towards};
-use crate::cloud::radii::{check_coordinates, check_radii, knn_radii, mean_and_max};
-use crate::{Aabb, CloudError, CloudRecipe, KdTree, PointCloud, Radii, RadiusRule};
+use crate::cloud::point_normals::{fill_from_nearest, normalize, turn_towards};
+use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
+use crate::{Aabb, CloudError, CloudRecipe, PointCloud, Radii, RadiusRule};
 use glamx::Vec3;
 use std::borrow::Cow;
-use std::cell::LazyCell;
 
 /// Most points of a cloud: indices, and counts of up to 64 pixels for each point, fit 32 bits.
 const MAX_POINTS: usize = (u32::MAX / 64) as usize;
@@ -306,30 +306,31 @@ impl<'a> CloudBuilder<'a> {
                 .map_or(i, |order: &Vec<u32>| order[i] as usize);
             index_before_drop(kept, &dropped)
         };
-        let tree = LazyCell::new(|| KdTree::from_coordinates(axes));
         let radii_given = radii.is_some();
+        let found = Neighborhoods {
+            radii: recipe.radii.neighbors().filter(|_| !radii_given),
+            normals: recipe.pca_neighbors.filter(|_| normals.is_none()),
+            viewpoint: recipe.viewpoint,
+        }
+        .of(axes)?;
         let radii = match (radii, recipe.radii) {
             (Some(given), _) => Radii::PerPoint(given),
             (None, RadiusRule::Global(radius)) => Radii::Global(radius),
-            (None, RadiusRule::NearestNeighbors { k, scale }) => {
-                Radii::PerPoint(Cow::Owned(knn_radii(&tree, k, scale)?))
-            }
+            (None, RadiusRule::NearestNeighbors { .. }) => Radii::PerPoint(found.radii.into()),
         };
         check_radii(&radii, given_index)?;
         check_coordinates(axes, bounds, &radii, given_index)?;
 
         let normals_given = normals.is_some();
-        let normals = match (normals, recipe.pca_neighbors, recipe.viewpoint) {
-            (Some(given), _, Some(viewpoint)) if !outward => {
+        let normals = match (normals, recipe.viewpoint) {
+            (Some(given), Some(viewpoint)) if !outward => {
                 let mut normals = usable_normals(given, axes)?.into_owned();
                 turn_towards(viewpoint, axes, &mut normals);
                 Some(Cow::Owned(normals))
             }
-            (Some(given), _, _) => Some(usable_normals(given, axes)?),
-            (None, Some(k), viewpoint) => Some(Cow::Owned(pca_normals(&tree, k, viewpoint))),
-            (None, None, _) => None,
+            (Some(given), _) => Some(usable_normals(given, axes)?),
+            (None, _) => recipe.pca_neighbors.map(|_| Cow::Owned(found.normals)),
         };
-        drop(tree);
 
         let (mean_radius, max_radius) = mean_and_max(&radii);
         let [x, y, z] = coordinates;

@@ -3,12 +3,12 @@
 use crate::cloud::builder::{check_count, check_dropped, check_length, merged};
 use crate::cloud::gather::{Gathered, extend_without};
 use crate::cloud::morton::permuted;
-use crate::cloud::point_normals::{fill_from_nearest, normalize, pca_normals};
-use crate::cloud::radii::{check_coordinates, check_radii, knn_radii, mean_and_max};
-use crate::{Aabb, CloudBuilder, CloudError, CloudRecipe, KdTree, Positions, RadiusRule};
+use crate::cloud::neighborhoods::Neighborhoods;
+use crate::cloud::point_normals::{fill_from_nearest, normalize};
+use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
+use crate::{Aabb, CloudBuilder, CloudError, CloudRecipe, Positions, RadiusRule};
 use glamx::Vec3;
 use std::borrow::Cow;
-use std::cell::LazyCell;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Points per block: [`PointCloud::blocks`] bounds that many consecutive points each.
@@ -319,20 +319,24 @@ impl<'a> PointCloud<'a> {
         let same_points = points.len() == self.x.len() && gathered.dropped.is_empty();
         let bounds = merged(&gathered.blocks);
         let coordinates = [&*gathered.x, &*gathered.y, &*gathered.z];
-        let tree = LazyCell::new(|| KdTree::from_coordinates(coordinates));
-        let new_radii = match (&self.radii, self.recipe.radii) {
-            (Radii::PerPoint(_), _) if same_points && (moved || self.radii_given) => None,
-            (Radii::PerPoint(radii), _) if self.radii_given => {
+        let rule = match &self.radii {
+            Radii::PerPoint(_) if same_points && (moved || self.radii_given) => None,
+            Radii::PerPoint(radii) if self.radii_given => {
                 let kept = points.len() - gathered.dropped.len();
                 let same_count = points.len() == radii.len();
                 let expected = if same_count { kept } else { points.len() };
                 return check_length("radii", radii.len(), expected);
             }
-            (Radii::PerPoint(_), RadiusRule::NearestNeighbors { k, scale }) => {
-                Some(Radii::PerPoint(Cow::Owned(knn_radii(&tree, k, scale)?)))
-            }
-            (_, _) => None,
+            Radii::PerPoint(_) => self.recipe.radii.neighbors(),
+            Radii::Global(_) => None,
         };
+        let found = Neighborhoods {
+            radii: rule,
+            normals: self.recipe.pca_neighbors.filter(|_| normals.is_none()),
+            viewpoint: self.recipe.viewpoint,
+        }
+        .of(coordinates)?;
+        let new_radii = rule.map(|_| Radii::PerPoint(found.radii.into()));
         let radii = new_radii.as_ref().unwrap_or(&self.radii);
         let given_index = |i: usize| order.map_or(i, |order| order[i] as usize);
         check_radii(radii, given_index)?;
@@ -346,10 +350,9 @@ impl<'a> PointCloud<'a> {
             if !normalize(new_normals) {
                 fill_from_nearest(new_normals, coordinates)?;
             }
-        } else if let Some(k) = self.recipe.pca_neighbors {
-            *new_normals = pca_normals(&tree, k, self.recipe.viewpoint);
+        } else if self.recipe.pca_neighbors.is_some() {
+            *new_normals = found.normals;
         }
-        drop(tree);
 
         // Nothing fails from here on.
         if order.is_none() {

@@ -3,21 +3,19 @@
 use crate::{CloudError, KdTree};
 use glamx::{DMat3, DSymmetricEigen3, DVec3, Vec3};
 
-/// Unit normals of the planes that best fit each position and its `k` nearest other positions:
-/// the direction of least variance (Hoppe et al. 1992, doi:10.1145/133994.134011); for each point.
-/// With a viewpoint they point to its side of the surface, else either way. `k` is at least 2.
-pub(crate) fn pca_normals(tree: &KdTree, k: usize, viewpoint: Option<Vec3>) -> Vec<Vec3> {
-    let normals = tree.map_positions(k, |tree, position, neighbors| {
-        let origin = position.as_dvec3();
-        let offsets = neighbors
-            .iter()
-            .map(|n| tree.position(n.index).as_dvec3() - origin)
-            .chain([DVec3::ZERO]);
-        let normal = least_variance_axis(covariance(offsets));
-        let away = viewpoint.is_some_and(|v| (v.as_dvec3() - origin).dot(normal) < 0.0);
-        (if away { -normal } else { normal }).as_vec3()
-    });
-    tree.spread(&normals)
+/// Unit normal of the plane that best fits a position and its neighbours: the direction of least
+/// variance (Hoppe et al. 1992, doi:10.1145/133994.134011). With a viewpoint it points to its side of the
+/// surface, else either way.
+pub(crate) fn plane_normal(
+    position: Vec3,
+    neighbors: impl Iterator<Item = Vec3>,
+    viewpoint: Option<Vec3>,
+) -> Vec3 {
+    let origin = position.as_dvec3();
+    let offsets = neighbors.map(|neighbor| neighbor.as_dvec3() - origin);
+    let normal = least_variance_axis(covariance(offsets.chain([DVec3::ZERO])));
+    let away = viewpoint.is_some_and(|v| (v.as_dvec3() - origin).dot(normal) < 0.0);
+    (if away { -normal } else { normal }).as_vec3()
 }
 
 /// Covariance of points given by their offsets from a point near them; not divided by their

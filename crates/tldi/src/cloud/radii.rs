@@ -83,20 +83,12 @@ pub(crate) fn mean_and_max(radii: &Radii<'_>) -> (f32, f32) {
     }
 }
 
-/// `scale` × the distance to the `k`-th nearest other position (the farthest, where there are
-/// fewer; what is rounded differently is the same one), for each point; `k` is at least 1. Let m be
-/// the median of that over all distinct positions. Radii above [`CAP_PER_MEDIAN`] × m are lowered
+/// Radii that cover a surface: of those of distinct positions, from the distance to a neighbour, let m be the
+/// median. Radii above [`CAP_PER_MEDIAN`] × m are lowered
 /// to it. Radii that [`check_coordinates`] would refuse are raised to what it accepts, but not
 /// above m. So a few points that nearly coincide do not make a cloud unusable, but coordinates too
 /// large for its typical spacing do.
-pub(crate) fn knn_radii(tree: &KdTree, k: usize, scale: f32) -> Result<Vec<f32>, CloudError> {
-    if tree.distinct() < 2 {
-        return Err(CloudError::NoSpacing { count: tree.len() });
-    }
-    let mut radii = tree.map_positions(k, |_, _, neighbors| {
-        let farthest = neighbors.last().map_or(0.0, |n| n.distance_squared);
-        (f64::from(scale) * farthest.sqrt()) as f32
-    });
+pub(crate) fn covering_radii(tree: &KdTree, mut radii: Vec<f32>) -> Result<Vec<f32>, CloudError> {
     if radii.iter().all(|radius| *radius == 0.0) {
         return Err(CloudError::NoSpacing { count: tree.len() });
     }
@@ -108,5 +100,5 @@ pub(crate) fn knn_radii(tree: &KdTree, k: usize, scale: f32) -> Result<Vec<f32>,
         let floor = (largest / COORDINATE_PER_RADIUS).min(*median);
         *radius = radius.min(CAP_PER_MEDIAN * *median).max(floor);
     }
-    Ok(tree.spread(&radii))
+    Ok(radii)
 }

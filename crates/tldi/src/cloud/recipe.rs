@@ -22,6 +22,16 @@ pub enum RadiusRule {
     },
 }
 
+impl RadiusRule {
+    /// Which neighbour, and radius in units of the distance to it.
+    pub(crate) fn neighbors(&self) -> Option<(usize, f32)> {
+        match *self {
+            Self::Global(_) => None,
+            Self::NearestNeighbors { k, scale } => Some((k, scale)),
+        }
+    }
+}
+
 /// What a cloud makes of its points, as a value: a builder applies it once,
 /// [`PointCloud::set_points`](crate::PointCloud::set_points) and streams of frames to all points
 /// that come later.
