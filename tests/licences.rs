@@ -111,7 +111,6 @@ fn dependencies_are_licensed() {
             )
         })
         .collect();
-    println!("{} packages", packages.len());
     assert!(
         refused.is_empty(),
         "licences that are not allowed:\n{}",

@@ -60,7 +60,7 @@ fn accuracy() {
     let rows = measure(&mut contenders, &copies, &mesh, &sample, &truth, || ());
     let wrong = (rows[0].error_pct / 100.0 * CASES as f64).round() as usize;
     let worst = rows[0].worst_false_negative_mean_radii;
-    println!("{wrong} of {CASES} wrong, worst {worst} radii");
+    eprintln!("{wrong} of {CASES} wrong, worst {worst} radii");
     assert!((50..250).contains(&truth.iter().filter(|meets| **meets).count()));
     assert!(wrong <= MOST_WRONG, "{wrong} of {CASES}: {:?}", rows[0]);
     assert!(worst <= WORST_MISS, "{worst} radii: {:?}", rows[0]);
@@ -85,7 +85,7 @@ fn contact_accuracy() {
         depth(Regime::Deep),
     ];
     let missed: usize = rows.iter().map(|row| row.missed).sum();
-    println!(
+    eprintln!(
         "normal {}°, shallow {} r, deep {}; {missed} missed",
         errors[0], errors[1], errors[2]
     );
@@ -137,7 +137,7 @@ fn work() {
             looked.points,
             looked.pixels
         );
-        println!("{found}");
+        eprintln!("{found}");
         let exceeds = |found: usize, most: usize| found as f32 > WORK_SLACK * most as f32;
         if exceeds(looked.points, most_points) || exceeds(looked.pixels, most_pixels) {
             worse.push(found);
@@ -214,6 +214,6 @@ fn tunnelling() {
             passed.push(format!("{k}: r {radius} m, {speed} m/s, {tilt}°, to {end}"));
         }
     }
-    println!("{} of {THROWN} passed", passed.len());
+    eprintln!("{} of {THROWN} passed", passed.len());
     assert!(passed.is_empty(), "{passed:#?}");
 }

@@ -72,7 +72,7 @@ fn a_warm_step_allocates_little() -> Result<(), Box<dyn Error + Send + Sync>> {
             assert_eq!(in_contact, 9);
         }
         let mean = counts.iter().sum::<usize>() as f64 / COUNTED as f64;
-        println!("{mean} allocations a step: {counts:?}");
+        eprintln!("{mean} allocations a step: {counts:?}");
         assert!(mean <= MOST, "{mean} a step: {counts:?}");
         Ok(())
     })
