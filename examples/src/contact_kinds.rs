@@ -23,11 +23,11 @@ pub struct WorstContact {
 /// The deepest contacts, by kind; null where nothing penetrated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ContactKinds {
-    /// Between two of which neither gives way, such as a hoof on a given path and the ground: it is as
-    /// deep as the path says.
+    /// Between two things neither of which gives way, such as a hoof on a scripted path and the ground. It is as
+    /// deep as the script says.
     pub scripted: Option<WorstContact>,
-    /// Of a body that what does not give way pushes from opposite sides in the same step: there is no
-    /// room for it.
+    /// Of a body that has no room: things that do not give way push it from opposite sides in the same
+    /// step.
     pub squeezed: Option<WorstContact>,
     /// Of all others, which the solver answers for.
     pub resting: Option<WorstContact>,

@@ -67,7 +67,8 @@ fn bodies_come_to_rest_and_equal_seeds_give_equal_reports() {
     write_scene(&folder);
     let options = [&SCENE[..], &["--steps", "120"]].concat();
     let report = seeded_report(BINARY, &folder, &options, &TIMES, &[]);
-    let table = String::from_utf8(drop_in(&folder, &["--steps", "1"]).stdout).unwrap();
+    let table = String::from_utf8(drop_in(&folder, &["--steps", "1", "--animate"]).stdout).unwrap();
+    assert_pictures(&folder.join("out/drop"), &["motion.png"]);
 
     assert_eq!(
         keys(&report),

@@ -109,6 +109,33 @@ fn the_nearest_cloud_is_seen_and_shades_what_is_below() {
     assert!(darker.count() > 50);
 }
 
+/// What lies far below another surface is a faint ring, what lies just below it a dot: a contact is always between
+/// two surfaces.
+#[test]
+fn contacts_that_something_hides_are_rings() {
+    let (floor, tile) = (cloud(square(3.0)), cloud(square(0.4)));
+    let items = [
+        item(&floor, Vec3::ZERO, Paint::Scan),
+        item(&tile, 0.3 * Vec3::Z, RED),
+    ];
+    let camera = from_above();
+    let bare = scene(&items).draw(&camera, &[]);
+    let yellow = [255, 230, 40];
+    // Under the tile: on the floor, and 2 cm below the tile itself, of 30 cm of detail.
+    for (height, is_hidden) in [(0.0, true), (0.28, false)] {
+        let contact = Vec3::new(0.0, 0.0, height);
+        let picture = scene(&items).draw(&camera, &[contact]);
+        let at = seen_at(&picture, &camera, contact).expect("it is in view");
+        let under = seen_at(&bare, &camera, contact).expect("it is in view");
+        let changed = picture.rgb.iter().zip(&bare.rgb).filter(|(a, b)| a != b);
+        let (dots, rest): (Vec<_>, Vec<_>) = changed.partition(|(color, _)| **color == yellow);
+        assert_eq!(at, if is_hidden { under } else { yellow });
+        assert_eq!(dots.is_empty(), is_hidden, "{} pixels", dots.len());
+        // The ring, or the dark rim of the dot.
+        assert!(rest.len() > 8, "{} pixels", rest.len());
+    }
+}
+
 #[test]
 fn png_files_hold_the_picture() {
     let tile = cloud(square(0.4));

@@ -60,7 +60,8 @@ pub(crate) fn move_to_mid_step(
     }
 }
 
-/// The body that rolls on the other, and whether it is the second: the dynamic one, of two the lighter.
+/// The body that rolls on the other, and whether it is the second. It is the dynamic one; of two dynamic ones, the
+/// lighter.
 fn rolling_body([first, second]: [Option<&RigidBody>; 2]) -> Option<(&RigidBody, bool)> {
     let dynamic = |body: &&RigidBody| body.is_dynamic();
     match (first.filter(dynamic), second.filter(dynamic)) {

@@ -119,9 +119,8 @@ fn height<const N: usize>(points: &[Vec3]) -> Option<Height> {
     (height.value.is_finite() && height.standard_error.is_finite()).then_some(height)
 }
 
-/// How far the surface of `cloud` moved along the unit `normal` at `point` from one sampling to the
-/// last, metres, from the points that it had at the two samplings before; 0 where that cannot be told
-/// apart from noise.
+/// How far the surface of `cloud` moved in the last frame along the unit `normal` at `point`, metres. The points of the
+/// two frames before tell it. 0 if the motion does not exceed the noise.
 pub(crate) fn way_along(
     cloud: &PointCloud<'_>,
     [earlier, before]: [&Snapshot; 2],

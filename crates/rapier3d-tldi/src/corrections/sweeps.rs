@@ -30,8 +30,8 @@ pub(crate) struct SweptPair<'a> {
 }
 
 impl Batch {
-    /// The pair that is swept, and which of its colliders the first and the second shape belong to. Of targets
-    /// that share a shape (tiles) it is the one nearest to where the target is; sensors hold nothing.
+    /// The pair that is swept, and which of its colliders the first and the second shape belong to. If several targets
+    /// share a shape (tiles), it is the one nearest to the target's place. Sensors hold nothing.
     fn swept(&self, swept: &SweptPair<'_>) -> Option<(&PreparedPair, [usize; 2])> {
         let shapes = swept.shapes.map(address);
         let solid = (self.pairs.iter()).filter(|pair| pair.question != Question::Crossing);

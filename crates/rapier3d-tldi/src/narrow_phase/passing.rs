@@ -32,7 +32,7 @@ use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Passes {
-    /// Its shape, or a part of its compound, is a line or a point: a segment, a polyline, or what has no width.
+    /// Its shape, or a part of its compound, is a line or a point: a segment, a polyline, or a shape without width.
     Line,
     /// It is the skin of one of rapier's soft bodies, whose particles rapier holds up by its own tests.
     SoftBody,
@@ -63,7 +63,7 @@ fn passes(collider: &Collider) -> Option<Passes> {
     (!parts.all(has_surface)).then_some(Passes::Line)
 }
 
-/// The colliders of which it was said that they pass.
+/// The colliders that were already reported to pass.
 #[derive(Default)]
 pub(crate) struct Told {
     colliders: Vec<ColliderHandle>,
@@ -72,7 +72,7 @@ pub(crate) struct Told {
 }
 
 impl Told {
-    /// Looks for the first candidate that passes and of which nothing was said so far.
+    /// Looks for the first candidate that passes and was not reported so far.
     pub(crate) fn look_for_passing(&mut self, candidates: &[Candidate], colliders: &ColliderSet) {
         let passing = |[collider, other]: [ColliderHandle; 2]| {
             let reason = passes(colliders.get(collider)?)?;
@@ -94,7 +94,7 @@ impl Told {
         });
     }
 
-    /// What is to be said, once.
+    /// The report, once for each collider.
     pub(crate) fn take(&mut self) -> Result<(), TldiError> {
         let Some(error) = self.next.take() else {
             return Ok(());

@@ -26,8 +26,8 @@ pub(crate) struct StraightWay {
 }
 
 impl StraightWay {
-    /// Of the second part, whose pose in the frame of the first is `a_from_b`, along `way`, metres; `None` where it
-    /// leads nowhere or past.
+    /// The way of the second part along `way`, metres. `a_from_b` is its pose in the frame of the first. `None` if the way
+    /// has no length, or passes the first part.
     pub(crate) fn new(
         parts: [&dyn Shape; 2],
         a_from_b: &Pose,

@@ -203,7 +203,7 @@ impl<'a> PointCloud<'a> {
     }
 
     /// Whether [`set_points`](Self::set_points) with these points and normals would leave the cloud
-    /// as it is. `false` also where that is not sure: points were dropped, or normals made unit
+    /// as it is. `false` also if that is not sure, since points were dropped or normals made unit
     /// vectors. Cost: one pass, up to the first difference.
     ///
     /// ```

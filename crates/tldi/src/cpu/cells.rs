@@ -109,7 +109,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// Of a cell with sums `own`, as steep as fits `all` best, those of its neighbours included.
+    /// The plane of a cell with sums `own`. Its slope fits `all` best: the sums of the cell and its neighbours.
     fn of(own: &Sums, all: &Sums) -> Self {
         let [n, x, y, z, xx, xy, xz, yy, yz, zz] = *all;
         let [x, y, z] = [x, y, z].map(|sum| sum / n);

@@ -78,7 +78,7 @@ impl Survivors {
         self.further.extend_from_slice(&other.further);
     }
 
-    /// Takes those of `all` points, of a cloud that is even, that are in `region`.
+    /// Takes the points of `all` that are in `region`. The cloud is even.
     pub(crate) fn select(&mut self, all: &Self, region: &Region) {
         self.clear();
         self.stride = all.stride;
@@ -186,7 +186,7 @@ impl<'a> PointRadii<'a> {
         sum / some.len().max(1) as f32
     }
 
-    /// At least the largest: of the cloud or, where it is coarser in other places, of the culled points.
+    /// A bound of the radii of the culled points. It is theirs if the cloud is coarser elsewhere, else the cloud's.
     pub(crate) fn limit(&self, cloud: &PointCloud) -> f32 {
         let largest = match self.radii {
             Radii::PerPoint(r) if cloud.is_uneven() => {
@@ -347,7 +347,7 @@ fn cull_blocks(
     }
 }
 
-/// Leaves of the points that are in the region of the coarsest one those that are in their own.
+/// Of the points in the region of the coarsest point, keeps those that are in their own region.
 fn keep_own(uneven: &Uneven, moved: &mut Moved, first: usize, stride: usize, region: &Region) {
     for i in 0..BLOCK {
         if moved.inside[i] > 0 {

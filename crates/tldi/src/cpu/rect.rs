@@ -55,9 +55,8 @@ pub(crate) struct Footprint {
 }
 
 impl Footprint {
-    /// Leaves out depths more than `reach` metres from `middle`, where there may be any: a point that is so far from
-    /// the others does not decide what depths can be told apart. What it covers is then taken to be at the end of what
-    /// remains.
+    /// Leaves out depths more than `reach` metres from `middle`. So one point far from the others does not decide how
+    /// finely depths are told apart. Its fragments count as if they lay at the end of the depths that remain.
     pub(crate) fn limit_depths(&mut self, reach: f32, middle: impl Fn() -> f32) {
         if self.far - self.near > reach {
             let middle = middle();

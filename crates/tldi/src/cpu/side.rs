@@ -130,7 +130,7 @@ impl Side {
         (near.map(|p| p.as_dvec3()).sum::<DVec3>() / self.near.len() as f64).as_vec3()
     }
 
-    /// Mean radius in metres of the culled points or, where these do not all reach equally far, of the near ones.
+    /// Mean radius of the culled points, metres. If their reaches differ, it is that of the near points.
     pub(super) fn mean_radius(&self, cloud: &PointCloud) -> f32 {
         let radii = PointRadii::new(cloud, &self.points);
         match self.points.further.is_empty() || self.near.is_empty() {

@@ -72,8 +72,8 @@ pub struct SidePlan {
     pub frame_from_surface: Pose3,
     /// Which of its points are kept.
     pub region: Region,
-    /// Middle of its bounds in the frame of the query, if it is not the larger one of the pair: the
-    /// body, where normals do not tell the inside, reaches at least that far.
+    /// Middle of its bounds in the frame of the query, unless it is the larger one of the pair. If normals do not tell the
+    /// inside, the body reaches at least that far.
     pub middle: Option<Vec3>,
 }
 
