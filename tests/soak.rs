@@ -150,7 +150,7 @@ impl Soak {
                 .collect();
             let colliders = &mut self.world.colliders;
             self.stream
-                .frame(&mut self.tldi, colliders, &frame, None, &Pose::IDENTITY)?;
+                .frame(&mut self.tldi, colliders, &frame, &Pose::IDENTITY)?;
             if step % EVERY == 0 && step + STAYS < CYCLE {
                 let mut spread = || 1.6 * (rng.f32() - 0.5);
                 let at = Vector::new(spread(), 0.4, spread());
