@@ -29,43 +29,49 @@ pub struct ContactKinds {
     /// Of a body that has no room: things that do not give way push it from opposite sides in the same
     /// step.
     pub squeezed: Option<WorstContact>,
+    /// Of a body that what does not give way moves into, such as what comes into the view of a depth camera: it is
+    /// as deep as the way that it moved, less what the body gave way.
+    pub pushed: Option<WorstContact>,
     /// Of all others, which the solver answers for.
     pub resting: Option<WorstContact>,
 }
 
 impl ContactKinds {
-    /// Counts the contacts of a step.
+    /// Counts the contacts of a step. `moved_in` says of a contact with what does not give way whether it has moved to
+    /// where it touches.
     pub fn count(
         &mut self,
         step: usize,
         contacts: &[CloudContact],
         bodies: &RigidBodySet,
         colliders: &ColliderSet,
+        moved_in: impl Fn(&CloudContact) -> bool,
     ) {
         let gives_way = |collider: ColliderHandle| {
             let parent = colliders.get(collider).and_then(Collider::parent);
             let body = parent.and_then(|parent| bodies.get(parent));
             body.is_some_and(RigidBody::is_dynamic)
         };
-        // Bodies, and where to what does not give way pushes them.
-        let pushes: Vec<(ColliderHandle, Vec3)> = (contacts.iter())
+        // Bodies, where to what does not give way pushes them, and whether it moved there.
+        let pushes: Vec<(ColliderHandle, Vec3, bool)> = (contacts.iter())
             .filter(|contact| contact.depth > 0.0)
             .filter_map(|c| match [c.collider1, c.collider2].map(gives_way) {
-                [false, true] => Some((c.collider2, c.normal)),
-                [true, false] => Some((c.collider1, -c.normal)),
+                [false, true] => Some((c.collider2, c.normal, moved_in(c))),
+                [true, false] => Some((c.collider1, -c.normal, moved_in(c))),
                 _ => None,
             })
             .collect();
-        let is_squeezed = |body: ColliderHandle| {
-            let own = || pushes.iter().filter(|push| push.0 == body);
-            own().any(|a| own().any(|b| a.1.dot(b.1) < OPPOSED))
-        };
+        let own = |body: ColliderHandle| pushes.iter().filter(move |push| push.0 == body);
+        let is_squeezed = |body| own(body).any(|a| own(body).any(|b| a.1.dot(b.1) < OPPOSED));
+        let is_pushed = |body| own(body).any(|push| push.2);
         for contact in contacts.iter().filter(|contact| contact.depth > 0.0) {
             let pair = [contact.collider1, contact.collider2];
             let worst = if !pair.into_iter().any(gives_way) {
                 &mut self.scripted
             } else if pair.into_iter().any(is_squeezed) {
                 &mut self.squeezed
+            } else if pair.into_iter().any(is_pushed) {
+                &mut self.pushed
             } else {
                 &mut self.resting
             };
@@ -87,6 +93,7 @@ impl ContactKinds {
         let kinds = [
             ("scripted, neither gives way", self.scripted),
             ("squeezed between the two", self.squeezed),
+            ("pushed by what moves in", self.pushed),
             ("resting and others", self.resting),
         ];
         for (name, worst) in kinds {
@@ -140,9 +147,10 @@ mod tests {
         let mut kinds = ContactKinds::default();
         let on_ground = contact(ground, body, Vec3::Y, 0.01);
         let stamped = contact(ground, hoof, Vec3::Y, 0.3);
-        kinds.count(1, &[on_ground, stamped], &bodies, &colliders);
+        let still = |_: &CloudContact| false;
+        kinds.count(1, &[on_ground, stamped], &bodies, &colliders, still);
         let gap = contact(ground, body, Vec3::Y, -0.01);
-        kinds.count(2, &[gap], &bodies, &colliders);
+        kinds.count(2, &[gap], &bodies, &colliders, still);
         assert_eq!(
             (kinds.scripted, kinds.resting),
             (worst(0.3, 1), worst(0.01, 1))
@@ -150,10 +158,19 @@ mod tests {
         assert_eq!(kinds.squeezed, None);
         // The hoof comes from above: its normal leads from the hoof down into the body.
         let under_hoof = contact(hoof, body, -Vec3::Y, 0.2);
-        kinds.count(3, &[on_ground, under_hoof], &bodies, &colliders);
+        kinds.count(3, &[on_ground, under_hoof], &bodies, &colliders, still);
         assert_eq!(
             (kinds.squeezed, kinds.resting),
             (worst(0.2, 3), worst(0.01, 1))
+        );
+        assert_eq!(kinds.pushed, None);
+        // Something comes from the side: the body is not only resting, wherever it touches.
+        let from_side = contact(ground, body, Vec3::X, 0.1);
+        let comes = |c: &CloudContact| c.normal == Vec3::X;
+        kinds.count(4, &[on_ground, from_side], &bodies, &colliders, comes);
+        assert_eq!(
+            (kinds.pushed, kinds.resting),
+            (worst(0.1, 4), worst(0.01, 1))
         );
     }
 }

@@ -13,6 +13,8 @@ const FOCAL: f32 = 560.0;
 const ROOM: Vec3 = Vec3::new(2.2, 1.9, 2.5);
 /// Difference of depth, metres, from which on a pixel may mix what is before and behind.
 const JUMP: f32 = 0.05;
+/// Metres in a unit of the images.
+const UNIT: f32 = 1e-3;
 /// Radius of a hole, pixels, and how many there are.
 const HOLE: i32 = 12;
 const HOLES: usize = 60;
@@ -111,13 +113,23 @@ impl RegisteredFrames {
         }
     }
 
+    /// The same with that share of empty pixels in all, holes not counted: at least what the grid leaves out.
+    pub fn with_empty(seed: u64, share: f32) -> Self {
+        let frames = Self::new(seed);
+        let kept = frames.periods.map(|every| 1.0 - 1.0 / every as f32);
+        Self {
+            dropped: 1.0 - (1.0 - share) / (kept[0] * kept[1]),
+            ..frames
+        }
+    }
+
     /// Geometry of the camera.
     pub fn intrinsics(&self) -> Intrinsics {
         Intrinsics {
             size: SIZE,
             focal: [FOCAL; 2],
             center: SIZE.map(|n| 0.5 * n as f32 - 0.5),
-            depth_unit: self.model.step,
+            depth_unit: UNIT,
         }
     }
 
@@ -152,7 +164,7 @@ impl RegisteredFrames {
                 // Rounding is a part of the model of its own.
                 let z2 = self.model.noise * depth * depth;
                 let seen = depth + gauss * z2.hypot(self.model.floor);
-                (seen / self.model.step).round() as u16
+                ((seen / self.model.step).round() * self.model.step / UNIT).round() as u16
             })
             .collect();
         for _ in 0..HOLES {

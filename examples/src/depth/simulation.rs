@@ -30,6 +30,10 @@ const DROP: f32 = 0.08;
 const REST_SPEED: f32 = 0.03;
 const REST_FRAMES: usize = 8;
 
+/// Frames of a quarter of a second: what they saw through and is there now has moved in. With half as many a slow hand
+/// counts as still; with twice as many, what stopped moves on.
+const MOVED_FRAMES: usize = 8;
+
 /// What a simulation is made of.
 pub struct DepthScene {
     /// The camera.
@@ -67,6 +71,8 @@ pub struct DepthSimulation {
     bodies: Vec<Body>,
     memory: usize,
     remembered: VecDeque<DepthCloud>,
+    /// What the last frames saw, and from where, the newest last.
+    former: VecDeque<(DepthCamera, Pose3)>,
     frames: Vec<FrameReport>,
     totals: StepTotals,
     max_penetration: f32,
@@ -142,6 +148,7 @@ impl DepthSimulation {
             bodies,
             memory: scene.memory,
             remembered: VecDeque::new(),
+            former: VecDeque::new(),
             frames: Vec::new(),
             totals: StepTotals::new(DT),
             max_penetration: 0.0,
@@ -191,6 +198,12 @@ impl DepthSimulation {
         }
         self.totals.add_wall_seconds(start.elapsed().as_secs_f64());
         self.follow(&seen);
+        if self.former.len() == MOVED_FRAMES {
+            self.former.pop_front();
+        }
+        let camera_from_world = frame.world_from_camera.inverse();
+        self.former
+            .push_back((self.camera.clone(), camera_from_world));
         Ok(())
     }
 
@@ -251,7 +264,18 @@ impl DepthSimulation {
         let (bodies, colliders) = (&self.world.bodies, &self.world.colliders);
         let contacts = self.tldi.contacts(&self.world.narrow_phase, colliders);
         let contacts: Vec<_> = contacts.collect();
-        (self.deepest).count(self.totals.steps, &contacts, bodies, colliders);
+        let moved_in = |contact: &CloudContact| {
+            // Where the surface is: up to half the depth beyond the middle between the two.
+            let into_body = if contact.collider1 == self.surface {
+                contact.normal
+            } else {
+                -contact.normal
+            };
+            let place = contact.point + 0.5 * contact.depth * into_body;
+            let mut former = self.former.iter();
+            former.any(|(camera, from_world)| camera.sees_through(place, from_world))
+        };
+        (self.deepest).count(self.totals.steps, &contacts, bodies, colliders, moved_in);
         Ok(report.pairs_in_contact)
     }
 

@@ -163,7 +163,7 @@ impl GallopSimulation {
         let (bodies, colliders) = (&self.world.bodies, &self.world.colliders);
         let all = self.tldi.contacts(&self.world.narrow_phase, colliders);
         let all: Vec<_> = all.collect();
-        (self.deepest).count(self.totals.steps, &all, bodies, colliders);
+        (self.deepest).count(self.totals.steps, &all, bodies, colliders, |_| false);
         self.totals.add_wall_seconds(stepped.as_secs_f64());
         for body in &mut self.bodies {
             body.kicked |= contacts

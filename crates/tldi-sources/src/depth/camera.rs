@@ -5,6 +5,10 @@ use rayon::prelude::*;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{CloudBuilder, PointCloud};
 
+/// Fewest different depths of a frame that tell their common step: so many multiples of twice the step are among others
+/// less often than once in 10⁹ frames. With half as many it would be once in 60,000, with twice as many coarse frames of
+/// level surfaces would tell nothing.
+const FEWEST_DEPTHS: usize = 32;
 /// Pixels without depth around the image, so that all of its pixels have neighbours.
 const FRINGE: usize = REACH;
 
@@ -31,7 +35,7 @@ pub struct SensorModel {
     /// The part that is the same at any range, metres.
     pub floor: f32,
     /// Between one depth that the sensor tells and the next, metres. [`DepthCamera::new`] takes the
-    /// unit of the image where that is larger.
+    /// unit of the image where that is larger, and [`DepthCamera::points`] what its frame shows.
     pub step: f32,
     /// Nearest and farthest range that is believed, metres.
     pub range: [f32; 2],
@@ -155,9 +159,16 @@ impl DepthCamera {
     /// `world_from_camera` leads into. 0 and 65535 mean no measurement. Of a frame that is too short
     /// the missing pixels have none either.
     ///
+    /// Where all depths of a frame are multiples of a larger step than the model knows, it is the model's
+    /// ([`SensorModel::step`]) from this frame on: a sensor that tells whole millimetres in units of a tenth.
+    ///
     /// Cost: some 30 ns a pixel on one core with AVX-512, 35 with AVX2, 45 with neither, shared by all cores.
     /// Most of it are the normals.
     pub fn points(&mut self, frame: &[u16], world_from_camera: &Pose3) -> DepthCloud {
+        if let Some(step) = common_step(frame) {
+            let step = f32::from(step) * self.intrinsics.depth_unit;
+            self.model.step = self.model.step.max(step);
+        }
         self.take_depths(frame);
         let Intrinsics {
             size: [width, height],
@@ -300,6 +311,34 @@ impl DepthCamera {
         let (z, [u, v]) = self.pixel_of(point, camera_from_world)?;
         let seen = *self.depths.get(self.index(u, v))?;
         (seen > 0.0).then_some((z, seen))
+    }
+}
+
+/// The largest step, in units of the image, of which all differences of depths in a frame are multiples; nothing where
+/// there are too few different ones.
+fn common_step(frame: &[u16]) -> Option<u16> {
+    let mut occurs = vec![false; usize::from(u16::MAX) + 1];
+    for raw in frame {
+        occurs[usize::from(*raw)] = true;
+    }
+    let mut depths = (1..u16::MAX).filter(|raw| occurs[usize::from(*raw)]);
+    let first = depths.next()?;
+    let (mut count, mut step) = (1, 0);
+    for depth in depths {
+        count += 1;
+        step = greatest_common_divisor(depth - first, step);
+        if step == 1 {
+            return None;
+        }
+    }
+    (count >= FEWEST_DEPTHS).then_some(step)
+}
+
+fn greatest_common_divisor(a: u16, b: u16) -> u16 {
+    if b == 0 {
+        a
+    } else {
+        greatest_common_divisor(b, a % b)
     }
 }
 
@@ -457,6 +496,29 @@ mod tests {
         errors.sort_unstable_by(f32::total_cmp);
         let tenth_worst = errors[errors.len() * 9 / 10];
         assert!(tenth_worst < 15.0, "{tenth_worst}");
+    }
+
+    /// A sensor whose depths are 3 mm apart in an image of units of 0.2 mm: the step is that of the frame, and stays. Few
+    /// depths, or one that is no multiple, tell none.
+    #[test]
+    fn the_step_is_what_the_frame_shows() {
+        let mut frame = plane(Vec3::new(0.3, -0.5, -0.8).normalize(), -1.5, 1e-3);
+        for depth in &mut frame {
+            *depth = *depth / 15 * 15 + 4;
+        }
+        let mut camera = camera();
+        camera.points(&[5000; 64 * 48], &Pose3::IDENTITY);
+        let few: Vec<u16> = (0..64 * 48).map(|k| 4000 + 500 * (k % 31)).collect();
+        camera.points(&few, &Pose3::IDENTITY);
+        assert_eq!(camera.model.step, 0.0002);
+        let mut off = frame.clone();
+        off[100] += 1;
+        camera.points(&off, &Pose3::IDENTITY);
+        assert_eq!(camera.model.step, 0.0002);
+        camera.points(&frame, &Pose3::IDENTITY);
+        assert!((camera.model.step - 0.003).abs() < 1e-6);
+        camera.points(&off, &Pose3::IDENTITY);
+        assert!((camera.model.step - 0.003).abs() < 1e-6);
     }
 
     #[test]
