@@ -216,10 +216,10 @@ mod tests {
     /// Of fragments that are alike but for their places, the same one is the face in any order, and with it the bend.
     #[test]
     fn like_fragments_are_told_apart_by_their_places() {
-        let splat = |x: f32, y: f32, normal: [i16; 3]| Splat {
-            centre: [x, y],
-            normal,
-            ..Splat::default()
+        let splat = |x: f32, y: f32, normal: [i16; 3]| {
+            let mut splat = Splat::default();
+            (splat.centre, splat.normal) = ([x, y], normal);
+            splat
         };
         // Two of one face, on both sides of one of another that leans along x.
         let flat = [0, 0, -8192];
