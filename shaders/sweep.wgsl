@@ -88,7 +88,7 @@ fn normal_of(splat: u32) -> vec3i {
 }
 
 // Whether the first of two fragments is the lighter one; of like ones, the one that comes first by
-// its key and normal.
+// its key, normal and place: fragments come in any order.
 fn is_lighter(f: vec2u, g: vec2u) -> bool {
     if weight_of(f) != weight_of(g) {
         return weight_of(f) < weight_of(g);
@@ -98,10 +98,14 @@ fn is_lighter(f: vec2u, g: vec2u) -> bool {
     }
     let n = normal_of(splat_of(f));
     let m = normal_of(splat_of(g));
-    if n.x != m.x {
-        return n.x < m.x;
+    for (var k = 0u; k < 3u; k++) {
+        if n[k] != m[k] {
+            return n[k] < m[k];
+        }
     }
-    return select(n.z < m.z, n.y < m.y, n.y != m.y);
+    let c = splats[splat_of(f)].centre;
+    let d = splats[splat_of(g)].centre;
+    return select(c.y < d.y, c.x < d.x, c.x != d.x);
 }
 
 // Weighted sums over fragments: of depths above a first one 48 bits, in words of 16 and 32; of normals 44, in

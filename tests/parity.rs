@@ -44,24 +44,32 @@ fn thinned_clouds_are_those_of_the_cpu() {
     assert!(100 * all.other_contacts <= all.contacts, "{all:?}");
 }
 
-/// Whole pairs of all kinds, in one batch.
+/// Whole pairs of all kinds, in one batch; of seeds on which nothing was tuned, too.
+///
+/// Estimated normals differ by about 0.0005, since neighbours' offsets are summed in steps of 1/2047 of their distance. An
+/// axis differs by as much where one direction has most of the normals' variance. Where two have nearly as much, as at an
+/// edge of a box, it differs by as many times more as their shares are alike: of these 480 pairs two, by 0.0055 and 0.0096.
+/// What such views show is compared by the least gap.
 #[test]
 fn contacts_are_those_of_the_cpu() {
     let Some(mut gpu) = gpu_backend() else {
         return;
     };
-    let pairs = random_pairs(0..120);
-    let batch = pair_queries(&pairs);
-    let found = Difference::between(&on_cpu(&batch), &compare_on(&mut gpu, &batch));
-    eprintln!("{found:?}");
-    assert!(found.pairs == 120 && found.contacts > 10_000, "{found:?}");
-    // A swap of two surfaces within rounding of each other may be seen by one only.
-    assert!(found.answers <= 1, "{found:?}");
-    // Neighbours' offsets are summed in steps of 1/2047 of their distance: normals that are
-    // estimated differ by about 0.0005, and so does an axis, or more where it is hardly determined.
-    assert!(found.axis < 2e-3, "{found:?}");
-    assert!(found.gap < 0.05, "{found:?}");
-    assert!(found.other_contacts * 100 < found.contacts, "{found:?}");
+    for seeds in [0..120, 9000..9120, 20_000..20_120, 30_000..30_120] {
+        let pairs = random_pairs(seeds.clone());
+        let batch = pair_queries(&pairs);
+        let found = Difference::between(&on_cpu(&batch), &compare_on(&mut gpu, &batch));
+        let told = format!("{seeds:?}: {found:?}");
+        assert!(found.pairs == 120 && found.contacts > 10_000, "{told}");
+        // A swap of two surfaces within rounding of each other may be seen by one only.
+        assert!(found.answers <= 1, "{told}");
+        // Twice what was seen.
+        assert!(found.turned <= 2 && found.axis < 0.02, "{told}");
+        // Of pixels whose centre is within rounding of a splat's rim, or that one splat more or less tips to the other side
+        // of an edge. Seen: 0.15 % of the pixels, and 0.019 mean radii.
+        assert!(found.other_contacts * 100 < found.contacts, "{told}");
+        assert!(found.gap < 0.05, "{told}");
+    }
 }
 
 /// With given normals, one given view along an axis of the frame, and coordinates and pixels that

@@ -11,6 +11,14 @@ pub const PARITY_RADIUS: f32 = 0.02;
 
 const R: f32 = PARITY_RADIUS;
 
+/// Radians. A view that is turned by so much shows a place at 25 pixels from the middle of the frame, which is half the
+/// size of these clouds, 0.025 pixels further: about as many splats change their pixel.
+pub const TURNED: f32 = 1e-3;
+
+/// Contact pixels from which on the least gap of a pair is compared. With fewer, surfaces only just come within reach, and
+/// a pixel that one backend has and the other has not is a good part of what is known.
+pub const FIRM: usize = 20;
+
 /// Two clouds, and the pose of the second in the frame of the first.
 pub type RandomPair = (PointCloud<'static>, PointCloud<'static>, Pose3);
 
@@ -66,15 +74,18 @@ pub struct Difference {
     pub pairs: usize,
     /// Pairs whose answers to `collides`, or whose numbers of views, differ.
     pub answers: usize,
-    /// Contact pixels of the first backend.
+    /// Pairs of which a view is turned by more than [`TURNED`]: other pixels show the same places, so that these are not
+    /// compared one by one.
+    pub turned: usize,
+    /// Contact pixels of the first backend, but for those pairs.
     pub contacts: usize,
     /// Contact pixels that only one has, or whose gaps differ by more than 0.01 mean radii.
     pub other_contacts: usize,
-    /// Greatest difference of the least gaps, in mean radii.
+    /// Greatest difference of the least gaps, in mean radii, of pairs with at least [`FIRM`] contact pixels.
     pub gap: f32,
     /// Greatest angle between axes, in radians.
     pub axis: f32,
-    /// Of each pair with the same answer: difference of the least gaps, in mean radii, where both have one.
+    /// Of each pair with the same answer: difference of the least gaps, in mean radii, where they are compared.
     pub gaps: Vec<f32>,
     /// Of each view of these pairs: angle between the axes, in radians.
     pub axes: Vec<f32>,
@@ -99,9 +110,17 @@ impl Difference {
             return;
         }
         let axes = first.axes.iter().zip(&second.axes);
-        self.axes.extend(axes.map(|(p, q)| p.distance(*q)));
-        if let (Some(gap), Some(other)) = (first.gap, second.gap) {
+        let turns: Vec<f32> = axes.map(|(p, q)| p.distance(*q)).collect();
+        let is_turned = turns.iter().any(|turn| *turn > TURNED);
+        self.axes.extend(turns);
+        if let (Some(gap), Some(other)) = (first.gap, second.gap)
+            && first.contacts.len().min(second.contacts.len()) >= FIRM
+        {
             self.gaps.push((gap - other).abs() / R);
+        }
+        if is_turned {
+            self.turned += 1;
+            return;
         }
         let is_like = |p: &ContactPixel, q: &ContactPixel| {
             (p.view, p.pixel) == (q.view, q.pixel) && (p.gap - q.gap).abs() <= 0.01 * R

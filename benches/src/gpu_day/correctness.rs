@@ -34,6 +34,8 @@ pub struct Parity {
     pub pairs: usize,
     /// Pairs with another answer to `collides`, or another number of views.
     pub other_answers: usize,
+    /// Pairs of which a view is turned by more than a milliradian. Their contact pixels are not compared one by one.
+    pub turned: usize,
     /// Contact pixels of the CPU.
     pub contacts: usize,
     /// Of these, or of the device's, those that only one has, or whose gaps differ by more than 0.01 mean radii.
@@ -121,6 +123,7 @@ impl Correctness {
             let some = Difference::between(&on_cpu, &compared(&mut backend, &batch)?);
             all.pairs += some.pairs;
             all.answers += some.answers;
+            all.turned += some.turned;
             all.contacts += some.contacts;
             all.other_contacts += some.other_contacts;
             all.gaps.extend(some.gaps);
@@ -129,6 +132,7 @@ impl Correctness {
         found.parity = (all.pairs > 0).then(|| Parity {
             pairs: all.pairs,
             other_answers: all.answers,
+            turned: all.turned,
             contacts: all.contacts,
             other_contacts: all.other_contacts,
             gaps: histogram(&all.gaps),
@@ -170,6 +174,14 @@ impl Correctness {
     pub fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
         if let Some(parity) = &self.parity {
+            // Twice what random pairs have.
+            if parity.turned * 60 > parity.pairs {
+                let turned = parity.turned;
+                faults.push(format!(
+                    "views of {turned} of {} pairs are turned",
+                    parity.pairs
+                ));
+            }
             // Those of the parity tests, per pair and per contact pixel.
             if parity.other_answers * 50 > parity.pairs {
                 faults.push(format!(
@@ -232,7 +244,7 @@ fn histogram(values: &[f32]) -> Vec<Bin> {
 }
 
 fn counted(scene: &str, backend: &WgpuBackend) -> Counted {
-    let stored = stored_counters(include_str!("../../results/gpu_day_llvmpipe_small.json"));
+    let stored = stored_counters(include_str!("../../results/gpu_day/llvmpipe_small.json"));
     let of = |name: &str| {
         let known = stored.iter().find(|counted| counted.scene == scene)?;
         let element = known.elements.iter().find(|e| e.name == name)?;
@@ -306,6 +318,7 @@ mod tests {
             parity: Some(Parity {
                 pairs: 100,
                 other_answers: 1,
+                turned: 1,
                 contacts: 1000,
                 other_contacts: 10,
                 gaps: Vec::new(),
@@ -335,6 +348,7 @@ mod tests {
             |change: &dyn Fn(&mut Parity)| told(&|wrong| wrong.parity.iter_mut().for_each(change));
         assert!(parity(&|p| p.other_answers = 3).contains("3 of 100 pairs"));
         assert!(parity(&|p| p.other_contacts = 21).contains("21 of 1000"));
+        assert!(parity(&|p| p.turned = 2).contains("2 of 100 pairs are turned"));
         let unequal = told(&|wrong| wrong.repeats.iter_mut().for_each(|r| r.equal = 49));
         assert!(unequal.contains("1 of 50"), "{unequal}");
         let off = told(&|wrong| wrong.counters[0].elements[0].count = 10_200);

@@ -161,8 +161,8 @@ impl Report {
             settings,
         };
         if let Some(out) = out {
-            let (contacts, radius) = contacts_of_both(gpu)?;
-            draw(&report, &contacts, radius, out)?;
+            let shown = contacts_of_both(gpu)?;
+            draw(&report, &shown.contacts, shown.radius, out)?;
         }
         Ok(report)
     }
@@ -175,8 +175,16 @@ impl Report {
     }
 }
 
-/// Contact pixels of a small body in a scan on both backends, by their names, and the mean radius in metres.
-fn contacts_of_both(gpu: Gpu) -> anyhow::Result<([(&'static str, Vec<ContactPixel>); 2], f32)> {
+/// What a picture shows of both backends.
+struct Shown {
+    /// Name of the backend, and its contact pixels.
+    contacts: [(&'static str, Vec<ContactPixel>); 2],
+    /// Mean radius, metres.
+    radius: f32,
+}
+
+/// A small body in a scan on both backends.
+fn contacts_of_both(gpu: Gpu) -> anyhow::Result<Shown> {
     let (placement, points) = (Placement::BodyOnScan, 100_000);
     let scene = Scene::new(placement, points, Kind::Bare, 1)?;
     let pixels = |backend: &mut dyn Backend| -> anyhow::Result<Vec<ContactPixel>> {
@@ -187,7 +195,10 @@ fn contacts_of_both(gpu: Gpu) -> anyhow::Result<([(&'static str, Vec<ContactPixe
     let on_device = pixels(&mut WgpuBackend::new(gpu)?)?;
     let on_cpu = pixels(&mut CpuBackend::without_first_look())?;
     let radius = Source::Generated(points).radius(placement)?;
-    Ok(([("device", on_device), ("CPU", on_cpu)], radius))
+    Ok(Shown {
+        contacts: [("device", on_device), ("CPU", on_cpu)],
+        radius,
+    })
 }
 
 #[cfg(test)]

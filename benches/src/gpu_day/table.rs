@@ -119,8 +119,12 @@ fn correctness(report: &Report) {
     let found = &report.correctness;
     if let Some(parity) = &found.parity {
         println!(
-            "parity: {} of {} pairs with other answers, {} of {} contact pixels differ",
-            parity.other_answers, parity.pairs, parity.other_contacts, parity.contacts
+            "parity: {} of {} pairs with other answers, {} turned, {} of {} contact pixels differ",
+            parity.other_answers,
+            parity.pairs,
+            parity.turned,
+            parity.other_contacts,
+            parity.contacts
         );
     }
     if let Some(repeats) = found.repeats {

@@ -4,7 +4,7 @@ use super::*;
 use serde_json::Value;
 use tldi_tests::gpu_backend;
 
-const STORED: &str = include_str!("../../results/gpu_day_llvmpipe_small.json");
+const STORED: &str = include_str!("../../results/gpu_day/llvmpipe_small.json");
 
 /// Every part is there, and every number is possible.
 fn check(report: &Report) {

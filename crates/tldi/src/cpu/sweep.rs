@@ -73,10 +73,15 @@ pub(crate) fn sweep(
     }
 }
 
-/// The splat of the heaviest fragment of a run.
+/// The splat of the heaviest fragment of a run; of like ones that of the last place, whatever their order.
 fn face_of<'a>(run: &[Fragment], splats: &'a [Splat]) -> &'a Splat {
-    let normal = |f: &&Fragment| splats[f.splat as usize].normal;
-    let heaviest = run.iter().max_by_key(|f| (f.weight, f.key, normal(f)));
+    let splat = |f: &Fragment| &splats[f.splat as usize];
+    let rank = |f: &Fragment| (f.weight, f.key, splat(f).normal);
+    let place = |f: &Fragment, g: &Fragment| {
+        let [c, d] = [f, g].map(|f| splat(f).centre);
+        (c[0].total_cmp(&d[0])).then(c[1].total_cmp(&d[1]))
+    };
+    let heaviest = (run.iter()).max_by(|f, g| rank(f).cmp(&rank(g)).then(place(f, g)));
     &splats[heaviest.map_or(0, |f| f.splat) as usize]
 }
 
@@ -206,6 +211,43 @@ mod tests {
         let image = build(&cloud, &camera.view_from_frame.inverse(), &camera, params);
         let creased = |l: &&Layer| l.agreement.abs() < CREASED;
         image.layers.iter().filter(creased).copied().collect()
+    }
+
+    /// Of fragments that are alike but for their places, the same one is the face in any order, and with it the bend.
+    #[test]
+    fn like_fragments_are_told_apart_by_their_places() {
+        let splat = |x: f32, y: f32, normal: [i16; 3]| {
+            let mut splat = Splat::default();
+            (splat.centre, splat.normal) = ([x, y], normal);
+            splat
+        };
+        // Two of one face, on both sides of one of another that leans along x.
+        let flat = [0, 0, -8192];
+        let splats = [
+            splat(-1.0, 0.0, flat),
+            splat(1.0, 0.0, flat),
+            splat(0.0, 0.5, [4096, 0, -7094]),
+        ];
+        let fragment = |splat: u32, weight| Fragment {
+            key: 1 << 8,
+            splat,
+            weight,
+        };
+        let [left, right, leaning] = [fragment(0, 200), fragment(1, 200), fragment(2, 100)];
+        let orders = [
+            [left, right, leaning],
+            [right, left, leaning],
+            [leaning, right, left],
+        ];
+        let mut bends = Vec::new();
+        for run in orders {
+            let face = face_of(&run, &splats);
+            assert_eq!(face.centre, [1.0, 0.0]);
+            bends.push(sign_of_bend(&run, &splats, face));
+            // The other one would say the opposite.
+            assert_eq!(sign_of_bend(&run, &splats, &splats[0]), -bends[0]);
+        }
+        assert_eq!(bends, [bends[0]; 3]);
     }
 
     /// Seen from outside, an edge agrees less than its faces do. A groove agrees as they do: both faces touch.
