@@ -92,9 +92,18 @@ impl RawCloud {
     ///
     /// ```
     /// use tldi_sources::RawCloud;
-    /// use tldi::glamx::Vec3;
-    /// let in_millimetres = RawCloud { points: vec![Vec3::X * 1500.0], ..Default::default() };
-    /// assert_eq!(in_millimetres.scaled(0.001).points, [Vec3::X * 1.5]);
+    /// use tldi::glamx::{DVec3, Vec3};
+    /// let cloud = RawCloud {
+    ///     points: vec![Vec3::X * 100.0],
+    ///     radii: Some(vec![2.0]),
+    ///     viewpoint: Some(Vec3::Y * 4.0),
+    ///     origin: DVec3::Z * 8.0,
+    ///     ..Default::default()
+    /// };
+    /// let metres = cloud.scaled(0.25); // a unit of 25 cm
+    /// assert_eq!(metres.points, [Vec3::X * 25.0]);
+    /// assert_eq!((metres.radii, metres.viewpoint), (Some(vec![0.5]), Some(Vec3::Y)));
+    /// assert_eq!(metres.origin, DVec3::Z * 2.0);
     /// ```
     pub fn scaled(mut self, metres: f32) -> Self {
         for point in self.points.iter_mut().chain(&mut self.viewpoint) {
