@@ -175,14 +175,14 @@ fn accuracy_of_samples() {
     let page = page("docs/benchmarks.md");
     let mut wrong = Vec::new();
     let models = ["bunny_watertight", "armadillo_86k"];
-    let large = models.map(|model| stored(&format!("speed_accuracy_{model}.json")));
+    let large = models.map(|model| stored(&format!("accuracy/speed_accuracy_{model}.json")));
     Table::new(&page, "<details><summary>Two large models").check(
         &mut wrong,
         |_| true,
         |name, k| Some(of_accuracy(&large[k], name)),
     );
     let models = ["rabbit", "dilo", "octopus"];
-    let small = models.map(|model| stored(&format!("speed_accuracy_{model}.json")));
+    let small = models.map(|model| stored(&format!("accuracy/speed_accuracy_{model}.json")));
     let without_setting = |mut figures: Vec<f64>, is_exact: bool| {
         // "0, 0.02": what errs never has no false negatives to tell.
         if is_exact && figures[0] == 0.0 {
@@ -288,7 +288,7 @@ fn the_readme() {
         "{least}"
     );
     // Deep: "a third of a grid's time from 134,000 points each"; slight: "1.5 to 9 times faster".
-    let rows = stored("frames_generated.json");
+    let rows = stored("frames/frames_generated.json");
     let ratio = |points, k| {
         let of = |method| frame(&rows, Some(points), method, 1, k)[0];
         of("tldi (cpu)") / of("bit grid, culled")
@@ -315,8 +315,9 @@ fn the_readme() {
 fn frames_beside_the_grid() {
     let page = page("docs/benchmarks.md");
     let mut wrong = Vec::new();
-    let generated = stored("frames_generated.json");
-    let models = ["armadillo_86k", "bunny_watertight"].map(|m| stored(&format!("frames_{m}.json")));
+    let generated = stored("frames/frames_generated.json");
+    let models =
+        ["armadillo_86k", "bunny_watertight"].map(|m| stored(&format!("frames/frames_{m}.json")));
     Table::new(
         &page,
         "This library's time divided by that of the culled bit grid",
@@ -344,7 +345,7 @@ fn frames_beside_the_grid() {
 fn frames_of_the_bunny() {
     let page = page("docs/benchmarks.md");
     let mut wrong = Vec::new();
-    let rows = stored("frames_bunny_watertight.json");
+    let rows = stored("frames/frames_bunny_watertight.json");
     Table::new(&page, "2 × 29,834 points, ms on one thread").check(
         &mut wrong,
         |_| true,
@@ -379,7 +380,7 @@ fn frames_of_the_bunny() {
 fn frames_of_the_bumpy_ball() {
     let page = page("docs/benchmarks.md");
     let mut wrong = Vec::new();
-    let rows = stored("frames_generated.json");
+    let rows = stored("frames/frames_generated.json");
     for (shown, points) in [
         ("| 10,000 | near-miss |", 10_000),
         ("| 134,000 | near-miss |", 134_000),
@@ -424,7 +425,7 @@ fn frames_of_the_bumpy_ball() {
 fn work_of_the_bumpy_ball() {
     let page = page("docs/benchmarks.md");
     let mut wrong = Vec::new();
-    let rows = stored("frames_generated.json");
+    let rows = stored("frames/frames_generated.json");
     Table::new(&page, "`PairResult::work`").check(
         &mut wrong,
         |_| true,
