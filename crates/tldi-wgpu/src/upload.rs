@@ -200,7 +200,7 @@ mod tests {
         // 3 * 2^31 words are 2^31 modulo 2^32.
         assert_eq!(refused_buffer(&upload, with(1 << 31, 1, 1)), Some("work"));
         assert_eq!(refused_buffer(&upload, with(1, 1 << 30, 1)), Some("work"));
-        assert_eq!(refused_buffer(&upload, with(1, 1, 1 << 28)), Some("found"));
+        assert_eq!(refused_buffer(&upload, with(1, 1, 1 << 29)), Some("found"));
         let of_cells = Upload {
             cells: 1 << 31,
             ..Upload::default()
