@@ -13,8 +13,6 @@ const FOCAL: f32 = 560.0;
 const ROOM: Vec3 = Vec3::new(2.2, 1.9, 2.5);
 /// Difference of depth, metres, from which on a pixel may mix what is before and behind.
 const JUMP: f32 = 0.05;
-/// Metres in a unit of the images.
-const UNIT: f32 = 1e-3;
 /// Radius of a hole, pixels, and how many there are.
 const HOLE: i32 = 12;
 const HOLES: usize = 60;
@@ -129,7 +127,7 @@ impl RegisteredFrames {
             size: SIZE,
             focal: [FOCAL; 2],
             center: SIZE.map(|n| 0.5 * n as f32 - 0.5),
-            depth_unit: UNIT,
+            depth_unit: self.model.step,
         }
     }
 
@@ -164,7 +162,7 @@ impl RegisteredFrames {
                 // Rounding is a part of the model of its own.
                 let z2 = self.model.noise * depth * depth;
                 let seen = depth + gauss * z2.hypot(self.model.floor);
-                ((seen / self.model.step).round() * self.model.step / UNIT).round() as u16
+                (seen / self.model.step).round() as u16
             })
             .collect();
         for _ in 0..HOLES {

@@ -300,7 +300,7 @@ fn slope(window: &[Pixel; PIXELS], axis: usize, error: f32) -> Option<f32> {
         let (next, last) = (at(1), at(2));
         let bend = middle - 2.0 * next.inverse + last.inverse;
         let is_straight = next.is_seen && last.is_seen && bend.abs() <= BEND * error;
-        is_straight.then(|| 0.5 * sign as f32 * (last.inverse - middle))
+        is_straight.then_some(0.5 * sign as f32 * (last.inverse - middle))
     };
     match (side(-1), side(1)) {
         (Some(before), Some(behind)) => Some(0.5 * (before + behind)),
