@@ -24,5 +24,6 @@ pub mod simulation;
 pub mod spots;
 pub mod step_totals;
 pub mod surface_sampling;
+pub mod terrain;
 pub mod up;
 pub mod viewpoint;
