@@ -11,9 +11,11 @@ use tldi_examples::cli::{Common, Triple};
 use tldi_examples::output;
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::robot::{
-    BUILT_IN, Base, DT, Description, RobotScene, RobotSimulation, RobotSnapshot,
+    BUILT_IN, Base, DT, Description, Motion, RobotScene, RobotSimulation, RobotSnapshot, Walk,
+    quadruped,
 };
 use tldi_examples::scan::{ScanSource, choose_up, load_scan};
+use tldi_examples::terrain::{Ground, Terrain};
 use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, thinned, viewpoint};
 
 /// A robot whose links are point clouds moves in a scan that is a point cloud
@@ -27,6 +29,12 @@ struct Args {
     /// Robot; links become clouds of their collision, else their visual geometry
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
+    /// Built-in robot, where no file is given
+    #[arg(long, value_enum, default_value_t = BuiltIn::Arm, conflicts_with = "urdf")]
+    robot: BuiltIn,
+    /// Generated rough ground with all the faults of a scan; the quadruped stands, walks and is measured
+    #[arg(long, value_enum, conflicts_with_all = ["scan", "place", "own_camera"])]
+    terrain: Option<Ground>,
     #[command(flatten)]
     source: ScanSource,
     /// Where the robot stands, in the frame of the scan, metres; found if left out
@@ -62,6 +70,15 @@ struct Args {
     common: Common,
 }
 
+/// Robots that need no file.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum BuiltIn {
+    /// An arm with a gripper.
+    Arm,
+    /// Twelve joints, 50 kg.
+    Quadruped,
+}
+
 const PICTURE_SIZE: [u32; 2] = [1280, 720];
 const ANIMATION_SIZE: [u32; 2] = [640, 360];
 /// Steps from one picture of the animation to the next.
@@ -90,20 +107,32 @@ fn run(args: &Args) -> anyhow::Result<()> {
     if !(args.sensor_noise.is_finite() && args.sensor_noise >= 0.0) {
         bail!("--sensor-noise must be a number that is not negative");
     }
-    let robot = load_robot(args.urdf.as_deref())?;
-    let scan = load_scan(&args.source, args.common.seed)?;
-    let up = choose_up(args.source.up, &scan);
+    let robot = load_robot(args)?;
+    let terrain = args
+        .terrain
+        .map(|ground| Terrain::new(ground, args.common.seed));
+    let (scan, up) = match &terrain {
+        Some(terrain) => (load::scan_from_surface(terrain.scan())?, Vec3::Z),
+        None => {
+            let scan = load_scan(&args.source, args.common.seed)?;
+            let up = choose_up(args.source.up, &scan);
+            (scan, up)
+        }
+    };
     let scene = RobotScene {
         scan,
         up,
-        robot,
         base: args.base,
-        at: args.place.map(|Triple(place)| place),
+        at: (args.place.map(|Triple(place)| place)).or(args.terrain.map(|_| Vec3::ZERO)),
+        facing: args.terrain.map(|_| Vec3::X),
+        terrain,
+        motion: Walk::of(&robot.kinematics).map(Motion::Walk),
         bodies: args.bodies,
         sensor_noise: args.sensor_noise,
         own_camera: args.own_camera,
         self_filter: !args.no_self_filter,
         seed: args.common.seed,
+        robot,
     };
     let mut simulation = RobotSimulation::new(scene, args.common.backend.open()?)?;
     if simulation.tip().is_none() && simulation.report().driven_joints == 0 {
@@ -126,14 +155,17 @@ fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn load_robot(path: Option<&Path>) -> anyhow::Result<Description> {
-    let robot = match path {
+fn load_robot(args: &Args) -> anyhow::Result<Description> {
+    let robot = match &args.urdf {
         Some(path) => {
             eprintln!("reading {}", path.display());
             Description::from_file(path)
                 .with_context(|| format!("cannot use the robot {}", path.display()))?
         }
-        None => Description::from_text(BUILT_IN, Path::new(""))?,
+        None => match args.robot {
+            BuiltIn::Arm => Description::from_text(BUILT_IN, Path::new(""))?,
+            BuiltIn::Quadruped => Description::from_text(&quadruped(), Path::new(""))?,
+        },
     };
     for warning in &robot.warnings {
         eprintln!("warning: {warning}");

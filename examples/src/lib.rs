@@ -21,4 +21,5 @@ pub mod simulation;
 pub mod spots;
 pub mod step_totals;
 pub mod surface_sampling;
+pub mod terrain;
 pub mod up;

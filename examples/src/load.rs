@@ -87,6 +87,20 @@ pub fn default_size(file_size: f32, scan_radius: f32) -> f32 {
     }
 }
 
+/// Times the median radius of a cloud beyond which a point is on no surface: its seven nearest neighbours are
+/// that much farther away than those of other points. Half of it would take coarse parts of an uneven scan;
+/// with twice of it, a speck in the air would stay as a splat as large as a hand.
+const ON_NO_SURFACE: f32 = 8.0;
+
+/// The points of a scan that lie on a surface, by index: not those with radii that are many times those of
+/// others. Dust and flying pixels far from everything would be splats as large as a robot's links.
+pub fn on_surfaces(scan: &PointCloud<'_>) -> Vec<bool> {
+    let mut radii: Vec<f32> = (0..scan.len()).map(|i| scan.radius(i)).collect();
+    let middle = radii.len() / 2;
+    let most = ON_NO_SURFACE * *radii.select_nth_unstable_by(middle, f32::total_cmp).1;
+    (0..scan.len()).map(|i| scan.radius(i) <= most).collect()
+}
+
 /// The cloud moved so that its bounds are centred on its origin, and scaled so that its largest
 /// extent is `size` metres.
 ///

@@ -141,7 +141,7 @@ fn grained(p: Vec3, color: [u8; 3], grain: f32) -> [u8; 3] {
 // Signed distances in metres; see Inigo Quilez, "distance functions",
 // https://iquilezles.org/articles/distfunctions/.
 
-fn rounded_block(p: Vec3, half: Vec3, rounding: f32) -> f32 {
+pub(crate) fn rounded_block(p: Vec3, half: Vec3, rounding: f32) -> f32 {
     let q = p.abs() - half + Vec3::splat(rounding);
     q.max(Vec3::ZERO).length() + q.max_element().min(0.0) - rounding
 }

@@ -1,5 +1,6 @@
 //! What the motors are told to do.
 
+use super::Walk;
 use super::kinematics::{Aim, JointKind, Kinematics};
 use std::f32::consts::{PI, TAU};
 
@@ -28,6 +29,8 @@ pub enum Motion {
         /// Speed of each joint that rolls, rad/s.
         rolling: Vec<Option<f32>>,
     },
+    /// The quadruped stands and walks.
+    Walk(Walk),
 }
 
 /// Share of the URDF's speed limits that is used.
@@ -132,6 +135,7 @@ impl Motion {
         match self {
             Self::Path(path) => path.last().map_or(0.0, |waypoint| waypoint.time),
             Self::Gait { .. } => f32::INFINITY,
+            Self::Walk(walk) => walk.seconds(),
         }
     }
 
@@ -169,13 +173,14 @@ impl Motion {
                     .map(|(k, p)| p + swing(k))
                     .collect()
             }
+            Self::Walk(walk) => walk.positions(time),
         }
     }
 
     /// The speed at which a joint is to roll, if it does.
     pub fn rolling(&self, joint: usize) -> Option<f32> {
         match self {
-            Self::Path(_) => None,
+            Self::Path(_) | Self::Walk(_) => None,
             Self::Gait { rolling, .. } => rolling[joint],
         }
     }

@@ -20,6 +20,8 @@ pub struct Site {
     pub body_radius: f32,
     /// How many.
     pub bodies: usize,
+    /// The level direction that it faces; found where it is left out.
+    pub facing: Option<Vec3>,
     /// Seed of the choice.
     pub seed: u64,
 }
@@ -92,13 +94,14 @@ pub fn place(
         .into_iter()
         .flat_map(|base| {
             let reachable = in_reach(&surfaces, base, up, site);
-            let turns = 0..8;
+            let turns = if site.facing.is_some() { 0..1 } else { 0..8 };
             turns
                 .map(move |turn| (base, reachable.clone(), turn))
                 .collect::<Vec<_>>()
         })
         .map(|(base, reachable, turn)| {
-            let forward = forward(up, turn as f32 * 0.5 * FRAC_PI_2);
+            let turned = || forward(up, turn as f32 * 0.5 * FRAC_PI_2);
+            let forward = site.facing.unwrap_or_else(turned);
             let bodies = in_front(&reachable, base, forward, site);
             let level = bodies.iter().map(|b| (*b - base).dot(up)).sum::<f32>();
             // Rather a table than the floor: what is higher is easier seen and reached.

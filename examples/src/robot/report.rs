@@ -1,5 +1,6 @@
 //! What a run of `robot_in_scan` found.
 
+use super::StandingReport;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -31,6 +32,8 @@ pub struct RobotReport {
     pub link_count: usize,
     /// Deepest penetration in metres over all steps and contacts of clouds.
     pub max_penetration: f32,
+    /// How it stood, where the true ground is known.
+    pub standing: Option<StandingReport>,
     /// Loose bodies.
     pub bodies: Vec<LooseBodyReport>,
     /// What of the URDF could not be used.
@@ -106,6 +109,9 @@ impl RobotReport {
             self.self_filtered_points,
             1e3 * self.max_penetration
         )?;
+        if let Some(standing) = &self.standing {
+            standing.write_line(out)?;
+        }
         self.totals.write_line(out)
     }
 }

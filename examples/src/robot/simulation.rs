@@ -8,9 +8,11 @@ use super::own_camera::OwnCamera;
 use super::placing::{Site, place};
 use super::plan::{Build, Tip, plan_motion, start_pose};
 use super::report::{LinkReport, RobotReport};
+use super::standing::Standing;
 use super::{Motion, SelfFilter};
 use crate::load;
 use crate::step_totals::StepTotals;
+use crate::terrain::Terrain;
 use anyhow::bail;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -27,6 +29,9 @@ const GRAVITY: f32 = 9.81;
 /// Speed in m/s at which penetrations are pushed out: an arm that motors press into a scan does not
 /// jump back.
 const PUSH_OUT_SPEED: f32 = 0.5;
+/// Frequency in Hz at which contacts give way under a robot that is not fixed. At rapier's 30 and 60 it sinks
+/// in by more than half a radius when a foot lands; a substep of 1/240 s allows no more than 120.
+const CONTACT_FREQUENCY: f32 = 120.0;
 /// Height of a robot that is not fixed over its surface at the start, metres.
 const ROBOT_DROP: f32 = 0.005;
 /// Distance within which a place counts as blocked by a point of the scan, metres.
@@ -61,6 +66,12 @@ pub struct RobotScene {
     pub base: Base,
     /// Where it stands, if not to be found; in the frame of the scan, metres.
     pub at: Option<Vec3>,
+    /// The level direction that it faces, if not to be found.
+    pub facing: Option<Vec3>,
+    /// The true ground, where it is known: how the robot stands on it is measured.
+    pub terrain: Option<Terrain>,
+    /// What it does, if not to be planned.
+    pub motion: Option<Motion>,
     /// Loose bodies in its reach, at most.
     pub bodies: usize,
     /// Standard deviation of the scan's points, metres.
@@ -103,6 +114,7 @@ pub struct RobotSimulation {
     filter: Option<SelfFilter>,
     own_camera: Option<OwnCamera>,
     self_filtered: usize,
+    standing: Option<Standing>,
     totals: StepTotals,
     max_penetration: f32,
 }
@@ -111,6 +123,8 @@ pub struct RobotSimulation {
 #[derive(Clone, Copy, Default)]
 struct LinkTally {
     touches: bool,
+    /// Contact force in the last step, N.
+    force: f32,
     contact_steps: usize,
     max_force: f32,
     force_sum: f64,
@@ -138,6 +152,7 @@ impl RobotSimulation {
             reach: build.tip.map_or(0.0, |tip| tip.reach),
             body_radius: 0.6 * loose_size,
             bodies: if build.is_fixed { scene.bodies } else { 0 },
+            facing: scene.facing,
             seed,
         };
         let points: Vec<Vec3> = scene.scan.points().collect();
@@ -162,7 +177,10 @@ impl RobotSimulation {
             _ => vec![false; points.len()],
         };
         let self_filtered = count(&on_robot);
-        let kept: Vec<usize> = (0..points.len()).filter(|i| !on_robot[*i]).collect();
+        let on_surface = load::on_surfaces(&scene.scan);
+        let kept: Vec<usize> = (0..points.len())
+            .filter(|i| on_surface[*i] && !on_robot[*i])
+            .collect();
         let scan = load::subset(&scene.scan, &kept, |p| p, |r| r)?;
 
         let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
@@ -174,6 +192,13 @@ impl RobotSimulation {
         world
             .integration_parameters
             .normalized_max_corrective_velocity = PUSH_OUT_SPEED;
+        if !build.is_fixed {
+            // Feet hold by friction while they are pushed out, too.
+            let parameters = &mut world.integration_parameters;
+            parameters.friction_in_bias_pass = true;
+            parameters.contact_softness.natural_frequency = CONTACT_FREQUENCY;
+            parameters.static_contact_softness.natural_frequency = CONTACT_FREQUENCY;
+        }
         tldi.attach(&mut world);
         let scan_shape = if scene.own_camera {
             // Every frame has other points: one radius for all, and normals found on the way.
@@ -188,18 +213,28 @@ impl RobotSimulation {
             &mut world, &tldi, &robot, &clouds, &build, &placement, &start,
         )?;
         let loose = lay_bodies(&mut world, &tldi, up, loose_size, &placement, seed)?;
-        let motion = plan_motion(
-            &robot.kinematics,
-            &clouds,
-            &build,
-            &start,
-            &placement,
-            &scan,
-            up,
-            loose_size,
-            seed,
-        );
+        let motion = scene.motion.unwrap_or_else(|| {
+            plan_motion(
+                &robot.kinematics,
+                &clouds,
+                &build,
+                &start,
+                &placement,
+                &scan,
+                up,
+                loose_size,
+                seed,
+            )
+        });
+        let of_clouds: Vec<Pose3> = (clouds.iter())
+            .map(|link| scan_from_link[link.link])
+            .collect();
+        let standing = scene.terrain.map(|terrain| {
+            let (root, weight) = (placement.scan_from_root, GRAVITY * assembled.mass);
+            Standing::new(terrain, &scan, &clouds, &root, &of_clouds, weight)
+        });
         Ok(Self {
+            standing,
             tally: vec![LinkTally::default(); clouds.len()],
             own_camera: scene
                 .own_camera
@@ -252,6 +287,7 @@ impl RobotSimulation {
         let report = self.tldi.step(&mut self.world)?;
         let seconds = start.elapsed().as_secs_f64();
         let touches = self.count_contacts();
+        self.observe_standing();
         self.totals.count(&report, touches);
         self.totals.add_wall_seconds(seconds);
         self.max_penetration = self.max_penetration.max(report.max_penetration);
@@ -296,6 +332,7 @@ impl RobotSimulation {
         let mut touches_world = false;
         for tally in &mut self.tally {
             tally.touches = false;
+            tally.force = 0.0;
         }
         for pair in self.world.narrow_phase.contact_pairs() {
             let links = [pair.collider1, pair.collider2].map(|c| link_of.get(&c).copied());
@@ -321,12 +358,32 @@ impl RobotSimulation {
         for (tally, impulse) in self.tally.iter_mut().zip(impulses) {
             if tally.touches {
                 let force = impulse.length() / DT;
+                tally.force = force;
                 tally.contact_steps += 1;
                 tally.max_force = tally.max_force.max(force);
                 tally.force_sum += f64::from(force);
             }
         }
         touches_world
+    }
+
+    fn observe_standing(&mut self) {
+        let (links, root) = (self.scan_from_link(), self.root());
+        let Some(standing) = &mut self.standing else {
+            return;
+        };
+        let contacts = (self.tldi)
+            .contacts(&self.world.narrow_phase, &self.world.colliders)
+            .filter(|c| [c.collider1, c.collider2].contains(&self.scan_collider))
+            .map(|contact| (contact.point, contact.depth));
+        let forces: Vec<f32> = self.tally.iter().map(|tally| tally.force).collect();
+        standing.observe(&self.scan, &self.clouds, &root, &links, contacts, &forces);
+    }
+
+    /// Where the root is.
+    fn root(&self) -> Pose3 {
+        let root = self.assembled.links[self.robot.kinematics.root()];
+        *self.world.bodies[root].position()
     }
 
     fn scan_from_link(&self) -> Vec<Pose3> {
@@ -375,7 +432,6 @@ impl RobotSimulation {
 
     /// What happened so far.
     pub fn report(&self) -> RobotReport {
-        let root = self.assembled.links[self.robot.kinematics.root()];
         let link = |(link, tally): (&LinkCloud, &LinkTally)| LinkReport {
             name: link.name.clone(),
             points: link.cloud.len(),
@@ -391,11 +447,15 @@ impl RobotSimulation {
             mean_radius: self.scan.mean_radius(),
             up: self.up.to_array(),
             base_fixed: self.build.is_fixed,
-            base: self.world.bodies[root].translation().to_array(),
+            base: self.root().translation.to_array(),
             driven_joints: self.assembled.driven_joints(),
             link_count: links.len(),
             links,
             max_penetration: self.max_penetration,
+            standing: self
+                .standing
+                .as_ref()
+                .map(|standing| standing.report().clone()),
             bodies: self
                 .loose
                 .iter()
@@ -408,8 +468,7 @@ impl RobotSimulation {
     /// Whether a robot that is not fixed is still on the scan: not below its lowest point.
     pub fn is_on_scan(&self) -> bool {
         let lowest = (self.scan.points().map(|p| p.dot(self.up))).fold(f32::MAX, f32::min);
-        let root = self.assembled.links[self.robot.kinematics.root()];
-        self.world.bodies[root].translation().dot(self.up) >= lowest - 0.1
+        self.root().translation.dot(self.up) >= lowest - 0.1
     }
 }
 
