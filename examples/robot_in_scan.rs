@@ -8,7 +8,6 @@ use std::process::ExitCode;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, Triple};
-use tldi_examples::output;
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::robot::{
     BUILT_IN, Base, DT, Description, Motion, RobotScene, RobotSimulation, RobotSnapshot, Walk,
@@ -16,6 +15,7 @@ use tldi_examples::robot::{
 };
 use tldi_examples::scan::{ScanSource, choose_up, load_scan};
 use tldi_examples::terrain::{Ground, Terrain};
+use tldi_examples::{load, output};
 use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, thinned, viewpoint};
 
 /// A robot whose links are point clouds moves in a scan that is a point cloud
