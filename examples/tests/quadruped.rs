@@ -82,7 +82,7 @@ fn thirty_walks() {
     for ground in Ground::ALL {
         for seed in 1..=10 {
             let r = walk(ground, seed);
-            println!(
+            eprintln!(
                 "| {ground:?} | {seed} | {:.1} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} |",
                 1e2 * r.least_height,
                 1e2 * r.last_height,

@@ -25,7 +25,7 @@ const STIFFNESS: f32 = 900.0;
 const DAMPING: f32 = 60.0;
 /// A robot that stands on its joints: the angle in radians by which a joint gives way under its full effort,
 /// and the seconds in which it goes to where it should be. A quadruped whose knees have 120 N·m stands 2 % lower by it; with twice
-/// of it, 4 %. With half of it, feet that land early push with five times their share of the weight in place of three.
+/// of it, 4 %. The stiffer, the harder feet push that land early.
 const GIVE: f32 = 0.3;
 const LAG: f32 = 0.02;
 /// Damping of wheels' motors, per second: stiff, since rolling over rough points costs torque.

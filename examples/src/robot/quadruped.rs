@@ -103,14 +103,14 @@ pub struct Walk {
 const STAND: f32 = 2.0;
 const WALK: f32 = 5.0;
 const STAND_AGAIN: f32 = 1.0;
-/// Seconds of a cycle: at 0.56 s feet land with up to five times their share of the weight, at 1 s with half
-/// of that; at twice of it, the robot would tip over the diagonal that is down.
+/// Seconds of a cycle: at 0.6 s feet land with five times their share of the weight, at 1 s with three times. Longer, and
+/// the robot tips farther over the diagonal that is down.
 const CYCLE: f32 = 1.0;
 /// Share of a cycle in which a foot is down: more than half, so that one diagonal is down before the other
 /// lifts.
 const DOWN: f32 = 0.65;
-/// Way of a foot on the ground in a cycle, and how high it is lifted, metres: half as high again as the
-/// highest step.
+/// Way of a foot on the ground in a cycle, and how high it is lifted, metres: three times the
+/// highest step, since the robot sinks and tips meanwhile.
 const STRIDE: f32 = 0.1;
 const LIFT: f32 = 0.06;
 /// Seconds in which the walk begins and ends.

@@ -29,8 +29,8 @@ const GRAVITY: f32 = 9.81;
 /// Speed in m/s at which penetrations are pushed out: an arm that motors press into a scan does not
 /// jump back.
 const PUSH_OUT_SPEED: f32 = 0.5;
-/// Frequency in Hz at which contacts give way under a robot that is not fixed. At rapier's 30 and 60 it sinks
-/// in by more than half a radius when a foot lands; a substep of 1/240 s allows no more than 120.
+/// Frequency in Hz at which contacts give way under a robot that is not fixed: feet sink in less than at rapier's 30 and
+/// 60. Substeps of 1/240 s allow no more than 120.
 const CONTACT_FREQUENCY: f32 = 120.0;
 /// Height of a robot that is not fixed over its surface at the start, metres.
 const ROBOT_DROP: f32 = 0.005;
