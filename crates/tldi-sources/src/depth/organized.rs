@@ -416,7 +416,7 @@ mod tests {
     const ROWS: usize = 32;
     const HEIGHT: f32 = 1.5;
     /// Half the edge of a square room.
-    const WALL: f32 = 6.0;
+    const WALL: f32 = 20.0;
     const DEVIATION: f32 = 0.01;
 
     /// What a turn of a scanner sees of a floor and four walls, with the true normals; its rows are rings, the lowest
@@ -453,7 +453,7 @@ mod tests {
         SensorModel::time_of_flight(DEVIATION, [0.5, 50.0])
     }
 
-    /// Floor and walls of a room, up to 70 degrees from facing the scanner, have their normals, of the whole sweep
+    /// Floor and walls of a room, up to 86 degrees from facing the scanner, have their normals, of the whole sweep
     /// and of one with half of its pixels.
     #[test]
     fn a_sweep_has_the_normals_of_the_room() {
@@ -479,7 +479,9 @@ mod tests {
             );
             // Edges of the room are among them.
             assert!(tenth < 15.0, "{seed}: {tenth}");
-            assert!(cloud.flying * 10 < seen, "{seed}: {}", cloud.flying);
+            // At 20 m the floor is 86 degrees from facing the scanner; where half is empty, many pixels of it are alone.
+            let share = if empty > 0.0 { 5 } else { 25 };
+            assert!(cloud.flying * share < seen, "{seed}: {}", cloud.flying);
             for (point, radius) in cloud.points.iter().zip(&cloud.radii) {
                 // A cell seen from the front is 1 by 1.15 degrees.
                 let range = point.length();
