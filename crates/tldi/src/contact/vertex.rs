@@ -6,7 +6,7 @@
 use crate::contact::estimate::Observed;
 use crate::contact::quadric::{LEAST_DEVIATION, Quadric, robust};
 use arrayvec::ArrayVec;
-use glamx::{Mat3, Vec2, Vec3};
+use glamx::{Mat2, Mat3, Vec2, Vec3};
 
 /// Most faces that meet. A corner has three, or three of its faces suffice.
 const MOST_FACES: usize = 3;
@@ -39,6 +39,10 @@ const BETTER: f32 = 0.25;
 /// are corners.
 const THIRD_FACE: f32 = 0.7;
 
+/// Most by which faces meet beyond the middles of the outermost pixels, in pixels. A pixel's corner is 0.7 pixels from its
+/// middle.
+const MOST_BEYOND: f32 = 1.0;
+
 /// Where faces meet, over places in pixels.
 #[derive(Debug)]
 pub(crate) struct Vertex {
@@ -68,7 +72,7 @@ impl Vertex {
             let gaps = smaller(vertex.gaps_off, quadric.gaps_off);
             let slopes = smaller(vertex.slopes_off, quadric.slopes_off);
             let is_better = gaps * slopes * slopes < BETTER && vertex.gap(vertex.place) > least;
-            is_better.then_some(vertex)
+            (is_better && vertex.is_among(observed)).then_some(vertex)
         };
         let edge = better(2);
         let most_off = edge
@@ -83,6 +87,20 @@ impl Vertex {
     pub(crate) fn gap(&self, place: Vec2) -> f32 {
         let gaps = self.faces.iter().map(|face| over(*face, place));
         gaps.fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// Whether the faces meet in the footprint. Those of a level face and of two opposite rims meet far away.
+    fn is_among(&self, observed: &[Observed]) -> bool {
+        let axes = [self.across, self.across.perp()];
+        let count = if self.is_corner { 2 } else { 1 };
+        axes[..count].iter().all(|axis| {
+            let beyond = |sign: f32| {
+                let along = |place: Vec2| sign * place.dot(*axis);
+                let rim = observed.iter().map(|o| along(o.place));
+                along(self.place) - rim.fold(f32::NEG_INFINITY, f32::max)
+            };
+            beyond(1.0).max(beyond(-1.0)) <= MOST_BEYOND
+        })
     }
 
     /// Standard deviation of gaps, pixels.
@@ -170,26 +188,35 @@ fn faces(observed: &[Observed], seeds: &[Vec2]) -> ArrayVec<Vec3, MOST_FACES> {
                     let own = o.slope.distance(slope);
                     slopes.iter().all(|other| other.distance(o.slope) >= own)
                 };
-                let (mut weights, mut sum, mut gap) = (f32::MIN_POSITIVE, Vec2::ZERO, 0.0);
-                let mut place = Vec2::ZERO;
-                for o in observed
-                    .iter()
-                    .filter(|o| o.turn_weight > 0.0)
-                    .filter(nearest)
-                {
-                    let weight = alike(o.slope, slope);
-                    weights += weight;
-                    sum += weight * o.slope;
-                    gap += weight * o.gap;
-                    place += weight * o.place;
-                }
-                let slope = sum / weights;
-                slope.extend(gap / weights - slope.dot(place / weights))
+                let of_face = observed.iter().filter(|o| o.turn_weight > 0.0);
+                let of_face = of_face.filter(nearest);
+                let weighted = of_face.map(|o| (alike(o.slope, slope), o));
+                plane_of(weighted)
             })
             .collect();
         slopes = faces.iter().map(|face: &Vec3| face.truncate()).collect();
     }
     faces
+}
+
+/// The plane with the least squares of both gaps, in pixels, and slopes: gaps tell the slope of a wide face, normals that
+/// of a narrow one.
+fn plane_of<'a>(weighted: impl Iterator<Item = (f32, &'a Observed)>) -> Vec3 {
+    let (mut weights, mut place, mut gap) = (f32::MIN_POSITIVE, Vec2::ZERO, 0.0);
+    let (mut spread, mut rise) = (Mat2::ZERO, Vec2::ZERO);
+    for (weight, o) in weighted {
+        let along = weight * o.place;
+        weights += weight;
+        place += along;
+        gap += weight * o.gap;
+        spread += Mat2::from_cols(o.place.x * along, o.place.y * along);
+        rise += along * o.gap + weight * o.slope;
+    }
+    let (place, gap) = (place / weights, gap / weights);
+    spread -= weights * Mat2::from_cols(place.x * place, place.y * place);
+    let known = spread + Mat2::from_diagonal(Vec2::splat(weights));
+    let slope = known.inverse() * (rise - weights * gap * place);
+    slope.extend(gap - slope.dot(place))
 }
 
 /// Standard deviations of gaps and of slopes about faces.
