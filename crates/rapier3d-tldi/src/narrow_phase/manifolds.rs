@@ -77,7 +77,7 @@ pub(crate) fn fill(
     std::mem::swap(manifolds, previous);
     // `manifolds` now holds those of two steps ago, of use for their memory only.
     let mut filled = 0;
-    let mut match_distance = pair.prediction;
+    let (mut match_distance, mut scatter) = (pair.prediction, 0.0);
     for part_pair in parts {
         let first = filled;
         match &part_pair.comparison {
@@ -90,6 +90,7 @@ pub(crate) fn fill(
                     }
                 }
                 match_distance = f32::max(match_distance, comparison.match_distance());
+                scatter = f32::max(scatter, comparison.scatter);
             }
             None => {
                 manifolds.truncate(filled);
@@ -103,7 +104,7 @@ pub(crate) fn fill(
     }
     manifolds.truncate(filled);
     if parts.len() > 1 {
-        share_planes(manifolds);
+        share_planes(pair, scatter, manifolds);
     }
     for manifold in manifolds {
         inherit_impulses(manifold, previous, match_distance);

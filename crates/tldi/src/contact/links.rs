@@ -30,6 +30,8 @@ pub(crate) struct Links {
     /// Where the neighbours of each contact pixel start in `neighbors`, and their end.
     starts: Vec<u32>,
     neighbors: Vec<u32>,
+    /// How far each neighbour is, in pixels along columns and rows.
+    steps: Vec<[i8; 2]>,
 }
 
 impl Links {
@@ -122,7 +124,7 @@ impl Links {
             (*k, *l) = (new_index[*k as usize], new_index[*l as usize]);
             *k != NONE && *l != NONE
         });
-        self.index(result.contacts.len());
+        self.index(&result.contacts);
         // Solids that overlap by more than a layer's thickness intersect, even if their surfaces cross
         // where no view sees them well.
         if !result.collides && result.contacts.iter().any(is_deep) {
@@ -155,15 +157,22 @@ impl Links {
         &self.neighbors[self.range(k)]
     }
 
+    /// The same, with how far they are in pixels along columns and rows.
+    pub(crate) fn placed_neighbors(&self, k: u32) -> impl Iterator<Item = (u32, [i8; 2])> {
+        let range = self.range(k);
+        let neighbors = self.neighbors[range.clone()].iter().copied();
+        neighbors.zip(self.steps[range].iter().copied())
+    }
+
     fn range(&self, k: u32) -> Range<usize> {
         let k = k as usize;
         self.starts[k] as usize..self.starts[k + 1] as usize
     }
 
     /// Fills what [`neighbors`](Self::neighbors) returns.
-    fn index(&mut self, contacts: usize) {
+    fn index(&mut self, contacts: &[ContactPixel]) {
         self.starts.clear();
-        self.starts.resize(contacts + 1, 0);
+        self.starts.resize(contacts.len() + 1, 0);
         for &(k, l) in &self.pairs {
             self.starts[k as usize] += 1;
             self.starts[l as usize] += 1;
@@ -176,11 +185,16 @@ impl Links {
         // Filled from the end, so that each start ends up where it belongs.
         self.neighbors.clear();
         self.neighbors.resize(end as usize, 0);
+        self.steps.clear();
+        self.steps.resize(end as usize, [0; 2]);
         for &(k, l) in &self.pairs {
-            for (of, neighbor) in [(k, l), (l, k)] {
+            let [from, to] = [k, l].map(|m| contacts[m as usize].pixel);
+            let step = [0, 1].map(|axis| (to[axis] - from[axis]) as i8);
+            for (of, neighbor, step) in [(k, l, step), (l, k, step.map(|s| -s))] {
                 let slot = &mut self.starts[of as usize];
                 *slot -= 1;
                 self.neighbors[*slot as usize] = neighbor;
+                self.steps[*slot as usize] = step;
             }
         }
     }
@@ -274,8 +288,13 @@ mod tests {
         links.find(&result.contacts, &params);
         links.confirm(&mut result, &params, tells_inside, &mut Vec::new());
         let count = result.contacts.len();
+        let pixel = |k: u32| result.contacts[k as usize].pixel;
         for (k, l) in &links.pairs {
             assert!(links.neighbors(*k).contains(l) && links.neighbors(*l).contains(k));
+            for (neighbor, step) in links.placed_neighbors(*k) {
+                let stepped = [0, 1].map(|axis| pixel(*k)[axis] + i32::from(step[axis]));
+                assert_eq!(pixel(neighbor), stepped);
+            }
             assert!((*k as usize) < count && (*l as usize) < count);
         }
         result

@@ -1,10 +1,11 @@
-//! A part of a contact: its normal and main direction.
+//! A part of a contact: its normal, its main direction, and the few points that stand for it.
 
-use crate::contact::estimate::{Estimate, EstimateScratch, Plane};
+use crate::contact::bowl::{Floor, GAP_PER_SLOPE, Lowest, relative_radius, slope_error};
+use crate::contact::crease::{Face, Frame, lower_by};
 use crate::contact::links::Links;
 use crate::contact::patches::Smooth;
-use crate::contact::supports::longest_axis;
-use crate::{ContactPatch, ContactPixel, Params};
+use crate::contact::supports::{longest_axis, supports};
+use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, Params};
 use glamx::Vec3;
 
 /// A surface's normal averaged over linked neighbours that is shorter than this (a spread of 26°) is a mean
@@ -17,6 +18,38 @@ const NORMAL_BAND: f32 = 2.0;
 /// Band whose pixels can be support points and decide where a part is split. What penetrates can up to
 /// [`NORMAL_BAND`]: a body that lies deeper on one side must not sink in on the other.
 const SUPPORT_BAND: f32 = 1.0;
+
+/// The gaps of a patch are taken to be at least this rough, in pixels: below, extent alone chooses
+/// the support points.
+const LEAST_ROUGHNESS: f32 = 0.05;
+
+/// Band above the smallest gap, in pixels, over which the deepest point is a mean.
+const DEEPEST_BAND: f32 = 0.1;
+
+/// How much deeper than the support points that point must be to count, in units of the roughness.
+/// On flat faces the difference is noise, and four corners carry more than three.
+const DEEPER: f32 = 0.4;
+
+/// Roughness, in pixels, above which a bend of the surfaces does not count. Gaps that rise through
+/// all of the support band, as around a ball's contact, deviate from a plane by 0.29; those of a
+/// small face whose rim is blurred by estimated normals by 0.1.
+const LEAST_RISE: f32 = 0.15;
+
+/// Share of the variance of normals across a valley that a steady turn explains at least. Measured: 0.98 and more of
+/// cylinders, 0.52 to 0.97 of two faces that meet at an edge.
+const STEADY: f32 = 0.9;
+
+/// Least radius of such a valley, in pixels: of edges it is up to 3.8.
+const LEAST_RADIUS: f32 = 4.0;
+
+/// Most that a point of a flat contact may be off its plane to be moved onto it, in pixels: what estimated
+/// normals make of the rims of two faces. What is lower still is a bump under the face.
+const OFF_PLANE: f32 = 0.4;
+
+/// A pixel at the rim of a face stands out beyond the points of the face, by half a pixel on average. Support points
+/// of faces of at least so many pixels go to the mean of themselves and their linked neighbours, which is as far
+/// inwards at a rim or a corner, and nowhere within.
+const LEAST_INWARDS: usize = 12;
 
 /// Variance (1 − mean length) that a surface's normals are taken to have at least, 1.4°: keeps the weights
 /// of two perfectly flat surfaces finite. Were it 0.01, a box's sides, which a moving view sees as
@@ -41,6 +74,15 @@ pub(crate) struct Pixels<'a> {
     pub(crate) contacts: &'a [ContactPixel],
     pub(crate) smooth: &'a [Smooth],
     pub(crate) links: &'a Links,
+}
+
+/// Memory of [`Shape::patch`], kept from call to call.
+#[derive(Debug, Default)]
+pub(crate) struct ShapeScratch {
+    /// Those that can be support points.
+    points: Vec<ContactPoint>,
+    /// The tangent planes there.
+    tangents: Vec<Face>,
 }
 
 impl Shape {
@@ -93,35 +135,150 @@ impl Shape {
         members.partition_point(|&m| !behind(m))
     }
 
-    /// The patch of `members`, which are in ascending order.
+    /// The patch's support points. If its deepest point is clearly deeper, as a ball's is, it
+    /// replaces the highest of them.
     pub(crate) fn patch(
         &self,
         members: &[u32],
         pixels: &Pixels<'_>,
-        scratch: &mut EstimateScratch,
+        scratch: &mut ShapeScratch,
         params: &Params,
     ) -> ContactPatch {
+        let ShapeScratch { points, tangents } = scratch;
         let Pixels {
             contacts,
             smooth,
             links,
         } = *pixels;
-        let plane = Plane {
-            origin: self.centre,
-            axes: [self.longest, self.normal.cross(self.longest)],
-            normal: self.normal,
-            pixel_size: params.pixel_size,
-            least_gap: self.least_gap,
+        let can_support = |m: &u32| smooth[*m as usize].gap <= self.support_gap;
+        let in_band = || {
+            (members.iter().filter(|m| can_support(m)))
+                .map(|&m| (&contacts[m as usize], &smooth[m as usize]))
         };
-        let footprint = (members.iter())
-            .map(|&m| (m, &contacts[m as usize], smooth[m as usize].gap))
-            .filter(|(_, _, gap)| *gap <= self.support_gap);
-        let estimate = Estimate::of(footprint, &plane, links, contacts.len(), scratch);
-        ContactPatch {
+        points.clear();
+        points.extend(in_band().map(|(contact, smooth)| self.point(contact.middle(), smooth.gap)));
+        let supports = supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
+        let rises = supports.roughness >= LEAST_RISE * params.pixel_size;
+        let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
+        let roughness = supports.roughness_about_bowl;
+        // How much lower than the lowest of the fitted points faces meet.
+        let mut lower = |lowest: &ContactPoint| {
+            let frame = Frame {
+                origin: self.centre,
+                axes: [self.longest, self.normal.cross(self.longest)],
+                normal: self.normal,
+            };
+            let pixels = in_band().map(|(contact, _)| contact);
+            lower_by(pixels, &frame, lowest, params.pixel_size, tangents)
+        };
+        if let Some(lowest) = lowest_of_bowl {
+            // Around it the surfaces have other normals: points there would stop what rolls. Where noise
+            // leaves open where it is, points as far apart let a ball lie that would otherwise roll about.
+            let off_fit = in_band().map(|(contact, smooth)| contact.gap - smooth.gap);
+            let slope_error = slope_error(off_fit, params.pixel_size);
+            let Lowest {
+                point,
+                aside,
+                radii,
+            } = lowest;
+            let relative_radii = radii.map(|radius| {
+                relative_radius(radius, self.centre, in_band().map(|(contact, _)| contact)).0
+            });
+            let point = self.point(point.middle(), point.gap - lower(&point));
+            let [u, v] = aside.map(|aside| slope_error * aside);
+            let points = if slope_error > 0.0 {
+                let moved = |aside: Vec3| self.point(point.middle() + aside, point.gap);
+                [u, v, -u, -v].into_iter().map(moved).collect()
+            } else {
+                [point].into_iter().collect()
+            };
+            return ContactPatch {
+                normal: self.normal,
+                points,
+                relative_radii: Some(relative_radii),
+                roughness: roughness.max(GAP_PER_SLOPE * slope_error),
+            };
+        }
+        if let Some(Floor { ends, radius }) = supports.floor_of_valley.filter(|_| rises) {
+            let (radius, steady) =
+                relative_radius(radius, self.centre, in_band().map(|(contact, _)| contact));
+            // Where two faces meet at an edge the normals turn at once.
+            if steady >= STEADY && radius.length() >= LEAST_RADIUS * params.pixel_size {
+                let on_plane = |end: ContactPoint| self.point(end.middle(), end.gap);
+                return ContactPatch {
+                    normal: self.normal,
+                    points: ends.into_iter().map(on_plane).collect(),
+                    relative_radii: Some([radius, Vec3::ZERO]),
+                    roughness,
+                };
+            }
+        }
+        // Chosen for being low, they are lower than the plane of a flat contact by what its gaps scatter by.
+        // What bends, or is rougher than that, is as low as it is, but for the rim of a flat contact.
+        let scatter = if rises { 0.0 } else { roughness };
+        let off_plane = OFF_PLANE * params.pixel_size;
+        let scatter = scatter + supports.flatness * (off_plane - scatter).max(0.0);
+        let inwards = if points.len() < LEAST_INWARDS {
+            0.0
+        } else if rises {
+            supports.flatness
+        } else {
+            1.0
+        };
+        let in_plane = |(k, above): (usize, f32)| {
+            let point = points[k];
+            let member = members.iter().filter(|m| can_support(m)).nth(k);
+            let neighbors = member.map_or(&[][..], |&m| links.neighbors(m));
+            let (mut sum, mut count) = (point.middle(), 1.0);
+            for &l in neighbors.iter().filter(|l| can_support(l)) {
+                sum += contacts[l as usize].middle();
+                count += 1.0;
+            }
+            let off = (sum / count - point.middle()).reject_from_normalized(self.normal);
+            let aside = inwards * off;
+            let gap = point.gap - above.clamp(-scatter, scatter) + supports.slope.dot(aside);
+            self.point(point.middle() + aside, gap)
+        };
+        let chosen = supports.indices.into_iter().zip(supports.above_plane);
+        let mut patch = ContactPatch {
             normal: self.normal,
-            points: estimate.points,
-            relative_radii: estimate.relative_radii,
-            roughness: estimate.roughness,
+            points: chosen.map(in_plane).collect(),
+            relative_radii: None,
+            roughness,
+        };
+        patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
+        let deepest = self.deepest(points, params);
+        // Where the gaps do not rise only a bump under the face counts.
+        let of_rims = if rises { supports.flatness } else { 1.0 } * off_plane;
+        let deeper = DEEPER * supports.roughness + of_rims;
+        if deepest.gap < patch.points[0].gap - deeper {
+            patch.points.truncate(PATCH_POINTS - 1);
+            patch.points.insert(0, deepest);
+        }
+        let lower = lower(&patch.points[0]);
+        for point in &mut patch.points {
+            *point = self.point(point.middle(), point.gap - lower);
+        }
+        patch
+    }
+
+    /// Mean of the points with the smallest gaps.
+    fn deepest(&self, points: &[ContactPoint], params: &Params) -> ContactPoint {
+        let (mut middle, mut gap, mut total) = (Vec3::ZERO, 0.0, 0.0);
+        for point in points {
+            let w = falloff(point.gap - self.least_gap, DEEPEST_BAND * params.pixel_size);
+            middle += w * point.middle();
+            gap += w * point.gap;
+            total += w;
+        }
+        self.point(middle / total, gap / total)
+    }
+
+    fn point(&self, middle: Vec3, gap: f32) -> ContactPoint {
+        ContactPoint {
+            point_a: middle - 0.5 * gap * self.normal,
+            point_b: middle + 0.5 * gap * self.normal,
+            gap,
         }
     }
 }

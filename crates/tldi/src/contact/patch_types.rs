@@ -65,13 +65,14 @@ pub struct ContactPatch {
     pub normal: Vec3,
     /// One to [`PATCH_POINTS`] points.
     pub points: arrayvec::ArrayVec<ContactPoint, PATCH_POINTS>,
-    /// Set if the gaps are bent so that the contact rolls. There is one vector along each main axis, as
-    /// long as the relative radius of curvature of the surfaces, 1 / (1 / R_a + 1 / R_b), metres. The
-    /// lowest point moves by that length for each radian of turn. It is then the only point; where
-    /// noise hides where it is, the points stand around where it may be. On a line, such as a cylinder
-    /// on a floor, the second vector is zero, and the points are the ends of the line.
+    /// Set if the gaps form a bowl, so that the contact rolls. There is one vector along each main
+    /// axis, as long as the relative radius of curvature of the surfaces, 1 / (1 / R_a + 1 / R_b),
+    /// metres. The bowl's lowest point moves by that length for each radian of turn. The lowest
+    /// point is then the only one. If noise hides where it is, four points stand around it at the
+    /// distance of the uncertainty. On a line, such as a cylinder on a floor, the second vector is
+    /// zero, and the points are the ends of the line.
     pub relative_radii: Option<[Vec3; 2]>,
-    /// Standard deviation of the gaps about the fitted surface, in metres. It says how far the gap of
+    /// Standard deviation of the gaps about a plane or bowl, in metres. It says how far the gap of
     /// one point can be trusted.
     pub roughness: f32,
 }

@@ -4,11 +4,11 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
-use crate::contact::estimate::EstimateScratch;
+use crate::contact::gap_fit::GapFit;
 use crate::contact::links::{Groups, Links, join, root};
 use crate::contact::lone_points::{Culled, LonePoints};
 use crate::contact::noise::allow_for_noise;
-use crate::contact::part_shape::{Pixels, Shape, common_normal};
+use crate::contact::part_shape::{Pixels, Shape, ShapeScratch, common_normal};
 use crate::contact::way_out::WayOut;
 use crate::cpu::sweep::SAME_FACE;
 use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params};
@@ -62,7 +62,7 @@ pub struct PatchScratch {
     /// Members of the parts of one patch, and of one of its groups.
     patch: Vec<u32>,
     spot: Vec<u32>,
-    estimate: EstimateScratch,
+    shape: ShapeScratch,
 }
 
 /// Some of the members, and what decides which patch they belong to.
@@ -188,7 +188,6 @@ impl PatchScratch {
                 }
                 !in_plane
             });
-            self.patch.sort_unstable();
             let first = out.len();
             if !self.push_round_spots(contacts, params, out) {
                 out.truncate(first);
@@ -240,24 +239,24 @@ impl PatchScratch {
             smooth: &self.smooth,
             links: &self.links,
         };
-        shape.patch(members, &pixels, &mut self.estimate, params)
+        shape.patch(members, &pixels, &mut self.shape, params)
     }
 
-    /// Averages normals and gaps over linked neighbours.
+    /// Averages normals over linked neighbours and fits the gaps to them. A third of a sensor's
+    /// noise is left.
     fn smooth(&mut self, contacts: &[ContactPixel]) {
+        let mut fit = GapFit::default();
         for (k, contact) in contacts.iter().enumerate() {
             let (mut normal_a, mut normal_b) = (contact.normal_a, contact.normal_b);
-            let mut gap = contact.gap;
             let neighbors = self.links.neighbors(k as u32);
             for neighbor in neighbors.iter().map(|&l| &contacts[l as usize]) {
                 normal_a += neighbor.normal_a;
                 normal_b += neighbor.normal_b;
-                gap += neighbor.gap;
             }
             let count = 1.0 + neighbors.len() as f32;
             let (normal_a, normal_b) = (normal_a / count, normal_b / count);
             self.smooth.push(Smooth {
-                gap: gap / count,
+                gap: fit.gap(k as u32, contacts, &self.links),
                 normal_a,
                 normal_b,
                 normal: common_normal(normal_a, normal_b).unwrap_or_else(|| contact.normal()),

@@ -9,6 +9,7 @@
 use super::lanes::multiversioned;
 use super::normals::{LANES, MAX_CANDIDATES, NormalScratch, SUPPORT, Sorted};
 use super::planes::Plane;
+use crate::contact::supports::ramp;
 use glamx::Vec3;
 
 /// Standard deviation of neighbours from their plane, in mean radii, up to which they are on it: a tenth of
@@ -125,8 +126,7 @@ pub(crate) fn sharpen(radius: f32, noise: f32, scratch: &mut NormalScratch, norm
                 let Some((face, weight)) = mean(point, own, limits, flat) else {
                     continue;
                 };
-                let off = (own.variance / on_plane - 1.0) / (OFF_PLANE - 1.0);
-                let share = off.clamp(0.0, 1.0) * weight.min(1.0);
+                let share = ramp(own.variance / on_plane, [1.0, OFF_PLANE]) * weight.min(1.0);
                 adopted.push((k, own.towards(&face, share)));
             }
         }

@@ -1,0 +1,322 @@
+//! The bowl that gaps form around the contact of a round surface: where it is lowest, and how
+//! certain that is.
+
+use crate::contact::supports::ramp;
+use crate::{ContactPixel, ContactPoint};
+use glamx::{Vec2, Vec3};
+
+/// Largest share of the roughness that a bowl may leave. A small flat face whose rim is bent by
+/// estimated normals is no bowl. Neither is a crease.
+const UNEXPLAINED: f32 = 0.1;
+
+/// The same of at least [`MANY`] points: noise of a quarter of a radius leaves a third of a ball's.
+const UNEXPLAINED_OF_MANY: f32 = 0.5;
+
+/// The same of a valley: the ends of a cylinder are bent by their rims.
+const UNEXPLAINED_OF_VALLEY: f32 = 0.4;
+
+/// Number of points from which noise can be told from a rim or a crease.
+const MANY: f32 = 30.0;
+
+/// Largest distance of a bowl's lowest point from the middle of the points, in standard deviations
+/// along each main axis. The rim of a disc is at 2.
+const LOWEST: f32 = 1.5;
+
+/// Least ratio between the widening of a bowl along its two main axes, in standard deviations of
+/// its points. In these units, a whole bowl widens equally, however oblong it is. Along an edge,
+/// only noise widens.
+const LEAST_ALIKE: f32 = 0.3;
+
+/// Fewest points of a bowl. It has five unknowns, so a bowl fits any five points, with its lowest
+/// point anywhere.
+const LEAST_POINTS: f32 = 6.0;
+
+/// Least spread of the squares of places, as a share of that in a disc, and least part of it that
+/// the axes do not have in common. If places differ less, rounding decides the bend.
+const LEAST_SPREAD: f32 = 0.02;
+
+/// Pixels that share their errors because they see the same points. Measured: the lowest points of
+/// a ball on a noisy plane vary 1.5 times as much as with independent pixels.
+const ALIKE: f32 = 2.4;
+
+/// Standard errors within which the lowest point of a bowl is taken to be.
+const DOUBT: f32 = 2.0;
+
+/// The error of a bowl's lowest gap, in those of its slope: in a disc, the root of 1 for the mean and 3 for
+/// the bend.
+pub(crate) const GAP_PER_SLOPE: f32 = 2.0;
+
+/// What gaps are off the fits through their neighbours, in standard deviations of their errors, of which a fit
+/// over 5 × 5 pixels keeps 0.39.
+const OFF_FIT: f32 = 0.92;
+
+/// Errors of gaps, in pixels, at which they begin to count as noise, and at which they fully do.
+/// Those of smooth surfaces are 0.01 to 0.04, those of samples with noise of a quarter of a radius
+/// 0.12 to 0.2.
+const NOISE: [f32; 2] = [0.04, 0.06];
+
+/// Most by which normals and gaps tell different radii of a surface: beyond, the normals are not those of the
+/// surface.
+const ALIKE_RADII: f32 = 2.0;
+
+/// The lowest point of a bowl.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lowest {
+    /// The point, and the gap there.
+    pub point: ContactPoint,
+    /// How far it moves aside, along each main axis of the points, for an error of one metre of the slope of the
+    /// gaps over a standard deviation of the places, metres.
+    pub aside: [Vec3; 2],
+    /// Along the same axes, vectors as long as the bowl's radii of curvature, metres.
+    pub radii: [Vec3; 2],
+}
+
+/// The floor of a valley.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Floor {
+    /// Its ends, and the gaps there.
+    pub ends: [ContactPoint; 2],
+    /// Across it, a vector as long as its radius of curvature, metres.
+    pub radius: Vec3,
+}
+
+/// Where gaps around the contact of a cylinder are lowest.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Valley {
+    /// The main axis across it.
+    pub(crate) across: usize,
+    /// Where its floor is along that axis, in standard deviations.
+    pub(crate) place: f32,
+    /// Rise of the gaps with the square of the distance from there, metres; distances in standard
+    /// deviations.
+    pub(crate) bend: f32,
+}
+
+/// A paraboloid that widens along the main axes, or does not bend, above a plane.
+pub(crate) struct Bowl {
+    /// By how much it rises with the square of the place, in standard deviations along the main axes.
+    widening: Vec2,
+    /// Standard deviation of the heights about it, metres.
+    pub(crate) left: f32,
+    count: f32,
+}
+
+impl Bowl {
+    /// The bowl that fits `count` heights above a plane best, at places in standard deviations along the
+    /// main axes.
+    pub(crate) fn fit(heights: impl Iterator<Item = (Vec2, f32)> + Clone, count: f32) -> Self {
+        // Squares of the places, less their mean.
+        let bend = |place: Vec2| place * place - Vec2::ONE;
+        let (mut squares, mut mixed, mut moment) = (Vec2::ZERO, 0.0, Vec2::ZERO);
+        for (place, height) in heights.clone() {
+            let bend = bend(place);
+            squares += bend * bend;
+            mixed += bend.x * bend.y;
+            moment += height * bend;
+        }
+        let determinant = squares.x * squares.y - mixed * mixed;
+        let is_known = count >= LEAST_POINTS
+            && squares.min_element() > LEAST_SPREAD * count
+            && determinant > LEAST_SPREAD * squares.x * squares.y;
+        let widening = if is_known {
+            let widening = Vec2::new(
+                moment.x * squares.y - moment.y * mixed,
+                moment.y * squares.x - moment.x * mixed,
+            );
+            (widening / determinant).max(Vec2::ZERO)
+        } else {
+            Vec2::ZERO
+        };
+        let left = heights.map(|(place, height)| (height - widening.dot(bend(place))).powi(2));
+        Self {
+            widening,
+            left: (left.sum::<f32>() / count).sqrt(),
+            count,
+        }
+    }
+
+    /// The place of its lowest point above a plane that rises by `slope` in a standard deviation of each place,
+    /// and how high that point is above the plane's middle, if it is a bowl in both directions, lowest among its
+    /// points, and most of the `roughness` about the plane.
+    pub(crate) fn lowest(&self, slope: Vec2, roughness: f32) -> Option<(Vec2, f32)> {
+        let place = -0.5 * slope / self.widening;
+        let unexplained = if self.count < MANY {
+            UNEXPLAINED
+        } else {
+            UNEXPLAINED_OF_MANY
+        };
+        let is_bowl = self.left < unexplained * roughness
+            && self.widening.min_element() >= LEAST_ALIKE * self.widening.max_element()
+            && place.abs().max_element() <= LOWEST;
+        let above = slope.dot(place) + self.widening.dot(place * place - Vec2::ONE);
+        is_bowl.then_some((place, above))
+    }
+
+    /// The floor of a valley, which widens along one main axis only, if the gaps above a plane that rises by `slope`
+    /// are one.
+    pub(crate) fn valley(&self, slope: Vec2, roughness: f32) -> Option<Valley> {
+        let across = usize::from(self.widening.y > self.widening.x);
+        let bend = self.widening[across];
+        let place = -0.5 * slope[across] / bend;
+        let is_valley = self.left < UNEXPLAINED_OF_VALLEY * roughness
+            && self.count >= MANY
+            && self.widening[1 - across] < LEAST_ALIKE * bend
+            && place.abs() <= LOWEST;
+        is_valley.then_some(Valley {
+            across,
+            place,
+            bend,
+        })
+    }
+
+    /// How far that place moves for an error of one metre of the slope.
+    pub(crate) fn place_per_slope(&self) -> Vec2 {
+        0.5 / self.widening
+    }
+}
+
+/// How far the slope of the gaps over a standard deviation of the places may be off, in metres, if they are `off`
+/// the fits through their neighbours by so much, in pixels of `pixel_size` metres. 0 where that is no noise, or is not
+/// known.
+pub(crate) fn slope_error(off: impl Iterator<Item = f32>, pixel_size: f32) -> f32 {
+    let (squares, count) = off.fold((0.0, 0.0), |(sum, n), off| (sum + off * off, n + 1.0));
+    if count < MANY {
+        return 0.0;
+    }
+    let noise = (squares / count).sqrt() / OFF_FIT;
+    DOUBT * ramp(noise / pixel_size, NOISE) * noise * (ALIKE / count).sqrt()
+}
+
+/// The relative radius of curvature along `radius`, that of the gaps of `contacts` about `centre`, by how their
+/// normals turn: a vector along it, metres; and which share of the variance of the normals a steady turn explains.
+/// What the gaps of a ball tell is up to a fifth too much or too little, by how far up they are known.
+pub(crate) fn relative_radius<'c>(
+    radius: Vec3,
+    centre: Vec3,
+    contacts: impl Iterator<Item = &'c ContactPixel>,
+) -> (Vec3, f32) {
+    let (axis, by_gaps) = radius.normalize_and_length();
+    let (mut squares, mut turn, mut turns) = (0.0, 0.0, 0.0);
+    for contact in contacts {
+        let place = (contact.middle() - centre).dot(axis);
+        let normal = (contact.normal_a + contact.normal_b).dot(axis);
+        squares += place * place;
+        turn += place * normal;
+        turns += normal * normal;
+    }
+    let by_normals = squares / turn.max(f32::MIN_POSITIVE);
+    let radius = by_normals.clamp(by_gaps / ALIKE_RADII, by_gaps * ALIKE_RADII) * axis;
+    let steady = turn * turn / (squares * turns).max(f32::MIN_POSITIVE);
+    (radius, steady)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fastrand::Rng;
+
+    /// A sum of twelve has the variance of one.
+    fn normal(rng: &mut Rng) -> f32 {
+        (0..12).map(|_| rng.f32() - 0.5).sum()
+    }
+
+    /// Places in a disc, in standard deviations along both axes.
+    fn disc(radius_squared: f32) -> Vec<Vec2> {
+        let grid = (-4..=4).flat_map(|i| (-4..=4).map(move |j| Vec2::new(i as f32, j as f32)));
+        let disc: Vec<Vec2> = grid
+            .filter(|p| p.length_squared() < radius_squared)
+            .collect();
+        let variance = disc.iter().map(|p| p.x * p.x).sum::<f32>() / disc.len() as f32;
+        disc.into_iter().map(|p| p / variance.sqrt()).collect()
+    }
+
+    /// A bowl's lowest place is found under noise, which scatters as the fit says it does.
+    #[test]
+    fn noise_moves_the_lowest_point_as_far_as_told() {
+        let mut rng = Rng::with_seed(11);
+        let (places, widening, slope) = (disc(17.0), 0.4, Vec2::new(0.3, -0.2));
+        let count = places.len() as f32;
+        assert!(count >= MANY);
+        let (mut squares, rounds) = (Vec2::ZERO, 400);
+        let sigma = 0.1;
+        let mut told = Vec2::ZERO;
+        for _ in 0..rounds {
+            let noisy = |p: &Vec2| (*p, widening * (*p * *p - Vec2::ONE).element_sum());
+            let heights: Vec<(Vec2, f32)> = (places.iter().map(noisy))
+                .map(|(p, height)| (p, height + sigma * normal(&mut rng)))
+                .collect();
+            // The slope is fitted before.
+            let slope_of = |axis: fn(&Vec2) -> f32| {
+                heights.iter().map(|(p, h)| axis(p) * h).sum::<f32>() / count
+            };
+            let fitted = slope + Vec2::new(slope_of(|p| p.x), slope_of(|p| p.y));
+            let bowl = Bowl::fit(heights.iter().copied(), count);
+            let (lowest, _) = bowl.lowest(fitted, 10.0 * sigma).expect("a bowl");
+            squares += (lowest + 0.5 * slope / widening).powf(2.0);
+            told += sigma / count.sqrt() * bowl.place_per_slope();
+        }
+        let scatter = (squares.element_sum() / (2.0 * rounds as f32)).sqrt();
+        let told = told.element_sum() / (2.0 * rounds as f32);
+        // That the bend is fitted, too, adds a little.
+        assert!((0.9..1.2).contains(&(scatter / told)), "{scatter} {told}");
+    }
+
+    /// A bowl under noise is one where many points tell so; of few it may as well be a rim.
+    #[test]
+    fn few_noisy_points_are_no_bowl() {
+        let mut rng = Rng::with_seed(14);
+        for (radius_squared, is_bowl) in [(7.0, false), (17.0, true)] {
+            let places = disc(radius_squared);
+            assert_eq!(places.len() as f32 >= MANY, is_bowl);
+            let heights: Vec<(Vec2, f32)> = (places.iter())
+                .map(|p| (*p, 0.4 * (*p * *p - Vec2::ONE).element_sum()))
+                .map(|(p, height)| (p, height + 0.1 * normal(&mut rng)))
+                .collect();
+            let bowl = Bowl::fit(heights.iter().copied(), places.len() as f32);
+            let roughness = 0.45;
+            assert!(
+                (0.15..0.4).contains(&(bowl.left / roughness)),
+                "{}",
+                bowl.left
+            );
+            assert_eq!(bowl.lowest(Vec2::ZERO, roughness).is_some(), is_bowl);
+        }
+    }
+
+    /// Gaps that widen along one axis only, as around the edge of a box, are no bowl, at any noise.
+    #[test]
+    fn a_noisy_edge_is_no_bowl() {
+        let mut rng = Rng::with_seed(13);
+        let places = disc(17.0);
+        let mut round = 0;
+        for across in [0.0, 0.4] {
+            for _ in 0..200 {
+                let height = |p: &Vec2| Vec2::new(0.4, across).dot(*p * *p - Vec2::ONE);
+                let heights: Vec<(Vec2, f32)> = (places.iter())
+                    .map(|p| (*p, height(p) + 0.08 * normal(&mut rng)))
+                    .collect();
+                let bowl = Bowl::fit(heights.iter().copied(), places.len() as f32);
+                let lowest = bowl.lowest(Vec2::ZERO, 1.0);
+                assert!(lowest.is_none() || across > 0.0);
+                round += usize::from(lowest.is_some());
+            }
+        }
+        assert_eq!(round, 200);
+    }
+
+    /// Two standard errors of noise, none of what smooth surfaces leave or of too few pixels.
+    #[test]
+    fn noise_is_told_from_smooth_surfaces() {
+        let mut rng = Rng::with_seed(12);
+        let mut off = |sigma: f32, count: usize| -> Vec<f32> {
+            (0..count).map(|_| sigma * normal(&mut rng)).collect()
+        };
+        assert_eq!(slope_error(off(0.03, 60).into_iter(), 1.0), 0.0);
+        assert_eq!(slope_error(off(0.2, 20).into_iter(), 1.0), 0.0);
+        let error = slope_error(off(0.2, 60).into_iter(), 1.0);
+        let expected = DOUBT * 0.2 / OFF_FIT * (ALIKE / 60.0).sqrt();
+        assert!((error / expected - 1.0).abs() < 0.3, "{error} {expected}");
+        let scaled = slope_error(off(0.002, 60).into_iter(), 0.01);
+        assert!((100.0 * scaled / expected - 1.0).abs() < 0.3, "{scaled}");
+    }
+}

@@ -1,0 +1,353 @@
+//! How deep a contact is at an edge or a corner.
+//!
+//! Pixels see such a contact beside its lowest place, and a fit through them is rounded: edges
+//! would be 0.3 pixels too high, corners 0.5. Their normals tell the faces, and the contact is
+//! where the planes of the faces meet. An edge that is rounded by less than two pixels counts as
+//! sharp, because in its pixels all edges are round.
+
+use crate::contact::supports::ramp;
+use crate::{ContactPixel, ContactPoint};
+use arrayvec::ArrayVec;
+use glamx::{Mat3, Vec2, Vec3};
+
+/// Most faces that meet. A corner has three, or three of its faces suffice.
+const MOST_FACES: usize = 3;
+
+/// Difference between the slopes of the gaps over two faces at which they begin to count as two,
+/// and at which they fully do.
+const APART: [f32; 2] = [0.5, 1.0];
+
+/// Largest difference between the slope of the gaps in a pixel and that over its face, while the
+/// face is searched and once it is found. Steep faces are allowed more.
+const NEAR_FACE: f32 = 0.3;
+const OF_FACE: f32 = 0.15;
+
+/// Least share of the pixels that a face needs. And the share of the pixels of all faces at which
+/// faces begin to explain the contact, and at which they fully do. Noise has normals of all kinds.
+const LEAST_SHARE: f32 = 0.05;
+const OF_FACES: [f32; 2] = [0.25, 0.45];
+
+/// Height in pixels of the lowest pixel above all faces at which faces begin to fail as an
+/// explanation, and at which they do fail. A round surface is above its tangents.
+const ROUND: [f32; 2] = [0.1, 0.25];
+
+/// Largest distance at which faces may meet below the lowest pixel, in pixels.
+const LOWEST: f32 = 1.0;
+
+/// Most by which a gap along the normal of the contact and one along the pixel's own differ.
+const LONGER: f32 = 2.0;
+
+/// The gap over a face, in metres, at a place on the plane of a contact: `at_origin + slope · place`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Face {
+    at_origin: f32,
+    slope: Vec2,
+    pixels: f32,
+}
+
+impl Face {
+    fn at(&self, place: Vec2) -> f32 {
+        self.at_origin + self.slope.dot(place)
+    }
+}
+
+/// The plane of a contact.
+pub(crate) struct Frame {
+    pub(crate) origin: Vec3,
+    /// Unit vectors.
+    pub(crate) axes: [Vec3; 2],
+    pub(crate) normal: Vec3,
+}
+
+impl Frame {
+    fn place(&self, point: Vec3) -> Vec2 {
+        let off = point - self.origin;
+        Vec2::new(off.dot(self.axes[0]), off.dot(self.axes[1]))
+    }
+
+    /// The gap over the tangent planes of both surfaces in a pixel.
+    fn face(&self, contact: &ContactPixel) -> Face {
+        let slope = |normal: Vec3| {
+            let across = Vec2::new(normal.dot(self.axes[0]), normal.dot(self.axes[1]));
+            -across / normal.dot(self.normal)
+        };
+        let (slope_a, slope_b) = (slope(contact.normal_a), slope(contact.normal_b));
+        let (at_a, at_b) = (self.place(contact.point_a), self.place(contact.point_b));
+        Face {
+            at_origin: self.gap(contact) - slope_b.dot(at_b) + slope_a.dot(at_a),
+            slope: slope_b - slope_a,
+            pixels: 1.0,
+        }
+    }
+
+    /// The gap of a pixel along the normal of the contact, and not its own.
+    fn gap(&self, contact: &ContactPixel) -> f32 {
+        let apart = contact.point_b - contact.point_a;
+        let longer = apart.dot(self.normal) / apart.dot(contact.normal());
+        let longer = if longer.is_finite() { longer } else { 1.0 };
+        longer.clamp(1.0 / LONGER, LONGER) * contact.gap
+    }
+}
+
+/// How far the contact of `pixels` is below `deepest`, the lowest of the points that were fitted to
+/// them, metres. `tangents` is overwritten.
+pub(crate) fn lower_by<'a>(
+    pixels: impl Iterator<Item = &'a ContactPixel> + Clone,
+    frame: &Frame,
+    deepest: &ContactPoint,
+    pixel_size: f32,
+    tangents: &mut Vec<Face>,
+) -> f32 {
+    tangents.clear();
+    let all = pixels.clone().map(|contact| frame.face(contact));
+    tangents.extend(all.filter(|face| face.slope.is_finite()));
+    let faces = faces(tangents);
+    let Some(vertex) = Vertex::of(&faces, frame.place(deepest.middle())) else {
+        return 0.0;
+    };
+    let (count, lowest) = (pixels.map(|contact| (frame.gap(contact), contact.point_b))).fold(
+        (0.0, (f32::INFINITY, Vec3::ZERO)),
+        |(count, lowest), pixel| (count + 1.0, if pixel.0 < lowest.0 { pixel } else { lowest }),
+    );
+    let (lowest, place) = (lowest.0, frame.place(lowest.1));
+    let faces_there = vertex.faces.iter().map(|face| face.at(place));
+    let above = lowest - faces_there.fold(f32::NEG_INFINITY, f32::max);
+    let of_faces: f32 = faces.iter().map(|face| face.pixels).sum();
+    let sure = ramp(vertex.apart, APART)
+        * ramp(of_faces / count, OF_FACES)
+        * (1.0 - ramp(above / pixel_size, ROUND));
+    let gap = vertex.gap.max(lowest - LOWEST * pixel_size);
+    sure * (deepest.gap - gap).max(0.0)
+}
+
+/// The faces that meet, by slopes that are as far apart as there are.
+fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_FACES> {
+    let count = tangents.len() as f32;
+    let mean = tangents.iter().map(|face| face.slope).sum::<Vec2>() / count;
+    let mut seeds = ArrayVec::<Vec2, MOST_FACES>::new();
+    while !seeds.is_full() {
+        let off = |slope: Vec2| match seeds.is_empty() {
+            true => slope.distance(mean),
+            false => seeds
+                .iter()
+                .map(|seed| slope.distance(*seed))
+                .fold(f32::INFINITY, f32::min),
+        };
+        let farthest = (tangents.iter())
+            .map(|face| (off(face.slope), face.slope))
+            .max_by(|m, n| m.0.total_cmp(&n.0));
+        match farthest {
+            Some((off, slope)) if seeds.is_empty() || off >= APART[0] => seeds.push(slope),
+            _ => break,
+        }
+    }
+    let mut faces = ArrayVec::<Face, MOST_FACES>::new();
+    if seeds.len() < 2 {
+        return faces;
+    }
+    let around = |slope: Vec2, tolerance: f32| {
+        let reach = tolerance * (1.0 + slope.length());
+        let near = tangents
+            .iter()
+            .filter(|face| face.slope.distance(slope) < reach);
+        let sum = near.fold(Face::default(), |sum, face| Face {
+            at_origin: sum.at_origin + face.at_origin,
+            slope: sum.slope + face.slope,
+            pixels: sum.pixels + 1.0,
+        });
+        Face {
+            at_origin: sum.at_origin / sum.pixels,
+            slope: sum.slope / sum.pixels,
+            ..sum
+        }
+    };
+    for seed in seeds {
+        // From the extremes to where most are.
+        let near = around(around(seed, NEAR_FACE).slope, NEAR_FACE);
+        let face = around(near.slope, OF_FACE);
+        let is_new = |known: &Face| known.slope.distance(face.slope) >= APART[0];
+        if face.pixels >= LEAST_SHARE * count && faces.iter().all(is_new) {
+            faces.push(face);
+        }
+    }
+    faces
+}
+
+/// Where faces meet.
+struct Vertex {
+    gap: f32,
+    faces: ArrayVec<Face, MOST_FACES>,
+    /// By how much the slopes over them differ at the least.
+    apart: f32,
+}
+
+impl Vertex {
+    /// Where three faces meet at a point, or else two on the way of steepest descent from `place`.
+    fn of(faces: &[Face], place: Vec2) -> Option<Self> {
+        if let [f, g, h] = faces {
+            let columns = [f, g, h].map(|face| face.slope.extend(1.0));
+            let [x, y, z] = columns;
+            let weights = Mat3::from_cols(x, y, z).inverse() * Vec3::Z;
+            if weights.is_finite() && weights.min_element() >= 0.0 {
+                let apart = [f.slope - g.slope, g.slope - h.slope, h.slope - f.slope];
+                return Some(Self {
+                    gap: weights.dot(Vec3::new(f.at_origin, g.at_origin, h.at_origin)),
+                    faces: faces.iter().copied().collect(),
+                    apart: apart
+                        .map(Vec2::length)
+                        .into_iter()
+                        .fold(f32::INFINITY, f32::min),
+                });
+            }
+        }
+        let mut highest: Option<Self> = None;
+        for (k, f) in faces.iter().enumerate() {
+            for g in &faces[k + 1..] {
+                let across = (f.slope - g.slope).normalize_or_zero();
+                let (down, up) = (g.slope.dot(across), f.slope.dot(across));
+                if down >= 0.0 || up <= 0.0 {
+                    continue;
+                }
+                let gap = (up * g.at(place) - down * f.at(place)) / (up - down);
+                if highest.as_ref().is_none_or(|highest| gap > highest.gap) {
+                    highest = Some(Self {
+                        gap,
+                        faces: [*f, *g].into_iter().collect(),
+                        apart: up - down,
+                    });
+                }
+            }
+        }
+        highest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::TAU;
+
+    /// Contact pixels of a body over a floor at height 0, in a view straight down: its height and slope at a place.
+    fn pixels(body: impl Fn(Vec2) -> (f32, Vec2)) -> Vec<ContactPixel> {
+        let grid = (-4..=4).flat_map(|j| (-4..=4).map(move |i| [i, j]));
+        grid.map(|pixel| {
+            let [x, z] = pixel.map(|k| k as f32);
+            let (height, slope) = body(Vec2::new(x, z));
+            let normal_b = Vec3::new(slope.x, -1.0, slope.y).normalize();
+            let mut contact = ContactPixel {
+                pixel,
+                view: 0,
+                point_a: Vec3::new(x, 0.0, z),
+                point_b: Vec3::new(x, height, z),
+                normal_a: Vec3::Y,
+                normal_b,
+                gap: 0.0,
+            };
+            contact.gap = height * contact.normal().y;
+            contact
+        })
+        .filter(|contact| contact.point_b.y < 1.0)
+        .collect()
+    }
+
+    /// Where the contact of `pixels` is, for a fit that is 0.3 above the lowest of them.
+    fn found(pixels: &[ContactPixel]) -> f32 {
+        let lowest = |m: &&ContactPixel, n: &&ContactPixel| m.point_b.y.total_cmp(&n.point_b.y);
+        let lowest = pixels.iter().min_by(lowest).expect("there are some");
+        let deepest = ContactPoint {
+            point_a: lowest.point_a,
+            point_b: lowest.point_b,
+            gap: lowest.point_b.y + 0.3,
+        };
+        let frame = Frame {
+            origin: Vec3::new(0.2, 0.0, -0.1),
+            axes: [Vec3::X, -Vec3::Z],
+            normal: Vec3::Y,
+        };
+        deepest.gap - lower_by(pixels.iter(), &frame, &deepest, 1.0, &mut vec![])
+    }
+
+    /// The highest of planes through one place, and its slope.
+    fn of_planes(planes: &[Vec2], apex: Vec2, depth: f32) -> impl Fn(Vec2) -> (f32, Vec2) {
+        move |place| {
+            let heights = planes
+                .iter()
+                .map(|slope| (slope.dot(place - apex) - depth, *slope));
+            heights
+                .max_by(|m, n| m.0.total_cmp(&n.0))
+                .expect("there are some")
+        }
+    }
+
+    #[test]
+    fn edges_and_corners_are_where_their_faces_meet() {
+        let mut rng = fastrand::Rng::with_seed(1);
+        for faces in [2, 3] {
+            for _ in 0..200 {
+                let turn = TAU * rng.f32();
+                let planes: Vec<Vec2> = (0..faces)
+                    .map(|k| {
+                        let angle = turn + TAU * k as f32 / faces as f32;
+                        (0.7 + 0.8 * rng.f32()) * Vec2::from_angle(angle)
+                    })
+                    .collect();
+                let apex = Vec2::new(rng.f32() - 0.5, rng.f32() - 0.5);
+                let depth = 0.5 + rng.f32();
+                let off = found(&pixels(of_planes(&planes, apex, depth))) + depth;
+                assert!(off.abs() < 1e-3, "{off} of {depth}: {planes:?} at {apex}");
+            }
+        }
+    }
+
+    /// Balls, ridges that are rounded, and normals that say nothing: what is fitted is left.
+    #[test]
+    fn what_has_no_faces_is_as_low_as_its_pixels() {
+        let mut rng = fastrand::Rng::with_seed(3);
+        for radius in [2.0, 3.0, 4.0, 5.0, 8.0] {
+            for _ in 0..20 {
+                let lowest = Vec2::new(rng.f32() - 0.5, rng.f32() - 0.5);
+                let ball = |place: Vec2| {
+                    let off = place - lowest;
+                    (0.5 * off.length_squared() / radius - 1.0, off / radius)
+                };
+                let pixels = pixels(ball);
+                let least = pixels
+                    .iter()
+                    .map(|c| c.point_b.y)
+                    .fold(f32::INFINITY, f32::min);
+                let lower = least + 0.3 - found(&pixels);
+                assert!(
+                    lower.abs() < 0.1,
+                    "{lower} of a ball of {radius} at {lowest}"
+                );
+            }
+        }
+        let ridge = |place: Vec2| {
+            let height = place.x.hypot(3.0);
+            (height - 4.0, Vec2::new(place.x / height, 0.0))
+        };
+        let lower = -0.7 - found(&pixels(ridge));
+        assert!(lower.abs() < 0.1, "{lower} of a ridge");
+        // An edge of which one normal in eight is its own.
+        let faces = [Vec2::X, -Vec2::X];
+        let mut noisy = pixels(of_planes(&faces, Vec2::splat(0.4), 0.5));
+        for contact in &mut noisy {
+            if !contact.pixel.iter().all(|k| k % 2 == 0) || rng.bool() {
+                let aside = 1.5 * rng.f32() * Vec2::from_angle(TAU * rng.f32());
+                contact.normal_b = Vec3::new(aside.x, -1.0, aside.y).normalize();
+                contact.gap = contact.point_b.y * contact.normal().y;
+            }
+        }
+        let (lowest, found) = (
+            noisy.iter().map(|c| c.point_b.y).fold(0.0, f32::min),
+            found(&noisy),
+        );
+        assert_eq!(found, lowest + 0.3);
+    }
+
+    #[test]
+    fn what_is_seen_edge_on_says_nothing() {
+        let upright = |_: Vec2| (0.0, Vec2::new(f32::INFINITY, 0.0));
+        assert_eq!(found(&pixels(upright)), 0.3);
+    }
+}
