@@ -13,9 +13,9 @@ use rapier3d_tldi::prelude::*;
 /// Bytes a pair may hold for each of its points: 16 pixels on both sides, splats, fragments and layers.
 const BYTES_PER_POINT: usize = 4 << 10;
 
-/// Bytes a pair may hold whatever its points: images of 2¹⁶ pixels before they are folded, and a grid of 4 Mi bits
-/// three times. An image over a square of 70 m takes 50 MB.
-const BYTES: usize = 16 << 20;
+/// Bytes a pair may hold whatever its points: the 2²² pixels of [`Room`](tldi::Room), two words each. From which side
+/// a pair is seen, and so how much of the room it takes, hangs on single contact pixels: 25 or 33 MB at 7 km.
+const BYTES: usize = 32 << 20;
 
 /// The same where pixels must be larger: images of 4 Mi pixels on both sides, and their tiles.
 const BYTES_OF_LARGEST: usize = 128 << 20;
