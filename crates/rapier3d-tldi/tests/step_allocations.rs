@@ -16,8 +16,9 @@ const SPACING: f32 = 0.02;
 const WARM: usize = 200;
 const COUNTED: usize = 100;
 
-/// Allocations of a step in the mean: 146 were measured, of which rapier has its own.
-const MOST: f64 = 150.0;
+/// Allocations of a step in the mean, of which rapier has its own: 146 were measured, 153 in debug, where the compiler
+/// removes none.
+const MOST: f64 = 157.0;
 
 /// A square of 2 m in the x-z plane.
 fn square() -> Vec<Vector> {
