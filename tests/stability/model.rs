@@ -27,6 +27,11 @@ static BUNNY_MESH: LazyLock<Mesh> = LazyLock::new(|| {
     }
 });
 
+/// Whether the bunny is at hand.
+pub(crate) fn has_bunny() -> bool {
+    data_file(BUNNY).is_some()
+}
+
 /// Corners of the bounds.
 pub(crate) fn bounds(points: &[Vec3]) -> (Vec3, Vec3) {
     points

@@ -177,6 +177,11 @@ fn fixed_samples(
 }
 
 fn new_samples(setup: &Setup, verdict: &mut Verdict, body: Body, seed: u64) -> Result<(), Stop> {
+    if body == Body::Bunny && !model::has_bunny() {
+        return Err(Stop::Unfit(
+            "the bunny is not at hand; the pebble in its place rocks by up to 2.5 cm/s",
+        ));
+    }
     let mut rng = Rng::with_seed(seed);
     let mut sample = {
         let mut rng = Rng::with_seed(seed ^ 0x5eed);
