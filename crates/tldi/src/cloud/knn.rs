@@ -77,13 +77,13 @@ pub(super) struct Split {
 
 /// A subtree still to be visited.
 #[derive(Clone, Copy)]
-struct Subtree {
+pub(super) struct Subtree {
     /// Its first split, in pre-order.
-    split: usize,
-    first_leaf: usize,
-    leaves: usize,
-    /// Vector from the query to the subtree's cell; 0 along axes where the query is within it.
-    offset: [f64; 3],
+    pub(super) split: usize,
+    pub(super) first_leaf: usize,
+    pub(super) leaves: usize,
+    /// Vector from the query, a point or the bounds of a leaf, to the subtree's cell; 0 along axes where they overlap.
+    pub(super) offset: [f64; 3],
 }
 
 impl KdTree {

@@ -1,7 +1,7 @@
 //! The nearest neighbours of all positions of a leaf at once.
 
 use crate::KdTree;
-use crate::cloud::knn::{LEVELS, Neighbor, insert, leaf_start, length_squared, reach};
+use crate::cloud::knn::{LEVELS, Neighbor, Subtree, insert, leaf_start, length_squared, reach};
 use arrayvec::ArrayVec;
 use glamx::DVec3;
 use multiversion::multiversion;
@@ -31,15 +31,6 @@ pub(super) struct LeafSearch<'a> {
     distances: Vec<f64>,
     keys: Vec<u128>,
     found: Vec<Neighbor>,
-}
-
-/// A subtree, and the vector from the leaf's bounds to its cell; 0 along axes where they overlap.
-#[derive(Clone, Copy)]
-struct Subtree {
-    split: usize,
-    first_leaf: usize,
-    leaves: usize,
-    offset: [f64; 3],
 }
 
 impl<'a> LeafSearch<'a> {
