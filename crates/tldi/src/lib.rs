@@ -13,11 +13,14 @@ pub mod paper;
 mod view;
 
 pub use aabb::Aabb;
-pub use cloud::builder::{CloudBuilder, NonFinite, Positions};
+pub use cloud::builder::CloudBuilder;
 pub use cloud::error::CloudError;
+pub use cloud::gather::BLOCK;
 pub use cloud::knn::{KdTree, Neighbor};
-pub use cloud::point_cloud::{BLOCK, PointCloud, Radii};
-pub use cloud::recipe::{CloudRecipe, RadiusRule};
+pub use cloud::point_cloud::PointCloud;
+pub use cloud::positions::Positions;
+pub use cloud::radii::Radii;
+pub use cloud::recipe::{CloudRecipe, NonFinite, RadiusRule};
 pub use contact::bowl::Lowest;
 pub use contact::patch_types::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS};
 pub use contact::patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};

@@ -1,86 +1,15 @@
 //! Builds and validates clouds.
 
-use crate::cloud::gather::{Gathered, block_bounds, non_finite_indices, without};
+use crate::cloud::checks::{check_count, check_dropped, check_length};
+use crate::cloud::gather::{block_bounds, merged, without};
 use crate::cloud::morton::{morton_order, permuted};
 use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_cloud::{Spare, next_content_id};
 use crate::cloud::point_normals::{fill_from_nearest, normalize, turn_towards};
 use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
-use crate::{Aabb, CloudError, CloudRecipe, PointCloud, Radii, RadiusRule};
+use crate::{CloudError, CloudRecipe, NonFinite, PointCloud, Positions, Radii, RadiusRule};
 use glamx::Vec3;
 use std::borrow::Cow;
-
-/// Most points of a cloud: indices, and counts of up to 64 pixels for each point, fit 32 bits.
-const MAX_POINTS: usize = (u32::MAX / 64) as usize;
-
-/// Where the positions of a cloud come from.
-///
-/// ```
-/// use tldi::{PointCloud, Positions};
-/// let (x, y, z) = (vec![0.0, 1.0, 2.0], vec![0.0; 3], vec![0.0; 3]);
-/// let cloud = PointCloud::builder([&x[..], &y[..], &z[..]]).radius(1.0).build()?;
-/// assert_eq!(cloud.coordinates()[0].as_ptr(), x.as_ptr(), "no copy");
-/// # Ok::<(), tldi::CloudError>(())
-/// ```
-#[derive(Clone, Debug)]
-pub enum Positions<'a> {
-    /// Vectors, borrowed or owned; transposed into the cloud in the pass that validates them.
-    Vectors(Cow<'a, [Vec3]>),
-    /// One slice per coordinate: borrowed by the cloud without a copy where every point is finite.
-    Soa {
-        /// x coordinates in metres.
-        x: Cow<'a, [f32]>,
-        /// y coordinates in metres.
-        y: Cow<'a, [f32]>,
-        /// z coordinates in metres.
-        z: Cow<'a, [f32]>,
-    },
-}
-
-impl<'a> From<&'a [Vec3]> for Positions<'a> {
-    fn from(points: &'a [Vec3]) -> Self {
-        Self::Vectors(Cow::Borrowed(points))
-    }
-}
-impl<'a> From<&'a Vec<Vec3>> for Positions<'a> {
-    fn from(points: &'a Vec<Vec3>) -> Self {
-        Self::Vectors(Cow::Borrowed(points))
-    }
-}
-impl From<Vec<Vec3>> for Positions<'_> {
-    fn from(points: Vec<Vec3>) -> Self {
-        Self::Vectors(Cow::Owned(points))
-    }
-}
-impl<'a> From<[&'a [f32]; 3]> for Positions<'a> {
-    fn from([x, y, z]: [&'a [f32]; 3]) -> Self {
-        Self::Soa {
-            x: x.into(),
-            y: y.into(),
-            z: z.into(),
-        }
-    }
-}
-impl From<[Vec<f32>; 3]> for Positions<'_> {
-    fn from([x, y, z]: [Vec<f32>; 3]) -> Self {
-        Self::Soa {
-            x: x.into(),
-            y: y.into(),
-            z: z.into(),
-        }
-    }
-}
-
-/// What to do with points that have a NaN or infinite coordinate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum NonFinite {
-    /// Leave them out, together with their attributes, and count them
-    /// ([`PointCloud::dropped`]): depth cameras emit NaN where they saw nothing.
-    #[default]
-    Drop,
-    /// Fail with [`CloudError::NonFinite`].
-    Refuse,
-}
 
 /// Normals of the caller's.
 #[derive(Clone, Debug)]
@@ -122,8 +51,16 @@ pub struct CloudBuilder<'a> {
     spatial_order: bool,
 }
 
+impl<'a> PointCloud<'a> {
+    /// Starts a builder over `points`: a slice or vector of vectors (transposed in the pass that
+    /// validates), or [`Positions::Soa`] slices, which are borrowed.
+    pub fn builder(points: impl Into<Positions<'a>>) -> CloudBuilder<'a> {
+        CloudBuilder::new(points.into())
+    }
+}
+
 impl<'a> CloudBuilder<'a> {
-    pub(crate) fn new(positions: Positions<'a>) -> Self {
+    fn new(positions: Positions<'a>) -> Self {
         Self {
             positions,
             recipe: CloudRecipe::default(),
@@ -274,7 +211,7 @@ impl<'a> CloudBuilder<'a> {
     pub fn build(self) -> Result<PointCloud<'a>, CloudError> {
         self.recipe.check()?;
         let count = self.check_lengths()?;
-        let (mut coordinates, mut blocks, dropped) = gather(self.positions);
+        let (mut coordinates, mut blocks, dropped) = self.positions.gather();
         let recipe = self.recipe;
         check_dropped(recipe.non_finite, count, &dropped)?;
         let mut radii = self.radii;
@@ -375,83 +312,6 @@ impl<'a> CloudBuilder<'a> {
             check_length("colors", colors.len(), count)?;
         }
         Ok(count)
-    }
-}
-
-/// Fails for more points than a cloud can have.
-pub(crate) fn check_count(count: usize) -> Result<(), CloudError> {
-    if count > MAX_POINTS {
-        return Err(CloudError::TooManyPoints {
-            count,
-            limit: MAX_POINTS,
-        });
-    }
-    Ok(())
-}
-
-/// Fails if an attribute does not have one entry for each point.
-pub(crate) fn check_length(
-    attribute: &'static str,
-    actual: usize,
-    expected: usize,
-) -> Result<(), CloudError> {
-    if actual != expected {
-        return Err(CloudError::LengthMismatch {
-            attribute,
-            expected,
-            actual,
-        });
-    }
-    Ok(())
-}
-
-/// Fails if the policy refuses the non-finite points, or no other is left of `count`.
-pub(crate) fn check_dropped(
-    policy: NonFinite,
-    count: usize,
-    dropped: &[u32],
-) -> Result<(), CloudError> {
-    match dropped.first() {
-        Some(&first) if policy == NonFinite::Refuse => Err(CloudError::NonFinite {
-            index: first as usize,
-            count: dropped.len(),
-        }),
-        _ if dropped.len() == count => Err(CloudError::Empty {
-            dropped: dropped.len(),
-        }),
-        _ => Ok(()),
-    }
-}
-
-/// The union of all blocks.
-pub(crate) fn merged(blocks: &[Aabb]) -> Aabb {
-    blocks.iter().copied().fold(Aabb::EMPTY, Aabb::merged)
-}
-
-/// The finite points, the bounds of their blocks, and the indices of the others, ascending.
-fn gather(positions: Positions<'_>) -> ([Cow<'_, [f32]>; 3], Vec<Aabb>, Vec<u32>) {
-    match positions {
-        Positions::Vectors(points) => {
-            let mut gathered = Gathered::default();
-            gathered.refill(&points, None);
-            let Gathered {
-                x,
-                y,
-                z,
-                blocks,
-                dropped,
-            } = gathered;
-            ([x, y, z].map(Cow::Owned), blocks, dropped)
-        }
-        Positions::Soa { x, y, z } => {
-            let dropped = non_finite_indices([&x, &y, &z]);
-            let mut coordinates = [x, y, z];
-            if !dropped.is_empty() {
-                coordinates = coordinates.map(|c| Cow::Owned(without(&c, &dropped)));
-            }
-            let blocks = block_bounds(coordinates.each_ref().map(|c| &**c));
-            (coordinates, blocks, dropped)
-        }
     }
 }
 

@@ -1,8 +1,11 @@
 //! The one pass over raw points: finiteness, transposition to structure of arrays, block bounds.
 
-use crate::{Aabb, BLOCK};
+use crate::Aabb;
 use glamx::Vec3;
 use multiversion::multiversion;
+
+/// Points per block: [`PointCloud::blocks`](crate::PointCloud::blocks) bounds that many consecutive points each.
+pub const BLOCK: usize = 256;
 
 /// Finite points as structure of arrays, with what was learnt while reading them. All buffers keep
 /// their memory from one [`Gathered::refill`] to the next.
@@ -165,4 +168,9 @@ pub(crate) fn extend_without<T>(
             kept.push(value);
         }
     }
+}
+
+/// The union of all blocks.
+pub(crate) fn merged(blocks: &[Aabb]) -> Aabb {
+    blocks.iter().copied().fold(Aabb::EMPTY, Aabb::merged)
 }

@@ -1,6 +1,7 @@
 //! Point clouds: how they are built, checked and searched.
 
 pub(crate) mod builder;
+pub(crate) mod checks;
 pub(crate) mod error;
 pub(crate) mod gather;
 pub(crate) mod knn;
@@ -9,6 +10,7 @@ pub(crate) mod morton;
 pub(crate) mod neighborhoods;
 pub(crate) mod point_cloud;
 pub(crate) mod point_normals;
+pub(crate) mod positions;
 pub(crate) mod radii;
 pub(crate) mod reach;
 pub(crate) mod recipe;

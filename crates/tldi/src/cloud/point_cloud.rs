@@ -1,31 +1,19 @@
 //! The point cloud: positions, radii, optional normals and colours, bounds.
 
-use crate::cloud::builder::{check_count, check_dropped, check_length, merged};
-use crate::cloud::gather::{Gathered, extend_without};
+use crate::cloud::checks::{check_count, check_dropped, check_length};
+use crate::cloud::gather::{Gathered, extend_without, merged};
 use crate::cloud::morton::permuted;
 use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_normals::{fill_from_nearest, normalize};
 use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
-use crate::{Aabb, CloudBuilder, CloudError, CloudRecipe, Positions, RadiusRule};
+use crate::{Aabb, CloudError, CloudRecipe, Radii, RadiusRule};
 use glamx::Vec3;
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Points per block: [`PointCloud::blocks`] bounds that many consecutive points each.
-pub const BLOCK: usize = 256;
-
-/// Radius of the ball around each point, in metres.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Radii<'a> {
-    /// The same for all points.
-    Global(f32),
-    /// One for each point.
-    PerPoint(Cow<'a, [f32]>),
-}
-
 /// Points of one body in its own frame, validated once, with what is derived from them.
 ///
-/// Coordinates are held as structure of arrays, owned or borrowed ([`Positions`]). The balls of
+/// Coordinates are held as structure of arrays, owned or borrowed ([`Positions`](crate::Positions)). The balls of
 /// the radii around the points are meant to cover the surface that was sampled.
 ///
 /// ```
@@ -77,12 +65,6 @@ impl Clone for Spare {
 }
 
 impl<'a> PointCloud<'a> {
-    /// Starts a builder over `points`: a slice or vector of vectors (transposed in the pass that
-    /// validates), or [`Positions::Soa`] slices, which are borrowed.
-    pub fn builder(points: impl Into<Positions<'a>>) -> CloudBuilder<'a> {
-        CloudBuilder::new(points.into())
-    }
-
     /// Number of points (at least one).
     #[allow(
         clippy::len_without_is_empty,
@@ -146,7 +128,7 @@ impl<'a> PointCloud<'a> {
     }
 
     /// Standard deviation of the points along the surface's normal in metres, as
-    /// [told](CloudBuilder::noise); 0 where it was not.
+    /// [told](crate::CloudBuilder::noise); 0 where it was not.
     pub fn noise(&self) -> f32 {
         self.recipe.noise
     }
@@ -177,7 +159,7 @@ impl<'a> PointCloud<'a> {
         self.bounds
     }
 
-    /// Bounds of each run of [`BLOCK`] consecutive points: where the order of the points is
+    /// Bounds of each run of [`BLOCK`](crate::BLOCK) consecutive points: where the order of the points is
     /// spatially coherent, whole blocks are skipped by the culling pass.
     pub fn blocks(&self) -> &[Aabb] {
         &self.blocks
@@ -195,7 +177,7 @@ impl<'a> PointCloud<'a> {
         self.content
     }
 
-    /// After [`CloudBuilder::spatial_order`], the index that each point would have without it (the
+    /// After [`CloudBuilder::spatial_order`](crate::CloudBuilder::spatial_order), the index that each point would have without it (the
     /// index given by the caller, where nothing was dropped), so that whoever is told of a point of
     /// the cloud finds it in their own data. Else `None`: the points are as given.
     pub fn order(&self) -> Option<&[u32]> {
@@ -237,10 +219,10 @@ impl<'a> PointCloud<'a> {
     ///   [set](Self::set_radii) a global radius first, or build another cloud. Colours are kept under the
     ///   same condition, else removed.
     /// - Normals are replaced by those given, which must be outward (see
-    ///   [`CloudBuilder::normals`]). Without any they are estimated as
-    ///   [`CloudBuilder::pca_normals`] and [`viewpoint`](CloudBuilder::viewpoint) told the builder, or
+    ///   [`CloudBuilder::normals`](crate::CloudBuilder::normals)). Without any they are estimated as
+    ///   [`CloudBuilder::pca_normals`](crate::CloudBuilder::pca_normals) and [`viewpoint`](crate::CloudBuilder::viewpoint) told the builder, or
     ///   removed where it was not told: the former ones would be wrong.
-    /// - A cloud built with [`CloudBuilder::spatial_order`] takes the points in the order in which
+    /// - A cloud built with [`CloudBuilder::spatial_order`](crate::CloudBuilder::spatial_order) takes the points in the order in which
     ///   they were given to the builder and puts them into its own; if the number changes, or some
     ///   are dropped, it keeps them as they come and [`order`](Self::order) becomes `None`.
     ///

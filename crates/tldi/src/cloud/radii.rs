@@ -1,7 +1,17 @@
 //! Point radii: validation, and the spherical cover from nearest neighbours.
 
-use crate::{Aabb, CloudError, KdTree, Radii};
+use crate::{Aabb, CloudError, KdTree};
+use std::borrow::Cow;
 use std::ops::RangeInclusive;
+
+/// Radius of the ball around each point, in metres.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Radii<'a> {
+    /// The same for all points.
+    Global(f32),
+    /// One for each point.
+    PerPoint(Cow<'a, [f32]>),
+}
 
 /// Radii in metres that a cloud accepts: with [`COORDINATE_PER_RADIUS`], squares and cubes of all
 /// lengths stay within the range of `f32`.

@@ -1,6 +1,6 @@
 //! What is made of the points of a cloud: now, and of new ones later.
 
-use crate::{CloudError, NonFinite};
+use crate::CloudError;
 use glamx::Vec3;
 
 /// The paper's spherical cover: 0.65 × the distance to the 7th nearest neighbour.
@@ -30,6 +30,17 @@ impl RadiusRule {
             Self::NearestNeighbors { k, scale } => Some((k, scale)),
         }
     }
+}
+
+/// What to do with points that have a NaN or infinite coordinate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum NonFinite {
+    /// Leave them out, together with their attributes, and count them
+    /// ([`PointCloud::dropped`](crate::PointCloud::dropped)): depth cameras emit NaN where they saw nothing.
+    #[default]
+    Drop,
+    /// Fail with [`CloudError::NonFinite`].
+    Refuse,
 }
 
 /// What a cloud makes of its points, as a value: a builder applies it once,
