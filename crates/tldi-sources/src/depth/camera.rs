@@ -1,9 +1,10 @@
 //! From a depth image to points with radii and normals.
 
+use super::cloud::{DepthCloud, gathered};
+use super::sensor::{Intrinsics, SensorModel};
 use super::tile::{DEVIATIONS, Optics, Pixels, REACH, TILE, Window, compute};
 use rayon::prelude::*;
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{CloudBuilder, PointCloud};
 
 /// Fewest different depths of a frame that tell their common step: so many multiples of twice the step are among others
 /// less often than once in 10⁹ frames. With half as many it would be once in 60,000, with twice as many coarse frames of
@@ -11,76 +12,6 @@ use tldi::{CloudBuilder, PointCloud};
 const FEWEST_DEPTHS: usize = 32;
 /// Pixels without depth around the image, so that all of its pixels have neighbours.
 const FRINGE: usize = REACH;
-
-/// A pinhole camera without distortion. Pixel (u, v) at depth z sees the point
-/// ((u − cx) z / fx, (v − cy) z / fy, z) of the camera's frame: x right, y down, z ahead.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Intrinsics {
-    /// Columns and rows.
-    pub size: [usize; 2],
-    /// Focal lengths in pixels.
-    pub focal: [f32; 2],
-    /// Principal point in pixels.
-    pub center: [f32; 2],
-    /// Metres in a unit of the image.
-    pub depth_unit: f32,
-}
-
-/// How a sensor errs: by a part that grows with the range, by a part that does not, and by rounding.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SensorModel {
-    /// The part of the standard deviation of depth that grows with the square of the range, as in all
-    /// that triangulates: at a range of 1 m, metres.
-    pub noise: f32,
-    /// The part that is the same at any range, metres.
-    pub floor: f32,
-    /// Between one depth that the sensor tells and the next, metres. [`DepthCamera::new`] takes the
-    /// unit of the image where that is larger, and [`DepthCamera::points`] what its frame shows.
-    pub step: f32,
-    /// Nearest and farthest range that is believed, metres.
-    pub range: [f32; 2],
-}
-
-impl Default for SensorModel {
-    /// A Kinect (Khoshelham and Elberink 2012, doi:10.3390/s120201437) whose depths are whole
-    /// millimetres. The floor is what is left of 0.45 mm, measured at 0.4 m.
-    fn default() -> Self {
-        Self {
-            noise: 1.42e-3,
-            floor: 0.26e-3,
-            step: 1e-3,
-            range: [0.3, 8.0],
-        }
-    }
-}
-
-impl SensorModel {
-    /// A sensor whose error is the same at any range, as where light is timed: its standard deviation, and the
-    /// nearest and farthest range that is believed, metres.
-    pub fn time_of_flight(deviation: f32, range: [f32; 2]) -> Self {
-        Self {
-            noise: 0.0,
-            floor: deviation,
-            step: 0.0,
-            range,
-        }
-    }
-
-    /// Standard deviation of the depth `z`, both in metres.
-    ///
-    /// ```
-    /// use tldi_sources::depth::SensorModel;
-    /// let kinect = SensorModel::default();
-    /// assert!((kinect.deviation(0.4) - 0.45e-3).abs() < 0.01e-3);
-    /// assert!((kinect.deviation(3.0) - 12.8e-3).abs() < 0.1e-3);
-    /// ```
-    pub fn deviation(&self, z: f32) -> f32 {
-        let growing = self.noise * z * z;
-        // What is rounded errs evenly over a step.
-        let rounding = self.step * self.step / 12.0;
-        (growing * growing + self.floor * self.floor + rounding).sqrt()
-    }
-}
 
 /// Turns depth images into points; keeps its memory.
 #[derive(Clone, Debug)]
@@ -95,39 +26,6 @@ pub struct DepthCamera {
     inverses: Vec<f32>,
     /// The points of each row of tiles.
     rows: Vec<DepthCloud>,
-}
-
-/// Points of one frame, with an entry for each in all lists.
-#[derive(Clone, Debug, Default)]
-pub struct DepthCloud {
-    /// Positions, metres.
-    pub points: Vec<Vec3>,
-    /// Radii: what a pixel covers at its range and the deviation of its depth, together, metres.
-    pub radii: Vec<f32>,
-    /// Unit normals towards the camera.
-    pub normals: Vec<Vec3>,
-    /// Pixels without a measurement, or out of the sensor's range.
-    pub empty: usize,
-    /// Pixels left out because they are on no surface: at jumps in depth, where a sensor mixes what is
-    /// before and behind, or with too few pixels around on the same surface to tell its normal.
-    pub flying: usize,
-}
-
-impl DepthCloud {
-    /// Takes all points out; the memory stays.
-    fn clear(&mut self) {
-        self.points.clear();
-        self.radii.clear();
-        self.normals.clear();
-        (self.empty, self.flying) = (0, 0);
-    }
-
-    /// Hands the points to a builder.
-    pub fn into_builder(self) -> CloudBuilder<'static> {
-        PointCloud::builder(self.points)
-            .radii(self.radii)
-            .normals(self.normals)
-    }
 }
 
 impl DepthCamera {
@@ -340,18 +238,6 @@ fn greatest_common_divisor(a: u16, b: u16) -> u16 {
     } else {
         greatest_common_divisor(b, a % b)
     }
-}
-
-/// One list of all parts together.
-pub(super) fn gathered<T: Copy>(
-    rows: &[DepthCloud],
-    list: impl Fn(&DepthCloud) -> &Vec<T>,
-) -> Vec<T> {
-    let mut all = Vec::with_capacity(rows.iter().map(|row| list(row).len()).sum());
-    for row in rows {
-        all.extend_from_slice(list(row));
-    }
-    all
 }
 
 #[cfg(test)]

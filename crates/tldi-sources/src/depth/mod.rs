@@ -1,10 +1,15 @@
 //! Depth cameras: folders of frames, and points from depth images.
 
 mod camera;
+mod cloud;
 mod organized;
+mod ray_window;
+mod sensor;
 mod sequence;
 mod tile;
 
-pub use camera::{DepthCamera, DepthCloud, Intrinsics, SensorModel};
+pub use camera::DepthCamera;
+pub use cloud::DepthCloud;
 pub use organized::OrganizedCloud;
+pub use sensor::{Intrinsics, SensorModel};
 pub use sequence::{DepthError, DepthFrame, DepthSequence};

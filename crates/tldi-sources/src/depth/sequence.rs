@@ -1,6 +1,6 @@
 //! A folder of depth frames.
 
-use super::camera::Intrinsics;
+use super::sensor::Intrinsics;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};

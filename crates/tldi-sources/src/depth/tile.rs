@@ -1,6 +1,6 @@
 //! Points, normals and radii of the pixels of a tile's line, all at once.
 
-use super::camera::{Intrinsics, SensorModel};
+use super::sensor::{Intrinsics, SensorModel};
 use multiversion::multiversion;
 use tldi::glamx::{Mat3, Pose3, Vec3};
 

@@ -1,7 +1,7 @@
 //! Checks the sizes in LASzip data before the crate laz takes memory for them: the items of a
 //! record, the number of chunks, and the layers of each chunk.
 
-use super::{Preview, bad_header, bytes, truncated, unsigned};
+use super::preview::{Preview, bad_header, bytes, truncated, unsigned};
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::seekable::ReadSeek;

@@ -6,15 +6,16 @@
 //! ([`guarded`]).
 
 mod laszip;
+mod preview;
 
 use crate::collector::{Collector, ColorScale, Layout, Sample, check_count};
 use crate::error::Result;
 use crate::input::Input;
-use crate::scalar::{Endian, Scalar};
 use crate::seekable::{self, ReadSeek, guarded};
 use crate::{Format, Position, RawCloud, ReadOptions, SourceError, SourceErrorKind};
 use ::las::{Error, Header, Reader};
-use std::io::{ErrorKind, SeekFrom};
+use preview::{Preview, seek, truncated};
+use std::io::ErrorKind;
 use std::path::Path;
 
 /// Bytes of point records that are unpacked at once.
@@ -84,115 +85,6 @@ fn read(
         input.report_share(collector.count(), preview.points);
     }
     Ok(collector.finish()?)
-}
-
-/// What a header says about sizes, checked against the length of the file.
-struct Preview {
-    length: u64,
-    offset_to_points: u64,
-    record_length: u64,
-    points: u64,
-}
-
-impl Preview {
-    fn read(source: &mut dyn ReadSeek, length: u64) -> Result<Self> {
-        /// Size of the header of version 1.0 to 1.2, the shortest.
-        const SHORTEST: usize = 227;
-        /// Size of that of version 1.4.
-        const EXTENDED: usize = 375;
-        /// Size of the head of an extended variable-length record.
-        const EVLR_HEAD: u64 = 60;
-
-        let header = bytes(source, 0, SHORTEST, length)?;
-        let is_extended = (header[24], header[25]) >= (1, 4);
-        let header = if is_extended {
-            bytes(source, 0, EXTENDED, length)?
-        } else {
-            header
-        };
-        let u64_at = |at: usize| unsigned(Scalar::U64, &header[at..]);
-        let u32_at = |at: usize| unsigned(Scalar::U32, &header[at..]);
-        let legacy_points = u32_at(107);
-        let preview = Self {
-            length,
-            offset_to_points: u32_at(96),
-            record_length: unsigned(Scalar::U16, &header[105..]).max(1),
-            points: if is_extended && legacy_points == 0 {
-                u64_at(247)
-            } else {
-                legacy_points
-            },
-        };
-        if preview.offset_to_points > length {
-            return Err(truncated("the header", length));
-        }
-        // The crate seeks there, also in packed files.
-        if preview.points > u64::from(u32::MAX) * 16 {
-            let limit = u64::from(u32::MAX) * 16;
-            return Err(SourceErrorKind::TooManyPoints { limit }.into());
-        }
-        if is_extended && u32_at(243) > 0 {
-            let start = u64_at(235);
-            let head = bytes(source, start, EVLR_HEAD as usize, length)?;
-            let size = unsigned(Scalar::U64, &head[20..]);
-            if size > length - start - EVLR_HEAD {
-                return Err(truncated("an extended variable-length record", length));
-            }
-        }
-        Ok(preview)
-    }
-
-    /// Where uncompressed points end.
-    fn end_of_points(&self) -> u64 {
-        // No overflow: at most 2³² + 2³⁶ × 2¹⁶.
-        self.offset_to_points + self.points * self.record_length
-    }
-}
-
-/// The unsigned integer at the start of `bytes`.
-fn unsigned(scalar: Scalar, bytes: &[u8]) -> u64 {
-    match scalar {
-        Scalar::U64 => {
-            let low = Scalar::U32.decode(bytes, Endian::Little) as u64;
-            let high = Scalar::U32.decode(&bytes[4..], Endian::Little) as u64;
-            high << 32 | low
-        }
-        // At most 32 bits: exact.
-        _ => scalar.decode(bytes, Endian::Little) as u64,
-    }
-}
-
-/// `count` bytes at `start`, if the file of `length` bytes has them.
-fn bytes(source: &mut dyn ReadSeek, start: u64, count: usize, length: u64) -> Result<Vec<u8>> {
-    if start
-        .checked_add(count as u64)
-        .is_none_or(|end| end > length)
-    {
-        return Err(truncated("the header", length));
-    }
-    seek(source, start)?;
-    let mut found = vec![0; count];
-    source.read_exact(&mut found).map_err(io_error)?;
-    Ok(found)
-}
-
-fn seek(source: &mut dyn ReadSeek, to: u64) -> Result<()> {
-    source.seek(SeekFrom::Start(to)).map_err(io_error)?;
-    Ok(())
-}
-
-fn io_error(error: std::io::Error) -> SourceError {
-    SourceErrorKind::Io(error).into()
-}
-
-fn truncated(what: &str, length: u64) -> SourceError {
-    let what = what.to_owned();
-    SourceError::new(SourceErrorKind::Truncated { what }, Position::Byte(length))
-}
-
-fn bad_header(reason: String) -> SourceError {
-    let format = Format::Las;
-    SourceErrorKind::Header { format, reason }.into()
 }
 
 fn error(error: Error, position: Position) -> SourceError {

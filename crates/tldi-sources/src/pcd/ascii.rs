@@ -1,13 +1,12 @@
 //! Data as text: one point a line.
 
 use super::header::Header;
-use super::set;
 use crate::SourceErrorKind;
 use crate::collector::{Collector, Sample};
 use crate::error::Result;
 use crate::input::Input;
 use crate::scalar::{Scalar, parse_number};
-use crate::slot::{Column, Columns, Slot};
+use crate::slot::{Column, Columns};
 
 pub(super) fn read(
     input: &mut Input<'_>,
@@ -54,11 +53,11 @@ fn read_point(
         let token = tokens.next().ok_or_else(wrong_number)?;
         if let Some(column) = column {
             let value = parse_number(token)?;
-            let bits = match column.slot {
-                Slot::PackedRgb | Slot::PackedRgba => packed_bits(column, value),
-                _ => 0,
-            };
-            set(&mut sample, column, value, bits);
+            if column.slot.is_packed() {
+                sample.set_packed(column.slot, packed_bits(column, value));
+            } else {
+                sample.set(column.slot, value);
+            }
         }
     }
     match tokens.next() {

@@ -9,10 +9,9 @@ mod binary;
 mod header;
 mod lzf;
 
-use crate::collector::{Collector, Layout, Sample, check_count};
+use crate::collector::{Collector, Layout, check_count};
 use crate::error::Result;
 use crate::input::Input;
-use crate::slot::Column;
 use crate::{Format, RawCloud, ReadOptions, SourceErrorKind};
 use header::{Encoding, Header};
 
@@ -40,14 +39,4 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
         .map(|viewpoint| (viewpoint - cloud.origin).as_vec3());
     cloud.size = header.size;
     Ok(cloud)
-}
-
-/// Sets the value of one column; `bits` are the first four bytes of the value.
-#[inline]
-fn set(sample: &mut Sample, column: &Column, value: f64, bits: u32) {
-    if column.slot.is_packed() {
-        sample.set_packed(column.slot, bits);
-    } else {
-        sample.set(column.slot, value);
-    }
 }

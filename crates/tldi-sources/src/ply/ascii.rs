@@ -1,7 +1,7 @@
 //! Data after the header as text: one record a line.
 
+use super::faces::{Faces, Fan};
 use super::header::{Element, Kind, Role};
-use super::{Faces, Fan};
 use crate::SourceErrorKind;
 use crate::collector::{Collector, Sample};
 use crate::error::Result;

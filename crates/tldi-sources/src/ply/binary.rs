@@ -1,7 +1,7 @@
 //! Binary data after the header.
 
+use super::faces::{Faces, Fan};
 use super::header::{Element, Kind, Role};
-use super::{Faces, Fan};
 use crate::SourceErrorKind;
 use crate::collector::{Collector, Sample};
 use crate::error::Result;
