@@ -1,14 +1,7 @@
 //! The settings of a pipeline.
 
-use crate::narrow_phase::parts::cloud_of;
 use crate::{Resolution, TldiError};
-use rapier3d::parry::shape::Shape;
-use tldi::plan::{largest_pixel, least_pixel};
-use tldi::{CameraPolicy, Params, Variant};
-
-/// Contacts are searched up to this many standard deviations of given noise. So the fit at a light
-/// contact has points around it on all sides.
-const FITTED: f32 = 3.0;
+use tldi::{CameraPolicy, Variant};
 
 /// Settings of a [`TldiPipeline`](crate::TldiPipeline), the same for all its pairs.
 ///
@@ -98,33 +91,5 @@ impl TldiConfig {
             fixed => fixed,
         };
         Self { resolution, ..self }
-    }
-
-    /// Parameters of a pair of parts for contacts up to a gap of `prediction` metres; none where no
-    /// part is a cloud.
-    pub(crate) fn params(&self, parts: [&dyn Shape; 2], prediction: f32) -> Option<Params> {
-        let radius = |part: &dyn Shape| cloud_of(part).map(|shape| shape.cloud().mean_radius());
-        let coarsest = parts.into_iter().filter_map(radius).reduce(f32::max)?;
-        let size = |part: &&dyn Shape| part.compute_local_aabb().extents();
-        let [first, second] = parts;
-        let smaller = match size(&first).length_squared() < size(&second).length_squared() {
-            true => first,
-            false => second,
-        };
-        let to_resolve = largest_pixel(size(&smaller), radius(smaller).unwrap_or(0.0));
-        let params = match self.variant {
-            Variant::Paper => Params::paper(coarsest),
-            Variant::Oriented => Params::for_radius(coarsest),
-        };
-        let noise = |part| cloud_of(part).map_or(0.0, |shape| shape.cloud().noise());
-        let fitted = FITTED * parts.into_iter().map(noise).fold(0.0, f32::max);
-        let least = |part| cloud_of(part).map_or(0.0, |shape| least_pixel(shape.cloud()));
-        let least = parts.into_iter().map(least).fold(0.0, f32::max);
-        let pixel_size = self.resolution.pixel_size(coarsest).min(to_resolve);
-        Some(
-            params
-                .with_pixel_size(pixel_size.max(least))
-                .with_prediction(prediction.max(fitted)),
-        )
     }
 }

@@ -1,6 +1,5 @@
 //! What can go wrong between the clouds and rapier.
 
-use crate::Passes;
 use rapier3d::geometry::ColliderHandle;
 use thiserror::Error;
 use tldi::{BackendError, CloudError};
@@ -110,4 +109,52 @@ pub enum TldiError {
         /// What is allowed.
         expected: &'static str,
     },
+}
+
+/// Why a collider passes through clouds.
+///
+/// ```
+/// # use rapier3d::prelude::*;
+/// # use rapier3d_tldi::prelude::*;
+/// # let points: Vec<Vector> = (0..400)
+/// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+/// #     .collect();
+/// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+/// # let mut world = PhysicsWorld::default();
+/// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// # tldi.attach(&mut world);
+/// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+/// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+/// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+/// // A segment has no surface: `step` says so once.
+/// use rapier3d_tldi::Passes;
+/// let body = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.01, 0.5));
+/// world.insert(body, ColliderBuilder::segment(-Vector::X, Vector::X));
+/// let error = tldi.step(&mut world).unwrap_err();
+/// assert!(matches!(error, TldiError::PassesThrough { reason: Passes::Line, .. }));
+/// # let _ = (scan, ball);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Passes {
+    /// Its shape, or a part of its compound, is a line or a point: a segment, a polyline, or a shape without width.
+    Line,
+    /// It is the skin of one of rapier's soft bodies, whose particles rapier holds up by its own tests.
+    SoftBody,
+}
+
+impl std::fmt::Display for Passes {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Line => {
+                "its shape has a part without a surface (a segment, a polyline or what has no width): \
+                 give it a width, as a capsule has"
+            }
+            Self::SoftBody => {
+                "rapier's soft bodies do not collide with clouds: take a rigid body, or give the cloud's \
+                 ground a shape of rapier's for it to rest on"
+            }
+        })
+    }
 }

@@ -2,9 +2,11 @@
 
 pub(crate) mod dispatcher;
 pub(crate) mod manifolds;
+pub(crate) mod moving;
 pub(crate) mod parts;
 pub(crate) mod passing;
 pub(crate) mod planes;
 pub(crate) mod queries;
 pub(crate) mod shape_casts;
 pub(crate) mod straight_way;
+pub(crate) mod turning;

@@ -9,11 +9,13 @@ mod convex;
 mod distance;
 mod line;
 mod mesh;
+mod projection;
 mod sampled;
 mod triangle;
 mod voxels;
 
 use line::Line;
+use projection::Projection;
 use rapier3d::glamx::{DVec3, Vec3};
 use rapier3d::parry::shape::{
     Ball, Capsule, Cone, ConvexPolyhedron, Cuboid, Cylinder, HalfSpace, Segment, Shape, Triangle,
@@ -53,9 +55,6 @@ use tldi::{Aabb, RayHit, RaySurface};
 /// ```
 #[derive(Clone, Copy)]
 pub struct ExactShape<'a>(pub &'a dyn Shape);
-
-/// Signed distance and outward unit normal at the nearest point of the surface.
-type Projection = (f64, DVec3);
 
 /// The distance function of a convex solid.
 enum Convex<'a> {

@@ -1,6 +1,8 @@
 //! Rays through convex solids: one entry, one exit.
 
-use super::{Line, Projection, distance};
+use super::distance;
+use super::line::Line;
+use super::projection::Projection;
 use rapier3d::glamx::DVec3;
 use rapier3d::parry::shape::{Ball, ConvexPolyhedron, Cuboid, HalfSpace};
 use tldi::RayHit;

@@ -1,6 +1,7 @@
 //! Exact signed distance functions, in `f64`.
 
-use super::{Projection, triangle};
+use super::projection::Projection;
+use super::triangle;
 use rapier3d::glamx::{DVec2, DVec3};
 
 /// Grows a solid by `border` metres.

@@ -1,7 +1,8 @@
 //! Triangle meshes and height fields.
 
+use super::line::Line;
+use super::projection::Projection;
 use super::triangle::{self, ShearedLine};
-use super::{Line, Projection};
 use rapier3d::glamx::{DVec3, Vec3};
 use rapier3d::parry::partitioning::BvhNode;
 use rapier3d::parry::query::PointQuery;

@@ -1,6 +1,7 @@
 //! Voxels: the boundary of the filled cells, without the faces between them.
 
-use super::{Line, Projection};
+use super::line::Line;
+use super::projection::Projection;
 use rapier3d::glamx::{DVec3, IVec3, Vec3};
 use rapier3d::parry::query::PointQuery;
 use rapier3d::parry::shape::Voxels;

@@ -1,6 +1,6 @@
 //! What the surface of a shape consists of: flat triangles, and triangles around curved solids.
 
-use super::SampleError;
+use super::error::SampleError;
 use crate::ExactShape;
 use crate::narrow_phase::parts::{part, part_count};
 use rapier3d::glamx::{DVec3, Vec3};
