@@ -2,7 +2,8 @@
 
 use super::figure::{Axis, Curve, Entry, Figure, Level, Panel, Point};
 use super::front::{front, steps};
-use super::{looks, origin};
+use super::looks;
+use super::origin::origin;
 use crate::stored::{ContactRow, Stored};
 use tldi_tests::Regime;
 

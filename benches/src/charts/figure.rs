@@ -162,3 +162,13 @@ impl Axis {
 
 /// Share of a logarithmic axis that is left for zero.
 pub(super) const ZERO_SHARE: f64 = 0.08;
+
+/// `figure` with a number where others have its name: of two runs of one model.
+pub(super) fn numbered(others: &[Figure], figure: Figure) -> Figure {
+    let is_alike = |other: &&Figure| other.name.starts_with(&figure.name);
+    let name = match others.iter().filter(is_alike).count() {
+        0 => figure.name.clone(),
+        count => format!("{}_{}", figure.name, count + 1),
+    };
+    Figure { name, ..figure }
+}

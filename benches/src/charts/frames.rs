@@ -1,7 +1,8 @@
 //! What a frame of new points costs, by placement and number of points.
 
-use super::figure::{Axis, Curve, Entry, Figure, Panel, Point};
-use super::{looks, numbered, origin};
+use super::figure::{Axis, Curve, Entry, Figure, Panel, Point, numbered};
+use super::looks;
+use super::origin::origin;
 use crate::stored::{FrameRow, Stored};
 
 /// How the names of peers in their best form end.

@@ -1,7 +1,9 @@
 //! Charts of a run of `gpu_day`.
 
+use super::error::ChartError;
 use super::figure::{Axis, Color, Curve, Entry, Figure, Line, Look, Mark, Panel, Point};
-use super::{ChartError, looks, origin, paint};
+use super::origin::origin;
+use super::{looks, paint};
 use crate::gpu_day::{Bin, Dispatches, Moved, Report, Workload};
 use std::path::{Path, PathBuf};
 use tldi::ContactPixel;

@@ -2,43 +2,22 @@
 
 mod canvas;
 mod contact_quality;
+mod error;
 mod figure;
 mod frames;
 mod front;
 pub(crate) mod gpu_day;
 mod looks;
+mod origin;
 mod paint;
 mod speed_accuracy;
 mod sweeps;
 mod ticks;
 mod work;
 
-use crate::stored::{
-    self, AccuracyRow, ContactRow, FrameRow, Measured, Provenance, Stored, StoredError,
-};
-use figure::Figure;
+use crate::stored::{self, AccuracyRow, ContactRow, FrameRow, Measured, Stored, StoredError};
+pub use error::ChartError;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why charts could not be drawn.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum ChartError {
-    /// The results cannot be used.
-    #[error(transparent)]
-    Stored(#[from] StoredError),
-    /// There are none.
-    #[error("{}: no results of benches (*.json); measure with --json first", .0.display())]
-    NoResults(PathBuf),
-    /// A picture cannot be written.
-    #[error("{}: cannot be drawn: {reason}", path.display())]
-    Picture {
-        /// Which.
-        path: PathBuf,
-        /// Why.
-        reason: String,
-    },
-}
 
 /// Folders of the charts below that of all results. Each holds the rows that its charts are drawn from, too:
 /// wrong answers against time, against one setting, contacts, frames of new points.
@@ -144,40 +123,6 @@ pub fn draw_all(results: &Path, out: &Path) -> Result<Drawn, ChartError> {
         }
     }
     Ok(drawn)
-}
-
-/// `figure` with a number where others have its name: of two runs of one model.
-fn numbered(others: &[Figure], figure: Figure) -> Figure {
-    let is_alike = |other: &&Figure| other.name.starts_with(&figure.name);
-    let name = match others.iter().filter(is_alike).count() {
-        0 => figure.name.clone(),
-        count => format!("{}_{}", figure.name, count + 1),
-    };
-    Figure { name, ..figure }
-}
-
-/// Where the numbers of a chart come from, in a line.
-fn origin<'a>(runs: impl IntoIterator<Item = &'a Provenance>) -> String {
-    let mut lines: Vec<String> = runs
-        .into_iter()
-        .map(|run| {
-            let device = match &run.adapter {
-                Some(adapter) => format!(", {adapter}"),
-                None => String::new(),
-            };
-            format!(
-                "{}, commit {}, {} cores of {}{device} ({})",
-                run.date,
-                run.commit,
-                run.cores,
-                run.cpu,
-                run.features.join(", ")
-            )
-        })
-        .collect();
-    lines.sort();
-    lines.dedup();
-    lines.join("; ")
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Figures as SVG and PNG.
 
-use super::ChartError;
 use super::canvas::{At, Canvas, FONT, Outcome, Words};
+use super::error::ChartError;
 use super::figure::{Axis, Color, Curve, Figure, Panel, ZERO_SHARE};
 use super::ticks::ticks;
 use plotters::prelude::*;

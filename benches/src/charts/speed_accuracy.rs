@@ -2,7 +2,8 @@
 
 use super::figure::{Axis, Curve, Entry, Figure, Panel, Point};
 use super::front::{front, steps};
-use super::{looks, origin};
+use super::looks;
+use super::origin::origin;
 use crate::stored::{AccuracyRow, Provenance, Stored};
 
 /// Models in the main chart: those with the most points.

@@ -1,7 +1,8 @@
 //! The figures of the paper that vary one thing: ρ, distance, resolution, noise, size of splats.
 
 use super::figure::{Axis, Curve, Entry, Figure, Level, Line, Look, Mark, Panel, Point};
-use super::{looks, origin};
+use super::looks;
+use super::origin::origin;
 use crate::accuracy::TOLD;
 use crate::stored::{AccuracyRow, Provenance, Stored};
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::stored::DistanceTally;
+use crate::stored::Provenance;
 use crate::stored::tests::contact_row;
 use tldi_tests::ContactPair;
 

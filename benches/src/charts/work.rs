@@ -1,8 +1,9 @@
 //! How much of two clouds this project models, by placement and number of points.
 
-use super::figure::{Axis, Curve, Figure, Line, Look, Mark, Panel, Point};
+use super::figure::{Axis, Curve, Figure, Line, Look, Mark, Panel, Point, numbered};
+use super::looks;
+use super::origin::origin;
 use super::ticks::label;
-use super::{looks, numbered, origin};
 use crate::stored::{FrameRow, Stored, WorkRow};
 
 type Run = Stored<FrameRow>;

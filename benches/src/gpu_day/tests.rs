@@ -1,6 +1,7 @@
 //! What is stored has the form that the code reads, and a run gives that form.
 
 use super::*;
+use crate::placements::Placement;
 use serde_json::Value;
 use tldi_tests::gpu_backend;
 

@@ -7,5 +7,5 @@ mod source;
 
 pub use generated::Scanner;
 pub use report::{LidarBodyReport, LidarReport, SweepReport};
-pub use simulation::{LidarScene, LidarSimulation, recipe};
-pub use source::{SeenSweep, Sweep, SweepSource};
+pub use simulation::{LidarScene, LidarSimulation};
+pub use source::{SeenSweep, Sweep, SweepSource, recipe};

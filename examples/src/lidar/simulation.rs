@@ -1,13 +1,12 @@
 //! Bodies on the sweeps of a scanner.
 
 use super::report::{LidarBodyReport, LidarReport, SweepReport};
-use super::source::Sweep;
+use super::source::{Sweep, recipe};
 use crate::simulation::NamedCloud;
 use crate::spots::Spot;
 use crate::step_totals::StepTotals;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
-use rapier3d_tldi::{CloudRecipe, RadiusRule};
 use std::time::Instant;
 use tldi::Backend;
 use tldi::glamx::{Pose3, Quat, Vec3};
@@ -22,8 +21,6 @@ const DENSITY: f32 = 500.0;
 const ROLLING_RESISTANCE: f32 = 1.0;
 /// Height over the surface at the start, metres.
 const DROP: f32 = 0.2;
-/// Neighbours for radii and normals: so many that there are some of the rings beside.
-const NEIGHBORS: usize = 24;
 
 /// What takes part.
 pub struct LidarScene {
@@ -35,18 +32,6 @@ pub struct LidarScene {
     pub up: Vec3,
     /// Points farther from the scanner are left out, metres.
     pub range: f32,
-}
-
-/// What is made of the points of a sweep that come in no order.
-pub fn recipe() -> CloudRecipe {
-    CloudRecipe {
-        radii: RadiusRule::NearestNeighbors {
-            k: NEIGHBORS,
-            scale: 0.65,
-        },
-        pca_neighbors: Some(NEIGHBORS),
-        ..CloudRecipe::default()
-    }
 }
 
 /// A world with a stream of sweeps and bodies.

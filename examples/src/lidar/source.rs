@@ -2,7 +2,7 @@
 
 use super::Scanner;
 use anyhow::{Context, bail, ensure};
-use rapier3d_tldi::SeenPoints;
+use rapier3d_tldi::{CloudRecipe, RadiusRule, SeenPoints};
 use std::path::{Path, PathBuf};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
 use tldi::{CloudError, PointCloud};
@@ -12,6 +12,8 @@ use tldi_sources::{ReadOptions, read};
 /// Standard deviation of ranges, metres: what an HDL-64E is said to have at half of its reach. With half as much, noise
 /// counts as an edge here and there; with twice as much, normals are smoothed over twice as many columns.
 const DEVIATION: f32 = 0.01;
+/// Neighbours for radii and normals: so many that there are some of the rings beside.
+const NEIGHBORS: usize = 24;
 /// Largest deviation of a pose's rotation from an orthonormal matrix: files round.
 const ROUNDING: f32 = 0.01;
 
@@ -25,6 +27,18 @@ pub struct Sweep {
     pub size: Option<[usize; 2]>,
     /// From the frame of the scanner into that of the world.
     pub world_from_scanner: Pose3,
+}
+
+/// What is made of the points of a sweep that come in no order.
+pub fn recipe() -> CloudRecipe {
+    CloudRecipe {
+        radii: RadiusRule::NearestNeighbors {
+            k: NEIGHBORS,
+            scale: 0.65,
+        },
+        pca_neighbors: Some(NEIGHBORS),
+        ..CloudRecipe::default()
+    }
 }
 
 /// What a sweep shows up to some range, in the frame of the scanner, metres.
@@ -84,7 +98,7 @@ impl SeenSweep {
             .map(|p| world_from_scanner * *p)
             .collect();
         let mut builder = PointCloud::builder(points)
-            .recipe(super::recipe())
+            .recipe(recipe())
             .viewpoint(world_from_scanner.translation);
         if let Some((normals, radii)) = &self.normals_and_radii {
             let normals = normals.iter().map(|n| world_from_scanner.rotation * *n);

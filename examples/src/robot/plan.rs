@@ -4,7 +4,6 @@ use super::Motion;
 use super::kinematics::{Aim, JointKind, Kinematics};
 use super::links::LinkCloud;
 use super::placing::Placement;
-use super::simulation::Base;
 use fastrand::Rng;
 use tldi::PointCloud;
 use tldi::glamx::{Pose3, Vec3};
@@ -19,6 +18,17 @@ const PATH_STEP: f32 = 0.06;
 const PRESS: f32 = 0.03;
 /// Places that are touched where nothing loose is in reach.
 const TOUCHES: usize = 3;
+
+/// Whether the robot's root is fixed to the scan.
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Base {
+    /// Fixed, unless wheels, feet or other links that move are lower than the root.
+    Auto,
+    /// Fixed: an arm that is screwed down.
+    Fixed,
+    /// Free: a robot that stands, drives or walks.
+    Floating,
+}
 
 /// The end of the longest limb.
 #[derive(Clone, Copy, Debug)]

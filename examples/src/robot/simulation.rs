@@ -6,7 +6,7 @@ use super::links::{LinkCloud, Spacing, clouds_of_links, world_groups};
 use super::loose_bodies::{LooseBody, lay_bodies, loose_size};
 use super::own_camera::OwnCamera;
 use super::placing::{Site, place};
-use super::plan::{Build, Tip, plan_motion, start_pose};
+use super::plan::{Base, Build, Tip, plan_motion, start_pose};
 use super::report::{LinkReport, RobotReport};
 use super::standing::Standing;
 use super::{Motion, SelfFilter};
@@ -42,17 +42,6 @@ const NOISE_MARGIN: f32 = 3.0;
 const FAR_AWAY: f32 = 10.0;
 /// Gap up to which surfaces are drawn as touching, in mean radii of the scan.
 const TOUCHING_GAP: f32 = 0.2;
-
-/// Whether the robot's root is fixed to the scan.
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Base {
-    /// Fixed, unless wheels, feet or other links that move are lower than the root.
-    Auto,
-    /// Fixed: an arm that is screwed down.
-    Fixed,
-    /// Free: a robot that stands, drives or walks.
-    Floating,
-}
 
 /// What a simulation is made of.
 pub struct RobotScene {
