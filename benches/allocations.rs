@@ -6,15 +6,15 @@
     reason = "a bench's table is its output; progress goes to stderr"
 )]
 
-#[path = "../crates/tldi/tests/counting/mod.rs"]
-mod counting;
-
 use anyhow::ensure;
 use clap::Parser;
-use counting::allocations;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Backend, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View};
 use tldi_benches::placements::{Placement, Source};
+use tldi_memory::{Counting, allocations};
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting::new();
 
 /// Counts allocations per frame of new points, which must be none on one thread.
 #[derive(Parser)]

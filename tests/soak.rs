@@ -13,10 +13,12 @@ use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 use rapier3d_tldi::{CloudRecipe, RadiusRule, sample_shape};
 use serde::Serialize;
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicIsize, Ordering::Relaxed};
 use std::time::Instant;
+use tldi_memory::{Counting, held};
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting::new();
 
 /// Runs a world with streaming clouds, bodies that are added and removed, and colliders whose shapes are swapped;
 /// fails if a step does, or if memory or work grow.
@@ -59,28 +61,6 @@ const PER_BODY: isize = 8;
 /// from cycle to cycle, and are solved in another order: by 4 %.
 const WORK: f64 = 0.1;
 
-/// Bytes that are taken now.
-static LIVE: AtomicIsize = AtomicIsize::new(0);
-
-struct Counting;
-
-// SAFETY: passes everything on to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        LIVE.fetch_add(layout.size() as isize, Relaxed);
-        // SAFETY: as the caller promises.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        LIVE.fetch_sub(layout.size() as isize, Relaxed);
-        // SAFETY: as the caller promises.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
 /// What a number of cycles took.
 #[derive(Clone, Debug, Default, Serialize)]
 struct Part {
@@ -88,7 +68,7 @@ struct Part {
     /// Bodies that came and went.
     bodies: usize,
     /// Bytes that were taken at the end of its last cycle, when all bodies were gone.
-    live_bytes: isize,
+    live_bytes: usize,
     /// Pairs that were compared, and pixels in which surfaces were close, of a cycle in the mean.
     pairs: f64,
     contact_pixels: f64,
@@ -185,7 +165,7 @@ impl Soak {
         part.pairs += pairs as f64;
         part.contact_pixels += pixels as f64;
         part.seconds += start.elapsed().as_secs_f64();
-        part.live_bytes = LIVE.load(Relaxed);
+        part.live_bytes = held();
         Ok(())
     }
 }
@@ -246,7 +226,7 @@ fn check(settling: &Part, measured: &[Part]) -> anyhow::Result<()> {
         return Ok(());
     };
     let bodies: usize = measured.iter().map(|part| part.bodies).sum();
-    let grown = last.live_bytes - settling.live_bytes;
+    let grown = last.live_bytes as isize - settling.live_bytes as isize;
     println!(
         "{grown} B more than when memory had settled: {:.1} for each of {bodies} bodies",
         grown as f64 / bodies as f64

@@ -32,6 +32,9 @@ pub(crate) fn main() -> anyhow::Result<ExitCode> {
     let (rows, timings) = runner::run_all(cases, &methods, &args.setup())?;
     let report = Report::new(started, rows, timings);
     report.write_files(&args)?;
+    if let Some(folder) = &args.out {
+        chart::draw(&report, folder)?;
+    }
     let mut out = io::stdout().lock();
     writeln!(out, "{}", report.summary())?;
     let undeclared = report.undeclared_failures();

@@ -1,7 +1,6 @@
 //! Rows as files and as a table.
 
 use super::args::Args;
-use super::chart;
 use super::host::RunInfo;
 use super::known::KNOWN_FAILURES;
 use super::method::Method;
@@ -217,7 +216,7 @@ impl Report {
         text
     }
 
-    /// Writes what the command line asks for.
+    /// Writes what the command line asks for, but for the chart.
     pub(crate) fn write_files(&self, args: &Args) -> anyhow::Result<()> {
         if let Some(file) = &args.json {
             self.write_json(file)?;
@@ -225,7 +224,6 @@ impl Report {
         if let Some(folder) = &args.out {
             self.write_json(&folder.join("stability.json"))?;
             write(&folder.join("stability.md"), &self.markdown())?;
-            chart::draw(self, folder)?;
         }
         if let Some(file) = &args.docs {
             self.fill_in(file)?;

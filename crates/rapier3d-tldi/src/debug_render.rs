@@ -18,6 +18,12 @@ use tldi::{Backend, CpuBackend, PairQuery, PairResult, VirtualCamera};
 
 bitflags::bitflags! {
     /// What [`TldiPipeline::debug_render`] draws.
+    ///
+    /// ```
+    /// use rapier3d_tldi::TldiDebugRenderMode;
+    /// let mode = TldiDebugRenderMode::default() | TldiDebugRenderMode::CAMERAS;
+    /// assert!(mode.contains(TldiDebugRenderMode::MANIFOLDS));
+    /// ```
     #[derive(Copy, Clone, PartialEq, Eq, Debug)]
     pub struct TldiDebugRenderMode: u32 {
         /// The points of all clouds: a line of the point's radius along its normal, or a cross of
@@ -47,6 +53,27 @@ impl Default for TldiDebugRenderMode {
 
 /// Most points of one cloud, and contact pixels of one pair, that are drawn. If there are more,
 /// every n-th is drawn.
+///
+/// ```
+/// # use rapier3d::prelude::*;
+/// # use rapier3d_tldi::{DEBUG_POINT_LIMIT, TldiDebugRenderMode, prelude::*};
+/// # use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
+/// # struct Lines(Vec<[Vector; 2]>);
+/// # impl DebugRenderBackend for Lines {
+/// #     fn draw_line(&mut self, _: DebugRenderObject, a: Vector, b: Vector, _: DebugColor) {
+/// #         self.0.push([a, b]);
+/// #     }
+/// # }
+/// let points: Vec<Vector> = (0..DEBUG_POINT_LIMIT + 2).map(|i| i as f32 * Vector::X).collect();
+/// let cloud = PointCloud::builder(points).radius(1.0).build()?;
+/// let mut world = PhysicsWorld::default();
+/// let tldi = TldiPipeline::new(TldiConfig::default())?;
+/// world.insert(RigidBodyBuilder::fixed(), tldi.collider(cloud));
+/// let mut lines = Lines(Vec::new());
+/// tldi.debug_render(&world, &mut lines, TldiDebugRenderMode::POINTS)?;
+/// assert_eq!(lines.0.len(), 3 * (DEBUG_POINT_LIMIT / 2 + 1)); // every second point, as a cross
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub const DEBUG_POINT_LIMIT: usize = 10_000;
 
 /// Colours, as hue in degrees, saturation, lightness and alpha.
@@ -130,6 +157,40 @@ impl TldiPipeline {
     ///
     /// # Errors
     /// Those of [`debug_render`](Self::debug_render).
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::{TldiDebugRenderMode, prelude::*};
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// # use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
+    /// # struct Lines(Vec<[Vector; 2]>);
+    /// # impl DebugRenderBackend for Lines {
+    /// #     fn draw_line(&mut self, _: DebugRenderObject, a: Vector, b: Vector, _: DebugColor) {
+    /// #         self.0.push([a, b]);
+    /// #     }
+    /// # }
+    /// let mut lines = Lines(Vec::new());
+    /// tldi.debug_render_sets(
+    ///     &world.integration_parameters,
+    ///     &world.bodies,
+    ///     &world.colliders,
+    ///     &world.narrow_phase,
+    ///     &mut lines,
+    ///     TldiDebugRenderMode::POINTS,
+    /// )?;
+    /// assert_eq!(lines.0.len(), 3 * 400); // crosses: the cloud has no normals
+    /// # let _ = (scan, ball);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn debug_render_sets(
         &self,
         integration: &IntegrationParameters,

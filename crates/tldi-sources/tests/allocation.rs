@@ -3,16 +3,14 @@
 //! One test, so that nothing else allocates meanwhile.
 
 mod common;
-#[path = "common/counting.rs"]
-mod counting;
 
 use common::*;
-use counting::{Counting, peak_of};
 use std::io::{self, Read};
+use tldi_memory::{Counting, most_held};
 use tldi_sources::{Format, ReadOptions, SourceErrorKind, read_from};
 
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: Counting = Counting::new();
 
 /// The bytes taken at most by reading, beyond those in use before, and what came of it.
 fn peak(
@@ -24,7 +22,7 @@ fn peak(
         max_points,
         ..Default::default()
     };
-    let (peak, outcome) = peak_of(|| read_from(source, format, &options, &mut |_| {}));
+    let (peak, outcome) = most_held(|| read_from(source, format, &options, &mut |_| {}));
     (peak, outcome.map(drop).map_err(|e| e.kind))
 }
 

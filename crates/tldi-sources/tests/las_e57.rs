@@ -3,17 +3,15 @@
 #![cfg(any(feature = "las", feature = "e57"))]
 
 mod common;
-#[path = "common/counting.rs"]
-mod counting;
 
 use common::*;
-use counting::{Counting, peak_of};
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 use tldi::glamx::DVec3;
+use tldi_memory::{Counting, most_held};
 use tldi_sources::{Format, RawCloud, ReadOptions, read_with_progress};
 
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: Counting = Counting::new();
 
 /// Held by each test: the allocator counts for one at a time.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -88,7 +86,7 @@ fn assert_survives(name: &str, format: Format, bytes: &[u8], must_fail_when_cut:
     // sound file.
     const LIMIT: usize = 64 << 20;
     let check = |damaged: &[u8]| {
-        let (peak, outcome) = peak_of(|| parse(damaged, format));
+        let (peak, outcome) = most_held(|| parse(damaged, format));
         assert!(peak < LIMIT, "{name}: {peak} bytes");
         if let Ok(cloud) = &outcome {
             let colors = cloud.colors.as_ref().map_or(cloud.points.len(), Vec::len);
@@ -202,7 +200,7 @@ mod las_files {
                 ..Default::default()
             };
             let (peak, outcome) =
-                peak_of(|| read_from(bytes, Format::Las, &options, &mut |_| {}).map(drop));
+                most_held(|| read_from(bytes, Format::Las, &options, &mut |_| {}).map(drop));
             assert!(outcome.is_err(), "{what}");
             assert!(peak < 64 << 20, "{what}: {peak} bytes");
         };
@@ -366,7 +364,7 @@ mod e57_files {
                 damaged[at] = *random.choice(b"0189-.<>\"/ aN").expect("not empty");
             }
             mend(&mut damaged);
-            let (peak, _) = peak_of(|| parse(&damaged, Format::E57).map(drop));
+            let (peak, _) = most_held(|| parse(&damaged, Format::E57).map(drop));
             assert!(peak < 64 << 20, "{peak}");
         }
     }
@@ -409,7 +407,7 @@ mod e57_files {
             }
             assert_eq!(changed, 3);
             mend(&mut damaged);
-            let (peak, outcome) = peak_of(|| parse(&damaged, Format::E57));
+            let (peak, outcome) = most_held(|| parse(&damaged, Format::E57));
             assert!(peak < 64 << 20, "{peak}");
             let error = outcome.expect_err("refused");
             assert!(!error.to_string().contains("gave up"), "{error}");

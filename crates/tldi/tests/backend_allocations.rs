@@ -1,14 +1,15 @@
 //! A warm backend allocates nothing. A binary of its own with one test, since the allocations of
 //! all threads are counted.
 
-mod counting;
-
-use counting::allocations;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
     Aabb, Backend, CpuBackend, PairQuery, PairResult, Params, PointCloud, RayHit, RaySurface,
     Surface, View,
 };
+use tldi_memory::{Counting, allocations};
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting::new();
 
 /// The half-space y < 0.
 struct Ground;

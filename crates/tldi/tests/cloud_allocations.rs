@@ -1,12 +1,13 @@
 //! Giving a warm cloud new points allocates nothing. A binary of its own with one test, since the
 //! allocations of all threads are counted.
 
-mod counting;
-
-use counting::allocations;
 use fastrand::Rng;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
+use tldi_memory::{Counting, allocations};
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting::new();
 
 #[test]
 fn a_warm_cloud_allocates_nothing() {

@@ -1,37 +1,15 @@
 //! A wide cloud beside a small exact surface takes memory for what the surface covers, not for all that is seen. A binary
 //! of its own with one test, since the bytes of all threads are counted.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicIsize, Ordering::Relaxed};
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
     Aabb, Backend, CpuBackend, ImpactQuery, PairQuery, Params, PointCloud, RayHit, RaySurface,
     Surface, View,
 };
-
-/// Bytes that are taken now, and that were at the most.
-static LIVE: AtomicIsize = AtomicIsize::new(0);
-static PEAK: AtomicIsize = AtomicIsize::new(0);
-
-struct Counting;
-
-// SAFETY: passes everything on to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let size = layout.size() as isize;
-        PEAK.fetch_max(LIVE.fetch_add(size, Relaxed) + size, Relaxed);
-        // SAFETY: as the caller promises.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        LIVE.fetch_sub(layout.size() as isize, Relaxed);
-        // SAFETY: as the caller promises.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
+use tldi_memory::{Counting, most_held};
 
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: Counting = Counting::new();
 
 /// A ball of half a metre.
 struct Ball;
@@ -73,10 +51,15 @@ impl RaySurface for Ball {
 const R: f32 = 0.05;
 
 /// Most bytes. Tiles over all that is seen would take about 500 MB.
-const MOST: isize = 32 << 20;
+const MOST: usize = 32 << 20;
 
 #[test]
 fn memory_is_that_of_what_meets() {
+    let (most, ()) = most_held(compare_and_cast);
+    assert!(most < MOST, "{most} B");
+}
+
+fn compare_and_cast() {
     let mut points: Vec<Vec3> = (0..441)
         .map(|k| R * Vec3::new((k % 21) as f32 - 10.0, 0.0, (k / 21) as f32 - 10.0))
         .collect();
@@ -118,6 +101,4 @@ fn memory_is_that_of_what_meets() {
         "{}",
         impact.distance
     );
-    let peak = PEAK.load(Relaxed);
-    assert!(peak < MOST, "{peak} B");
 }

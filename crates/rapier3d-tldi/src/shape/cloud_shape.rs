@@ -3,9 +3,8 @@
 use crate::shape::mass::{MassModel, unit_mass_properties};
 use rapier3d::glamx::Vec3;
 use rapier3d::parry::bounding_volume::{Aabb, BoundingSphere};
-use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
-use rapier3d::parry::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
-use rapier3d::parry::shape::{FeatureId, Shape, ShapeType, TypedShape};
+use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy};
+use rapier3d::parry::shape::{Shape, ShapeType, TypedShape};
 use rapier3d::prelude::MassProperties;
 use std::f32::consts::FRAC_PI_4;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -102,6 +101,18 @@ impl std::fmt::Debug for PointCloudShape {
 
 impl PointCloudShape {
     /// A shape over `cloud`, with the mass of the solid that it encloses.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// let shape = PointCloudShape::new(scan);
+    /// assert_eq!(shape.mass_model(), MassModel::default());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn new(cloud: PointCloud<'static>) -> Self {
         Self::with_mass_model(cloud, MassModel::default())
     }
@@ -128,17 +139,56 @@ impl PointCloudShape {
     }
 
     /// The points, in the shape's own frame.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// let shape = PointCloudShape::new(scan);
+    /// assert_eq!((shape.cloud().len(), shape.cloud().mean_radius()), (400, 0.1));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn cloud(&self) -> &PointCloud<'static> {
         &self.content.cloud
     }
 
     /// What of the cloud has mass.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// let model = MassModel::Shell { thickness: 0.01 };
+    /// assert_eq!(PointCloudShape::with_mass_model(scan, model).mass_model(), model);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn mass_model(&self) -> MassModel {
         self.content.mass_model
     }
 
     /// A number that no other content of any shape in this process has: shapes of equal revision
     /// hold the same points, and new points bring a new revision.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// let mut shape = PointCloudShape::new(scan);
+    /// let copy = shape.clone();
+    /// assert_eq!(shape.revision(), copy.revision());
+    /// shape.set_points(&points[1..], None)?;
+    /// assert_ne!(shape.revision(), copy.revision());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn revision(&self) -> u64 {
         self.content.revision
     }
@@ -242,6 +292,25 @@ impl PointCloudShape {
     }
 
     /// Lets the mass properties follow the present points when they are asked for next.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// use rapier3d::parry::shape::Shape;
+    /// let mut shape = PointCloudShape::with_mass_model(scan, MassModel::Shell { thickness: 0.01 });
+    /// let mass_of = |shape: &PointCloudShape| shape.mass_properties(1000.0).mass();
+    /// let before = mass_of(&shape);
+    /// let shrunk: Vec<Vector> = points.iter().map(|p| 0.5 * *p).collect();
+    /// shape.set_points(&shrunk, None)?;
+    /// assert_eq!(mass_of(&shape), before);
+    /// shape.refresh_mass();
+    /// assert!(mass_of(&shape) < 0.5 * before);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn refresh_mass(&mut self) {
         if let Some(content) = Arc::get_mut(&mut self.content) {
             content.unit_mass.take();
@@ -290,27 +359,6 @@ impl PointCloudShape {
                 normals.expect("they were asked for").to_vec()
             })
         })
-    }
-
-    /// Index of the point nearest to `point`; `None` if that is not finite.
-    pub(crate) fn nearest(&self, point: Vec3) -> Option<usize> {
-        self.bvh()
-            .find_best(
-                f32::MAX,
-                |node: &BvhNode, _| node.aabb().distance_to_local_point(point, true),
-                |leaf, _| Some(self.cloud().point(leaf as usize).distance(point)),
-            )
-            .map(|(leaf, _)| leaf as usize)
-    }
-
-    /// Where the line of `ray` passes through the disc of a point, in units of the direction.
-    fn disc_hit(&self, index: usize, ray: &Ray) -> Option<f32> {
-        let cloud = self.cloud();
-        let to_point = cloud.point(index) - ray.origin;
-        let normal = cloud.normals().map_or(ray.dir, |normals| normals[index]);
-        let t = normal.dot(to_point) / normal.dot(ray.dir);
-        let in_disc = (t * ray.dir - to_point).length() <= cloud.radius(index);
-        (t >= 0.0 && in_disc).then_some(t)
     }
 }
 
@@ -411,65 +459,5 @@ impl Shape for PointCloudShape {
     /// As for a triangle mesh, 45°.
     fn ccd_angular_thickness(&self) -> f32 {
         FRAC_PI_4
-    }
-}
-
-impl RayCast for PointCloudShape {
-    /// The first disc that the ray passes, see [`PointCloudShape`]; the feature is the point's
-    /// index and the normal is turned towards the ray, as with meshes. A cloud is a surface:
-    /// `solid` has no effect.
-    fn cast_local_ray_and_get_normal(
-        &self,
-        ray: &Ray,
-        max_time_of_impact: f32,
-        _solid: bool,
-    ) -> Option<RayIntersection> {
-        let (leaf, t) = self.bvh().find_best(
-            max_time_of_impact,
-            |node: &BvhNode, best| node.cast_ray(ray, best),
-            |leaf, _| self.disc_hit(leaf as usize, ray),
-        )?;
-        let normal = self.cloud().normals().map_or(-ray.dir, |normals| {
-            let normal = normals[leaf as usize];
-            if normal.dot(ray.dir) > 0.0 {
-                -normal
-            } else {
-                normal
-            }
-        });
-        let feature = FeatureId::Vertex(leaf);
-        Some(RayIntersection::new(t, normal.normalize_or_zero(), feature))
-    }
-}
-
-impl PointQuery for PointCloudShape {
-    /// As [`project_local_point_and_get_feature`](Self::project_local_point_and_get_feature), but
-    /// with `solid` a point inside is its own projection.
-    fn project_local_point(&self, point: Vec3, solid: bool) -> PointProjection {
-        let (projection, _) = self.project_local_point_and_get_feature(point);
-        if solid && projection.is_inside {
-            return PointProjection::new(true, point);
-        }
-        projection
-    }
-
-    /// The point of the nearest sample's disc that is nearest to `point`, and the index of that
-    /// sample. Where normals are oriented, a point behind the disc is inside; for an open scan
-    /// that is all that lies behind it. A point that is not finite is its own projection.
-    fn project_local_point_and_get_feature(&self, point: Vec3) -> (PointProjection, FeatureId) {
-        let Some(index) = self.nearest(point) else {
-            return (PointProjection::new(false, point), FeatureId::Unknown);
-        };
-        let cloud = self.cloud();
-        let sample = cloud.point(index);
-        let feature = FeatureId::Vertex(index as u32);
-        let Some(normals) = cloud.normals() else {
-            return (PointProjection::new(false, sample), feature);
-        };
-        let height = normals[index].dot(point - sample);
-        let along = point - sample - height * normals[index];
-        let foot = sample + along.clamp_length_max(cloud.radius(index));
-        let is_inside = cloud.normals_oriented() && height < 0.0;
-        (PointProjection::new(is_inside, foot), feature)
     }
 }

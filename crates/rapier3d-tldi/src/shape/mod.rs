@@ -1,5 +1,6 @@
 //! Shapes: clouds as shapes and colliders of rapier, their mass, and rapier's own shapes as surfaces.
 
+mod cloud_discs;
 pub(crate) mod cloud_shape;
 pub(crate) mod collider;
 pub(crate) mod exact;

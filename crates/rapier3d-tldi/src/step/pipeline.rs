@@ -1,24 +1,22 @@
 //! The pipeline: a batch of comparisons, then rapier's step.
 
+mod attaching;
 mod surfaces;
 
 use crate::corrections::rolling::move_to_mid_step;
-use crate::corrections::surface_motion::{SurfaceMotions, TldiHooks};
+use crate::corrections::surface_motion::SurfaceMotions;
 use crate::corrections::surface_push;
 use crate::narrow_phase::parts::append_queries;
 use crate::narrow_phase::passing::Told;
 use crate::shape::exact::ExactShape;
 use crate::step::batching::{Frame, PairMemory};
 use crate::step::candidates::CandidateSearch;
-use crate::step::prepared::{PROBE_ANSWER, Shared};
+use crate::step::prepared::Shared;
 use crate::step::report::{ComparedBy, cloud_pairs, contacts_of};
-use crate::{
-    Contact, PointCloudShape, StepReport, TldiConfig, TldiDispatcher, TldiError, cloud_collider,
-};
+use crate::{Contact, PointCloudShape, StepReport, TldiConfig, TldiError, cloud_collider};
 use rapier3d::dynamics::{IntegrationParameters, RigidBodySet};
 use rapier3d::geometry::{ColliderBuilder, ColliderHandle, ColliderSet, NarrowPhase};
-use rapier3d::math::{Pose, Vector};
-use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher};
+use rapier3d::math::Vector;
 use rapier3d::pipeline::{EventHandler, PhysicsHooks, PhysicsWorld};
 use std::sync::Arc;
 use std::time::Instant;
@@ -74,6 +72,13 @@ impl TldiPipeline {
     /// # Errors
     /// [`TldiError::BadConfig`], [`TldiError::NoBackend`] where `TLDI_BACKEND` asks for what is not
     /// there.
+    ///
+    /// ```
+    /// # use rapier3d_tldi::prelude::*;
+    /// assert!(TldiPipeline::new(TldiConfig::default()).is_ok());
+    /// let error = TldiPipeline::new(TldiConfig { scatter: -1.0, ..TldiConfig::default() }).err();
+    /// assert!(matches!(error, Some(TldiError::BadConfig { setting: "scatter", .. })));
+    /// ```
     pub fn new(config: TldiConfig) -> Result<Self, TldiError> {
         #[cfg(feature = "gpu")]
         let backend = tldi_wgpu::BackendChoice::Auto
@@ -112,50 +117,6 @@ impl TldiPipeline {
         })
     }
 
-    /// Makes the world's narrow phase ask this pipeline, and rapier's own dispatcher about pairs
-    /// without a cloud. Needed once, and again after the world was deserialised.
-    ///
-    /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// let mut world = PhysicsWorld::default();
-    /// let tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// tldi.attach(&mut world);
-    /// assert!(tldi.is_attached(&world.narrow_phase));
-    /// # Ok::<(), TldiError>(())
-    /// ```
-    pub fn attach(&self, world: &mut PhysicsWorld) {
-        self.attach_narrow_phase(&mut world.narrow_phase);
-    }
-
-    /// [`attach`](Self::attach) for split sets.
-    pub fn attach_narrow_phase(&self, narrow_phase: &mut NarrowPhase) {
-        narrow_phase.set_query_dispatcher(self.dispatcher().chain(DefaultQueryDispatcher));
-    }
-
-    /// The dispatcher that [`attach`](Self::attach) installs, for a chain of your own; it must come
-    /// before rapier's default one.
-    ///
-    /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// // Distances without a world. The pose is that of the second shape in the frame of the first.
-    /// use rapier3d::parry::query::QueryDispatcher;
-    /// let tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// let (scan, ball) = (PointCloudShape::new(scan), Ball::new(0.2));
-    /// let pose = Pose::from_translation(Vector::new(1.0, 0.5, 1.0));
-    /// let found = tldi.dispatcher().distance(&pose, &scan, &ball)?;
-    /// assert!((found.distance - 0.3).abs() < 1e-3);
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn dispatcher(&self) -> TldiDispatcher {
-        TldiDispatcher::new(Arc::clone(&self.shared))
-    }
-
     /// A collider for a cloud; see [`cloud_collider`]. For several bodies of one cloud, make one
     /// [`PointCloudShape`] and give each a clone.
     ///
@@ -173,15 +134,6 @@ impl TldiPipeline {
     /// ```
     pub fn collider(&self, cloud: PointCloud<'static>) -> ColliderBuilder {
         cloud_collider(PointCloudShape::new(cloud))
-    }
-
-    /// `inner` and what tells rapier the velocities of [deforming](Self::deform) clouds: the hooks
-    /// for a step with split sets.
-    pub fn hooks<'a>(&'a self, inner: &'a dyn PhysicsHooks) -> TldiHooks<'a> {
-        TldiHooks {
-            motions: &self.motions,
-            inner,
-        }
     }
 
     /// Compares the pairs that rapier is going to ask about in its next step, in one batch.
@@ -279,6 +231,28 @@ impl TldiPipeline {
     /// [new points](Self::set_points) is measured along the normal of the contact, from the points of
     /// the last two steps; noise, and a surface that jumps once, have none. Cost: for each contact of
     /// such a cloud a pass over the points in the blocks around it.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// let risen: Vec<Vector> = points.iter().map(|p| *p + 0.05 * Vector::Y).collect(); // 3 m/s
+    /// tldi.deform(&mut world, scan, &risen, None)?;
+    /// let integration = world.integration_parameters;
+    /// tldi.prepare(world.gravity, &integration, &world.bodies, &world.colliders)?;
+    /// tldi.push(&mut world.bodies, &world.colliders, &integration);
+    /// assert!((world.bodies[ball].linvel().y - 3.0).abs() < 0.1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn push(
         &mut self,
         bodies: &mut RigidBodySet,
@@ -303,6 +277,28 @@ impl TldiPipeline {
     /// # Errors
     /// [`TldiError::NotAttached`], [`TldiError::OnTheSpot`] where comparisons inside the step
     /// failed, and [`TldiError::PassesThrough`] where a collider of a kind that does not meet clouds came near one.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// let integration = world.integration_parameters;
+    /// tldi.prepare(world.gravity, &integration, &world.bodies, &world.colliders)?;
+    /// world.step_with_events(&tldi.hooks(&()), &());
+    /// let report = tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
+    /// assert_eq!(report.pairs_in_contact, 1);
+    /// # let _ = (scan, ball);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn finish(
         &mut self,
         bodies: &mut RigidBodySet,
@@ -358,6 +354,25 @@ impl TldiPipeline {
     /// # Errors
     /// Those of `prepare`, and [`TldiError::NotAttached`]: the world was not stepped. Those of
     /// `finish`: it was.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// let report = tldi.step(&mut world)?;
+    /// assert_eq!((report.pairs_batched, report.pairs_in_contact), (1, 1));
+    /// # let _ = (scan, ball);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn step(&mut self, world: &mut PhysicsWorld) -> Result<StepReport, TldiError> {
         self.step_with_events(world, &(), &())
     }
@@ -449,15 +464,6 @@ impl TldiPipeline {
     /// The settings.
     pub(crate) fn config(&self) -> TldiConfig {
         self.shared.config()
-    }
-
-    /// Whether the narrow phase asks this pipeline.
-    pub fn is_attached(&self, narrow_phase: &NarrowPhase) -> bool {
-        let probe = &self.shared.probe;
-        narrow_phase
-            .query_dispatcher()
-            .distance(&Pose::IDENTITY, probe, probe)
-            .is_ok_and(|answer| answer.distance == PROBE_ANSWER)
     }
 }
 

@@ -100,6 +100,20 @@ impl<'a> From<&'a Vec<Vector>> for SeenPoints<'a> {
 }
 
 /// What became of the points of a frame. Together they are those given.
+///
+/// ```
+/// # use rapier3d::prelude::*;
+/// # use rapier3d_tldi::prelude::*;
+/// # let mut world = PhysicsWorld::default();
+/// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+/// use rapier3d_tldi::StreamFrame;
+/// let recipe = CloudRecipe { radii: RadiusRule::Global(0.1), ..CloudRecipe::default() };
+/// let mut stream = CloudStream::new(&mut world.colliders, recipe)?;
+/// let seen = [Vector::Z, Vector::splat(f32::NAN)];
+/// let taken = stream.frame(&mut tldi, &mut world.colliders, &seen[..], &Pose::IDENTITY)?;
+/// assert_eq!(taken, StreamFrame { points: 1, dropped: 1, own: 0 });
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StreamFrame {
     /// Points of the collider.
@@ -115,6 +129,15 @@ impl CloudStream {
     ///
     /// # Errors
     /// [`CloudError::BadParameter`] for a recipe that cannot be followed.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let mut world = PhysicsWorld::default();
+    /// let stream = CloudStream::new(&mut world.colliders, CloudRecipe::default())?;
+    /// assert!(!world.colliders[stream.collider()].is_enabled());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn new(colliders: &mut ColliderSet, recipe: CloudRecipe) -> Result<Self, CloudError> {
         recipe.check()?;
         let collider = cloud_collider(stand_in()?).enabled(false);
@@ -132,6 +155,20 @@ impl CloudStream {
 
     /// Leaves out points on these colliders, where they are when a frame is taken: the links of the robot that
     /// carries the sensor. `margin` is in metres, see [`points_on`].
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// let hand = world.colliders.insert(ColliderBuilder::ball(0.1).translation(Vector::Z));
+    /// let recipe = CloudRecipe { radii: RadiusRule::Global(0.05), ..CloudRecipe::default() };
+    /// let mut stream = CloudStream::new(&mut world.colliders, recipe)?.without([hand], 0.02);
+    /// let seen = [Vector::Z, 2.0 * Vector::Z]; // in the hand, and beyond it
+    /// let taken = stream.frame(&mut tldi, &mut world.colliders, &seen[..], &Pose::IDENTITY)?;
+    /// assert_eq!((taken.points, taken.own), (1, 1));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn without(mut self, own: impl IntoIterator<Item = ColliderHandle>, margin: f32) -> Self {
         self.own = own.into_iter().collect();
         self.own_margin = margin;
@@ -139,6 +176,16 @@ impl CloudStream {
     }
 
     /// The collider; the same one in all frames.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let mut world = PhysicsWorld::default();
+    /// let stream = CloudStream::new(&mut world.colliders, CloudRecipe::default())?;
+    /// world.colliders[stream.collider()].set_friction(0.8);
+    /// assert_eq!(world.colliders[stream.collider()].friction(), 0.8);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn collider(&self) -> ColliderHandle {
         self.collider
     }
@@ -156,6 +203,21 @@ impl CloudStream {
     /// [`TldiError::Cloud`] where the points are refused, or the pose is not finite;
     /// [`TldiError::NoSuchCollider`] if the collider, or one of those [without](Self::without) which
     /// the frame is taken, was removed. The collider then keeps the points of the frame before.
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// let recipe = CloudRecipe { radii: RadiusRule::Global(0.1), ..CloudRecipe::default() };
+    /// let mut stream = CloudStream::new(&mut world.colliders, recipe)?;
+    /// let above = Pose::from_translation(Vector::Y);
+    /// let taken = stream.frame(&mut tldi, &mut world.colliders, &[Vector::Z][..], &above)?;
+    /// assert_eq!(taken.points, 1);
+    /// let bounds = world.colliders[stream.collider()].compute_aabb();
+    /// assert!(bounds.center().distance(Vector::Y + Vector::Z) < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn frame<'a>(
         &mut self,
         tldi: &mut TldiPipeline,

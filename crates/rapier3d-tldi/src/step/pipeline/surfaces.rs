@@ -57,6 +57,26 @@ impl TldiPipeline {
     ///
     /// # Errors
     /// Those of [`set_points`](Self::set_points).
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// let sunk: Vec<Vector> = points.iter().map(|p| *p - 0.5 * Vector::Y).collect();
+    /// tldi.set_collider_points(&mut world.colliders, scan, &sunk, None)?;
+    /// assert!((world.colliders[scan].compute_aabb().center().y + 0.5).abs() < 1e-6);
+    /// # let _ = ball;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn set_collider_points(
         &mut self,
         colliders: &mut ColliderSet,
@@ -128,6 +148,26 @@ impl TldiPipeline {
     ///
     /// # Errors
     /// Those of [`set_cloud`](Self::set_cloud).
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// let half = PointCloud::builder(points[..200].to_vec()).radius(0.1).build()?;
+    /// tldi.set_collider_cloud(&mut world.colliders, scan, half)?;
+    /// assert!(world.colliders[scan].compute_aabb().center().z < 0.5);
+    /// # let _ = ball;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn set_collider_cloud(
         &mut self,
         colliders: &mut ColliderSet,
@@ -218,6 +258,26 @@ impl TldiPipeline {
     ///
     /// # Errors
     /// Those of [`deform`](Self::deform).
+    ///
+    /// ```
+    /// # use rapier3d::prelude::*;
+    /// # use rapier3d_tldi::prelude::*;
+    /// # let points: Vec<Vector> = (0..400)
+    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
+    /// #     .collect();
+    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    /// # let mut world = PhysicsWorld::default();
+    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
+    /// # tldi.attach(&mut world);
+    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
+    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    /// let moved: Vec<Vector> = points.iter().map(|p| *p + 0.01 * Vector::X).collect(); // 0.6 m/s
+    /// tldi.deform_collider(&mut world.colliders, scan, &moved, None, 1.0 / 60.0)?;
+    /// assert!(world.colliders[scan].active_hooks().contains(ActiveHooks::MODIFY_SOLVER_CONTACTS));
+    /// # let _ = ball;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn deform_collider(
         &mut self,
         colliders: &mut ColliderSet,

@@ -1,0 +1,167 @@
+//! Times and work of frames of new points.
+
+use crate::table::{Table, numbers};
+use crate::{done, number, page, stored};
+use serde_json::Value;
+
+const PLACEMENTS: [&str; 5] = ["near-miss", "slight", "deep", "coincident", "body on scan"];
+
+/// Milliseconds, and the ratio to the floor, of a frame.
+pub(crate) fn frame(
+    rows: &[Value],
+    points: Option<u64>,
+    method: &str,
+    threads: u64,
+    k: usize,
+) -> [f64; 2] {
+    let is_it = |row: &&Value| {
+        points.is_none_or(|points| row["points"] == points)
+            && row["method"] == method
+            && row["threads"] == threads
+            && row["placement"] == PLACEMENTS[k]
+    };
+    match rows.iter().find(is_it) {
+        Some(row) => [number(row, "total_ms"), number(row, "floor_ratio")],
+        None => [f64::NAN; 2],
+    }
+}
+
+#[test]
+fn frames_beside_the_grid() {
+    let page = page("docs/benchmarks.md");
+    let mut wrong = Vec::new();
+    let generated = stored("frames/frames_generated.json");
+    let models =
+        ["armadillo_86k", "bunny_watertight"].map(|m| stored(&format!("frames/frames_{m}.json")));
+    Table::new(
+        &page,
+        "This library's time divided by that of the culled bit grid",
+    )
+    .check(
+        &mut wrong,
+        |name| !name.starts_with("asked"),
+        |name, k| {
+            let (rows, points) = match name.split(' ').next() {
+                Some("armadillo,") => (&models[0], None),
+                Some("bunny,") => (&models[1], None),
+                _ => (&generated, numbers(name)[0].parse().ok()),
+            };
+            let of = |method| frame(rows, points, method, 1, k)[0];
+            let mut all = vec![of("tldi (cpu)") / of("bit grid, culled")];
+            // What was asked of the first row stands beside.
+            all.extend((name == "10,000" && k == 1).then_some(2.0));
+            Some(all)
+        },
+    );
+    done(wrong);
+}
+
+#[test]
+fn frames_of_the_bunny() {
+    let page = page("docs/benchmarks.md");
+    let mut wrong = Vec::new();
+    let rows = stored("frames/frames_bunny_watertight.json");
+    Table::new(&page, "2 × 29,834 points, ms on one thread").check(
+        &mut wrong,
+        |_| true,
+        |name, k| {
+            let of = |method: &str| frame(&rows, None, method, 1, k)[0];
+            let faster = |method: &str| of(method).min(of(&format!("{method}, culled")));
+            let all = match name {
+                "this project" => vec![of("tldi (cpu)")],
+                "bit grid" => vec![faster("bit grid")],
+                "grid, counting sort" => vec![faster("grid (counting sort)")],
+                "voxels" => vec![faster("voxels rebuild")],
+                "BVH rebuild, binned (not culled)" => {
+                    vec![
+                        of("bvh rebuild (binned), culled"),
+                        of("bvh rebuild (binned)"),
+                    ]
+                }
+                "kiddo" => vec![faster("k-d tree rebuild (kiddo)")],
+                "compound of balls" => vec![faster("compound of balls")],
+                "compound of discs" => vec![faster("compound of discs")],
+                "`TriMesh` rebuild" => vec![faster("mesh rebuild (TriMesh)")],
+                "`TriMesh::set_vertices`" => vec![of("mesh set_vertices (TriMesh)")],
+                other => panic!("no method {other:?}"),
+            };
+            all[0].is_finite().then_some(all)
+        },
+    );
+    done(wrong);
+}
+
+#[test]
+fn frames_of_the_bumpy_ball() {
+    let page = page("docs/benchmarks.md");
+    let mut wrong = Vec::new();
+    let rows = stored("frames/frames_generated.json");
+    for (shown, points) in [
+        ("| 10,000 | near-miss |", 10_000),
+        ("| 134,000 | near-miss |", 134_000),
+        ("| 544,000 | near-miss |", 544_000),
+        ("| 1,000,000 | near-miss |", 1_000_000),
+    ] {
+        // The caption is the head itself.
+        let (before, _) = page
+            .split_once(shown)
+            .unwrap_or_else(|| panic!("no {shown:?}"));
+        Table {
+            caption: shown,
+            ..Table::new(&page[before.len() - 1..], "\n")
+        }
+        .check(
+            &mut wrong,
+            |_| true,
+            |name, k| {
+                let of = |method: &str, threads| frame(&rows, Some(points), method, threads, k);
+                let both = |method: &str| {
+                    [format!("{method}, culled"), method.to_owned()]
+                        .map(|m| of(&m, 1)[0])
+                        .to_vec()
+                };
+                Some(match name {
+                    "this project" => of("tldi (cpu)", 1).to_vec(),
+                    "this project, two threads" => vec![of("tldi (cpu)", 2)[0]],
+                    "bit grid, culled" => of("bit grid, culled", 1).to_vec(),
+                    "grid, culled" => vec![of("grid (counting sort), culled", 1)[0]],
+                    "voxels, culled (not)" => both("voxels rebuild"),
+                    "BVH rebuild, binned, culled (not)" => both("bvh rebuild (binned)"),
+                    "kiddo, culled (not)" => both("k-d tree rebuild (kiddo)"),
+                    other => panic!("no method {other:?}"),
+                })
+            },
+        );
+    }
+    done(wrong);
+}
+
+#[test]
+fn work_of_the_bumpy_ball() {
+    let page = page("docs/benchmarks.md");
+    let mut wrong = Vec::new();
+    let rows = stored("frames/frames_generated.json");
+    Table::new(&page, "`PairResult::work`").check(
+        &mut wrong,
+        |_| true,
+        |name, k| {
+            let points: u64 = numbers(name)[0].parse().expect("points");
+            let is_it = |row: &&Value| {
+                row["points"] == points
+                    && row["method"] == "tldi (cpu)"
+                    && row["threads"] == 1
+                    && row["placement"] == PLACEMENTS[k]
+            };
+            let work = &rows.iter().find(is_it)?["work"];
+            let looks = ["large", "windows", "fine"].map(|look| &work[look]);
+            let mut all = looks.map(|look| number(look, "points")).to_vec();
+            all.push(looks.iter().map(|look| number(look, "pixels")).sum());
+            // "0": nothing was drawn.
+            if all.iter().all(|figure| *figure == 0.0) {
+                all.truncate(1);
+            }
+            Some(all)
+        },
+    );
+    done(wrong);
+}

@@ -1,0 +1,10 @@
+//! What bodies do on clouds, step by step.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod ccd;
+mod pipeline;
+mod refusals;
+mod resting;
+mod rolling;

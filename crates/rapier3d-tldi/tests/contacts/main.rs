@@ -1,0 +1,12 @@
+//! What the narrow phase is told: contacts, pairs, and what is drawn of them.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod debug_render;
+mod dispatcher;
+mod manifolds;
+mod resolution;
+mod shared_shapes;
+mod thin_shapes;
+mod uneven;

@@ -1,0 +1,8 @@
+//! Clouds that get new points.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod own_points;
+mod set_points;
+mod stream;
