@@ -250,7 +250,7 @@ impl TldiPipeline {
     /// let integration = world.integration_parameters;
     /// tldi.prepare(world.gravity, &integration, &world.bodies, &world.colliders)?;
     /// tldi.push(&mut world.bodies, &world.colliders, &integration);
-    /// assert!((world.bodies[ball].linvel().y - 3.0).abs() < 0.1);
+    /// assert!(world.bodies[ball].linvel().y >= 3.0, "as fast as the surface, or a little faster");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn push(
