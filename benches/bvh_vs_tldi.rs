@@ -19,6 +19,7 @@ use tldi_benches::peers::{Found, Frame, Method, Peer, TldiPeer, all_peers};
 use tldi_benches::placements::{Placement, Source, bounds};
 use tldi_benches::stopwatch::Stopwatch;
 use tldi_benches::stored::{FrameRow, LookedRow, Provenance, WorkRow};
+use tldi_benches::times::Times;
 use tldi_wgpu::BackendChoice;
 
 #[global_allocator]
@@ -35,7 +36,7 @@ struct Args {
     /// Take the points from this model in place of a generated body: any format, also gzipped
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Frames that each is measured; medians are told
+    /// Frames that each is measured; medians and quartiles are told
     #[arg(long, value_name = "N", default_value_t = 5)]
     repeats: usize,
     /// Only these placements, several by commas: near-miss, slight, deep, coincident, body on scan
@@ -169,13 +170,12 @@ fn measure(
         progress.inc(1);
     }
     progress.finish_and_clear();
-    let floor_seconds = median(floors);
+    let floor_seconds = Times::of(floors).median;
     let rows = methods.iter().zip(found).zip(peaks);
     Ok(rows
         .map(|(((method, threads), all), peak_mib)| {
-            let milliseconds = |part: fn(&Found) -> f64| 1e3 * median(all.iter().map(part));
-            let total = |found: &Found| found.build_seconds + found.query_seconds;
-            let totals = || all.iter().map(|found| 1e3 * total(found));
+            let spread = |part: fn(&Found) -> f64| Times::of(all.iter().map(|f| 1e3 * part(f)));
+            let total = spread(|found| found.build_seconds + found.query_seconds);
             let last = all.last().copied().unwrap_or_default();
             FrameRow {
                 model: source.name().to_owned(),
@@ -184,16 +184,17 @@ fn measure(
                 placement: placement.name().to_owned(),
                 method: method.name(),
                 threads: *threads,
-                build_ms: milliseconds(|found| found.build_seconds),
-                query_ms: milliseconds(|found| found.query_seconds),
-                total_ms: median(totals()),
-                least_ms: totals().fold(f64::MAX, f64::min),
-                most_ms: totals().fold(0.0, f64::max),
+                build_ms: spread(|found| found.build_seconds).median,
+                query_ms: spread(|found| found.query_seconds).median,
+                total_ms: total.median,
+                least_ms: total.least,
+                quartiles_ms: Some(total.quartiles),
+                most_ms: total.most,
                 frames: all.len(),
                 collides: last.collides,
                 contacts: last.contacts,
                 peak_mib,
-                floor_ratio: 1e-3 * median(totals()) / floor_seconds,
+                floor_ratio: 1e-3 * total.median / floor_seconds,
                 work: last.work.map(WorkRow::from),
             }
         })
@@ -217,12 +218,6 @@ fn floor(frame: &Frame) -> f64 {
     seconds
 }
 
-fn median(values: impl IntoIterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
 fn print(rows: &[FrameRow]) {
     let Some(first) = rows.first() else {
         return;
@@ -232,25 +227,31 @@ fn print(rows: &[FrameRow]) {
         first.model, first.points, first.points_b, first.placement
     );
     println!(
-        "{:<32} {:>7} {:>10} {:>10} {:>10} {:>9} {:>9} {:>8} {:>8}",
+        "{:<32} {:>7} {:>10} {:>10} {:>10} {:>19} {:>9} {:>9} {:>8} {:>8}",
         "method",
         "threads",
         "build ms",
         "query ms",
         "total ms",
+        "quartiles",
         "collides",
         "contacts",
         "MiB",
         "x floor"
     );
     for row in rows {
+        let quartiles = row
+            .quartiles_ms
+            .map(|[lower, upper]| format!("{lower:.3}–{upper:.3}"));
+        let quartiles = quartiles.unwrap_or_default();
         println!(
-            "{:<32} {:>7} {:>10.3} {:>10.3} {:>10.3} {:>9} {:>9} {:>8.1} {:>8.1}",
+            "{:<32} {:>7} {:>10.3} {:>10.3} {:>10.3} {:>19} {:>9} {:>9} {:>8.1} {:>8.1}",
             row.method,
             row.threads,
             row.build_ms,
             row.query_ms,
             row.total_ms,
+            quartiles,
             row.collides,
             row.contacts,
             row.peak_mib,

@@ -34,7 +34,7 @@ pub struct Provenance {
     pub cores: usize,
     /// Commit of the code; `-dirty` if files were changed since.
     pub commit: String,
-    /// Features of the build, and the instruction sets that were found at run time.
+    /// Features of the build, the instruction sets that were found at run time, and what all code was compiled for.
     pub features: Vec<String>,
     /// Name of the GPU, where one took part.
     pub adapter: Option<String>,
@@ -72,6 +72,14 @@ fn features() -> Vec<String> {
     ] {
         if is_there {
             all.push(name.to_owned());
+        }
+    }
+    for (is_assumed, name) in [
+        (cfg!(target_feature = "avx2"), "avx2"),
+        (cfg!(target_feature = "avx512f"), "avx512f"),
+    ] {
+        if is_assumed {
+            all.push(format!("compiled for {name}"));
         }
     }
     all

@@ -83,6 +83,7 @@ fn frame(method: &str, placement: &str, points: usize, total_ms: f64) -> FrameRo
         query_ms: 0.5 * total_ms,
         total_ms,
         least_ms: 0.9 * total_ms,
+        quartiles_ms: Some([0.95 * total_ms, 1.2 * total_ms]),
         most_ms: 1.5 * total_ms,
         frames: 3,
         collides: true,

@@ -120,6 +120,10 @@ pub struct FrameRow {
     pub total_ms: f64,
     /// Fastest frame.
     pub least_ms: f64,
+    /// A quarter of the frames is faster than the first, and a quarter is slower than the second; none in rows of before
+    /// they were told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quartiles_ms: Option<[f64; 2]>,
     /// Slowest frame.
     pub most_ms: f64,
     /// Frames that were measured.
@@ -207,7 +211,8 @@ impl Measured for FrameRow {
         if self.points == 0 || self.points_b == 0 || self.threads == 0 || self.frames == 0 {
             return Some("points, threads and frames must be at least 1".to_owned());
         }
-        let times = [self.least_ms, self.total_ms, self.most_ms];
+        let [lower, upper] = self.quartiles_ms.unwrap_or([self.total_ms; 2]);
+        let times = [self.least_ms, lower, self.total_ms, upper, self.most_ms];
         if !(times[0] > 0.0 && times.is_sorted()) {
             return Some(format!("times of {times:?} ms are not positive and rising"));
         }

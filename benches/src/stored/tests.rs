@@ -153,16 +153,28 @@ fn bad_results_are_refused_by_name_with_a_way_out() {
     assert!(matches!(refusal(&good).0, StoredError::Kind { .. }));
 }
 
-/// Rows of before anything was counted are read, and those that count nothing are written like them.
+/// Rows of before work was counted and quartiles were told are read, and those without are written like them.
 #[test]
-fn work_is_optional() {
+fn work_and_quartiles_are_optional() {
     let old = r#"{"model": "ball", "points": 10, "points_b": 20, "placement": "deep", "method": "grid",
         "threads": 1, "build_ms": 1.0, "query_ms": 1.0, "total_ms": 2.0, "least_ms": 1.5, "most_ms": 3.0,
         "frames": 3, "collides": true, "contacts": 4, "peak_mib": 0.5, "floor_ratio": 9.0}"#;
     let row: FrameRow = serde_json::from_str(old).expect("it is a row");
-    assert_eq!(row.work, None);
+    assert_eq!((row.work, row.quartiles_ms), (None, None));
     let written = serde_json::to_string(&row).expect("it can be written");
-    assert!(!written.contains("work"), "{written}");
+    assert!(
+        !written.contains("work") && !written.contains("quartiles"),
+        "{written}"
+    );
+    let spread = |lower, upper| FrameRow {
+        quartiles_ms: Some([lower, upper]),
+        ..row.clone()
+    };
+    assert_eq!(spread(1.7, 2.5).fault(), None);
+    // Below the fastest frame, and on the wrong side of the median.
+    for (lower, upper) in [(1.4, 2.5), (2.1, 2.5), (1.7, 1.9), (1.7, 3.1)] {
+        assert!(spread(lower, upper).fault().is_some(), "{lower} {upper}");
+    }
     let work = WorkRow {
         culled: 7,
         windows: LookedRow {
