@@ -157,14 +157,16 @@ impl Listing {
                     .last()
                     .is_some_and(|s| s.ident == "bitflags") =>
             {
-                let lines = call.mac.tokens.to_string();
-                let without_docs = lines
-                    .split("# [doc")
-                    .map(|part| part.split_once(']').map_or(part, |(_, rest)| rest));
-                self.entries.insert(format!(
-                    "bitflags! {{{}}}\n",
-                    without_docs.collect::<String>()
-                ));
+                let tokens = call.mac.tokens.to_string();
+                let mut parts = tokens.split("# [doc");
+                let mut text = parts.next().unwrap_or_default().to_owned();
+                // The rest of a doc ends with its closing quote and bracket.
+                text.extend(parts.filter_map(|part| Some(part.split_once("\"]")?.1)));
+                let words: Vec<&str> = text.split_whitespace().collect();
+                let name = words.windows(2).find(|pair| pair[0] == "struct");
+                self.types.extend(name.map(|pair| pair[1].to_owned()));
+                self.entries
+                    .insert(format!("bitflags! {{{}}}\n", words.join(" ")));
                 return;
             }
             _ => return,
