@@ -1,7 +1,6 @@
 // Stage `sweep`: the fragments of each pixel become layers. See the CPU's stage.
 
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(2) var<storage, read> sides: array<Side>;
 @group(0) @binding(7) var<storage, read_write> views: array<View>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
 @group(0) @binding(11) var<storage, read_write> splats: array<Splat>;
@@ -225,7 +224,7 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
             end = begin;
         }
     }
-    let merge_steps = sides[view / MAX_VIEWS * 2u + s].merge_steps;
+    let merge_steps = pairs[view / MAX_VIEWS].sides[s].merge_steps;
     if end > begin {
         sort_fragments(begin, end - begin);
         count = 1u;
@@ -251,7 +250,7 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
     if !fitting {
         return;
     }
-    let flags = sides[view / MAX_VIEWS * 2u + s].flags;
+    let flags = pairs[view / MAX_VIEWS].sides[s].flags;
     let oriented = (flags & (HAS_NORMALS | ORIENTED)) == (HAS_NORMALS | ORIENTED);
     // Estimated ones are sharpened.
     let knows_faces = oriented || (flags & HAS_NORMALS) == 0u;

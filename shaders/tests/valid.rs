@@ -24,7 +24,7 @@ fn every_stage_is_valid_and_declares_its_bindings() {
             .collect();
         let declared: BTreeSet<u32> = stage.bindings.iter().copied().collect();
         assert_eq!(used, declared, "{}", stage.name);
-        // What every device has (`Limits::default()`): eight storage buffers, and one uniform here.
-        assert!(used.len() <= 9, "{}: {used:?}", stage.name);
+        // What every device has (`Limits::default()`) is eight storage buffers, and one uniform here. One is spare.
+        assert!(used.len() <= 8, "{}: {used:?}", stage.name);
     }
 }

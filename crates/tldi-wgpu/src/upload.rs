@@ -19,7 +19,6 @@ pub(crate) struct Upload {
     pub(crate) pairs_of: Vec<usize>,
     plans: Vec<PairPlan>,
     pub(crate) pairs: Vec<PairData>,
-    pub(crate) sides: Vec<SideData>,
     /// Side and first point of each block that may have points in reach.
     pub(crate) items: Vec<[u32; 2]>,
     /// What the selected pairs will need, about.
@@ -111,14 +110,12 @@ impl Upload {
         resident.begin();
         sources.begin();
         self.pairs.clear();
-        self.sides.clear();
         (self.zone_words, self.cells) = (0, 0);
         for (plan, &pair) in self.plans.iter().zip(&self.pairs_of) {
             let query = &batch[pair];
-            let data = PairData::new(query, plan, self.zone_words)?;
+            let mut data = PairData::new(query, plan, self.zone_words)?;
             self.zone_words += 2 * u64::from(data.zone_words);
-            self.pairs.push(data);
-            for (surface, side) in [query.a, query.b].iter().zip(&plan.sides) {
+            for (k, surface) in [query.a, query.b].iter().enumerate() {
                 let place = match surface {
                     Surface::Cloud(cloud) => resident.place(gpu, cloud)?,
                     Surface::Device(cloud) => sources.place(gpu, cloud, resident)?,
@@ -127,12 +124,42 @@ impl Upload {
                 let Some(facts) = CloudFacts::of(surface) else {
                     continue;
                 };
-                let side = SideData::new(&facts, side, &query.params, &place, self.cells)?;
+                let side =
+                    SideData::new(&facts, &plan.sides[k], &query.params, &place, self.cells)?;
                 self.cells += side.cells();
-                self.sides.push(side);
+                data.sides[k] = side;
             }
+            self.pairs.push(data);
         }
         Ok(())
+    }
+
+    /// As many as `wanted`, but of what shares a buffer with other things no more than `allowed` bytes have room for beside
+    /// these: what is foreseen, or was needed before, may be more than this part needs.
+    pub(crate) fn fitted(&self, wanted: Counters, allowed: u64) -> Counters {
+        let pairs = self.pairs.len() as u64;
+        let beside = |bytes: u64, element: u64| {
+            u32::try_from(allowed.saturating_sub(bytes) / element).unwrap_or(u32::MAX)
+        };
+        let contacts = beside(
+            4 * u64::from(PAIR_WORDS) * pairs,
+            4 * u64::from(CONTACT_WORDS),
+        );
+        let of_images =
+            TILE_BYTES * u64::from(wanted.tiles) + PIXEL_BYTES * u64::from(wanted.pixels);
+        let room = allowed.saturating_sub(4 * self.words_before_tiles());
+        let share = (room as f32 / of_images.max(1) as f32).min(1.0);
+        Counters {
+            contacts: wanted.contacts.min(contacts),
+            ..wanted.with_image_shares(share)
+        }
+    }
+
+    /// Words of the arena before the tiles: counters, sides, zones, cells, views.
+    fn words_before_tiles(&self) -> u64 {
+        let per_pair = 2 * SIDE_WORDS + MAX_VIEWS * VIEW_WORDS;
+        let pairs = u64::from(per_pair) * self.pairs.len() as u64;
+        u64::from(COUNTERS) + pairs + self.zone_words + 2 * self.cells
     }
 
     /// Sizes of the batch and where the parts of the arena are.
@@ -143,10 +170,11 @@ impl Upload {
     pub(crate) fn batch_data(&self, capacities: &Counters) -> Result<BatchData, GpuError> {
         let pairs = self.pairs.len() as u64;
         let sides_at = u64::from(COUNTERS);
-        let views_at = sides_at + 2 * pairs * u64::from(SIDE_WORDS);
-        let zone_at = views_at + pairs * u64::from(MAX_VIEWS * VIEW_WORDS);
+        let zone_at = sides_at + 2 * pairs * u64::from(SIDE_WORDS);
         let cells_at = zone_at + self.zone_words;
-        let tiles_at = cells_at + 2 * self.cells;
+        // From here on, a round of further views begins anew.
+        let views_at = cells_at + 2 * self.cells;
+        let tiles_at = self.words_before_tiles();
         let pixels_at = tiles_at + TILE_BYTES / 4 * u64::from(capacities.tiles);
         let work_words = pixels_at + PIXEL_BYTES / 4 * u64::from(capacities.pixels);
         // The stages compute places anywhere in it.
