@@ -188,6 +188,7 @@ fn columns_depths(
 fn view_of_tile(tile: u32) -> u32 {
     var low = 0u;
     var high = batch.pairs * MAX_VIEWS;
+    // Ends: the middle is between them, so that they come closer.
     while high - low > 1u {
         let middle = (low + high) / 2u;
         if views[middle].first_tile <= tile {

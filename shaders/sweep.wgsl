@@ -17,6 +17,7 @@ var<workgroup> base: u32;
 fn sift(begin: u32, start: u32, count: u32) {
     var root = start;
     let value = fragments[begin + root];
+    // Ends: a child comes after its root, and roots come before `count`.
     loop {
         var child = 2u * root + 1u;
         if child >= count {
@@ -39,6 +40,7 @@ fn sort_fragments(begin: u32, count: u32) {
         for (var i = 1u; i < count; i++) {
             let value = fragments[begin + i];
             var k = i;
+            // Ends: `k` falls.
             while k > 0u {
                 let before = fragments[begin + k - 1u];
                 if before.x <= value.x {
@@ -262,6 +264,7 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
             // In order of depth, then of facing.
             let layer = layer_of(start, i + 1u, oriented, knows_faces, view);
             var place = slot;
+            // Ends: `place` falls.
             while place > first_layer {
                 let before = layers[place - 1u];
                 let is_behind = before.depth > layer.depth

@@ -9,6 +9,7 @@ use crate::prediction::predicted;
 use crate::resident::Resident;
 use crate::sources::Sources;
 use crate::{Gpu, GpuError};
+use std::ops::Range;
 use tldi::plan::PairPlan;
 use tldi::{Aabb, BLOCK, PairQuery, Surface};
 
@@ -21,6 +22,8 @@ pub(crate) struct Upload {
     pub(crate) pairs: Vec<PairData>,
     /// Side and first point of each block that may have points in reach.
     pub(crate) items: Vec<[u32; 2]>,
+    /// Which of them are of each side of each pair.
+    items_of: Vec<[Range<usize>; 2]>,
     /// What the selected pairs will need, about.
     pub(crate) predicted: Counters,
     zone_words: u64,
@@ -34,6 +37,7 @@ impl Upload {
         self.pairs_of.clear();
         self.plans.clear();
         self.items.clear();
+        self.items_of.clear();
         self.predicted = Counters::default();
         for pair in among {
             let query = &batch[pair];
@@ -44,7 +48,7 @@ impl Upload {
                 continue;
             };
             let first_item = self.items.len();
-            let mut blocks = [0; 2];
+            let mut items_of = [0..0, 0..0];
             let is_reached = (0..2).all(|k| {
                 let side = &plan.sides[k];
                 let index = (2 * self.plans.len() + k) as u32;
@@ -66,11 +70,13 @@ impl Upload {
                     }
                     Surface::Exact(_) => {}
                 }
-                blocks[k] = self.items.len() - before;
-                blocks[k] > 0
+                items_of[k] = before..self.items.len();
+                !items_of[k].is_empty()
             });
             if is_reached {
+                let blocks = [0, 1].map(|k| items_of[k].len());
                 let of_pair = predicted(query, &plan, blocks);
+                self.items_of.push(items_of);
                 self.predicted = self.predicted.plus(&of_pair);
                 self.plans.push(plan);
                 self.pairs_of.push(pair);
@@ -95,7 +101,7 @@ impl Upload {
         2 * 4 * self.cells
     }
 
-    /// Puts the clouds of the selected pairs on the device, and fills what tells of them.
+    /// Puts the blocks in reach of the selected pairs on the device, and fills what tells of them.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] where there is no room for the clouds, or the stages cannot number
@@ -111,13 +117,18 @@ impl Upload {
         sources.begin();
         self.pairs.clear();
         (self.zone_words, self.cells) = (0, 0);
-        for (plan, &pair) in self.plans.iter().zip(&self.pairs_of) {
+        let selected = self.plans.iter().zip(&self.items_of);
+        for ((plan, items_of), &pair) in selected.zip(&self.pairs_of) {
             let query = &batch[pair];
             let mut data = PairData::new(query, plan, self.zone_words)?;
             self.zone_words += 2 * u64::from(data.zone_words);
             for (k, surface) in [query.a, query.b].iter().enumerate() {
                 let place = match surface {
-                    Surface::Cloud(cloud) => resident.place(gpu, cloud)?,
+                    Surface::Cloud(cloud) => {
+                        let items = self.items[items_of[k].clone()].iter();
+                        let blocks = items.map(|[_, first_point]| *first_point as usize / BLOCK);
+                        resident.place(gpu, cloud, blocks)?
+                    }
                     Surface::Device(cloud) => sources.place(gpu, cloud, resident)?,
                     Surface::Exact(_) => continue,
                 };
