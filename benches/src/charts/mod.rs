@@ -6,6 +6,7 @@ mod figure;
 mod frames;
 mod front;
 pub(crate) mod gpu_day;
+mod gpu_layers;
 mod looks;
 mod paint;
 mod speed_accuracy;

@@ -7,6 +7,7 @@ mod correctness;
 mod floors;
 mod frames;
 mod host_costs;
+mod shown;
 mod spread;
 mod table;
 mod workloads;
@@ -19,15 +20,14 @@ pub use host_costs::HostCost;
 pub use spread::Spread;
 pub use table::print;
 pub use workloads::{StageTime, Workload};
+pub(crate) use shown::Shown;
 
 use crate::charts::gpu_day::draw;
-use crate::placements::{Placement, Source};
 use crate::stored::Provenance;
 use anyhow::Context;
 use budget::Budget;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use tldi::{Backend, ContactPixel, CpuBackend};
 use tldi_wgpu::{Gpu, WgpuBackend};
 use workloads::Workloads;
 
@@ -161,8 +161,7 @@ impl Report {
             settings,
         };
         if let Some(out) = out {
-            let shown = contacts_of_both(gpu)?;
-            draw(&report, &shown.contacts, shown.radius, out)?;
+            draw(&report, &Shown::of(gpu)?, out)?;
         }
         Ok(report)
     }
@@ -173,32 +172,6 @@ impl Report {
         std::fs::write(path, text + "\n")
             .with_context(|| format!("cannot write {}", path.display()))
     }
-}
-
-/// What a picture shows of both backends.
-struct Shown {
-    /// Name of the backend, and its contact pixels.
-    contacts: [(&'static str, Vec<ContactPixel>); 2],
-    /// Mean radius, metres.
-    radius: f32,
-}
-
-/// A small body in a scan on both backends.
-fn contacts_of_both(gpu: Gpu) -> anyhow::Result<Shown> {
-    let (placement, points) = (Placement::BodyOnScan, 100_000);
-    let scene = Scene::new(placement, points, Kind::Bare, 1)?;
-    let pixels = |backend: &mut dyn Backend| -> anyhow::Result<Vec<ContactPixel>> {
-        let mut results = Vec::new();
-        backend.compare(&[scene.query()], &mut results)?;
-        Ok(std::mem::take(&mut results[0].contacts))
-    };
-    let on_device = pixels(&mut WgpuBackend::new(gpu)?)?;
-    let on_cpu = pixels(&mut CpuBackend::without_first_look())?;
-    let radius = Source::Generated(points).radius(placement)?;
-    Ok(Shown {
-        contacts: [("device", on_device), ("CPU", on_cpu)],
-        radius,
-    })
 }
 
 #[cfg(test)]
