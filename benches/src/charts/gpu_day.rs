@@ -1,19 +1,15 @@
 //! Charts of a run of `gpu_day`.
 
 use super::figure::{Axis, Color, Curve, Entry, Figure, Line, Look, Mark, Panel, Point};
-use super::{ChartError, looks, origin, paint};
 use super::gpu_layers::layers;
+use super::{ChartError, looks, origin, paint};
 use crate::gpu_day::{Bin, Dispatches, Moved, Report, Shown, Workload};
 use std::path::{Path, PathBuf};
 use tldi::ContactPixel;
 
 /// Draws floors, workloads, stages, differences from the CPU, and of one scene the contact pixels on the device and on
 /// the CPU, and a row of layers. Each as SVG and PNG.
-pub(crate) fn draw(
-    report: &Report,
-    shown: &Shown,
-    out: &Path,
-) -> Result<Vec<PathBuf>, ChartError> {
+pub(crate) fn draw(report: &Report, shown: &Shown, out: &Path) -> Result<Vec<PathBuf>, ChartError> {
     let figures = [
         floors(report),
         workloads(report),
@@ -29,7 +25,12 @@ pub(crate) fn draw(
     Ok(files)
 }
 
-pub(super) fn figure(report: &Report, name: &str, title: &str, panels: Vec<Panel>) -> Option<Figure> {
+pub(super) fn figure(
+    report: &Report,
+    name: &str,
+    title: &str,
+    panels: Vec<Panel>,
+) -> Option<Figure> {
     let has_points = |panel: &Panel| panel.curves.iter().any(|curve| !curve.points.is_empty());
     panels.iter().any(has_points).then(|| Figure {
         name: format!("gpu_day_{name}"),

@@ -31,10 +31,20 @@ pub(super) fn layers(report: &Report, shown: &Shown) -> Option<Figure> {
     ];
     let places = section.layers.iter().chain(&section.contacts);
     let panel = Panel {
-        title: format!("Row {}: {} contacts", section.row, section.contacts[0].len()),
+        title: format!(
+            "Row {}: {} contacts",
+            section.row,
+            section.contacts[0].len()
+        ),
         x: axis("column", all().map(|place| place[0])),
-        y: axis("depth along the view, mean radii", all().map(|place| in_radii(place).1)),
-        curves: places.zip(looks).map(|(places, look)| curve(places, look)).collect(),
+        y: axis(
+            "depth along the view, mean radii",
+            all().map(|place| in_radii(place).1),
+        ),
+        curves: places
+            .zip(looks)
+            .map(|(places, look)| curve(places, look))
+            .collect(),
         levels: Vec::new(),
     };
     let labels = [
@@ -50,7 +60,12 @@ pub(super) fn layers(report: &Report, shown: &Shown) -> Option<Figure> {
     Some(Figure {
         panel_size: [900, 420],
         legend: looks.into_iter().zip(labels).map(entry).collect(),
-        ..figure(report, "layers", "Layers and contacts of one row of pixels", vec![panel])?
+        ..figure(
+            report,
+            "layers",
+            "Layers and contacts of one row of pixels",
+            vec![panel],
+        )?
     })
 }
 

@@ -17,10 +17,10 @@ pub use card::Card;
 pub use correctness::{Bin, Correctness, Counted, DefaultLimits, Element, Parity, Repeats};
 pub use floors::{Dispatches, Floors, Moved};
 pub use host_costs::HostCost;
+pub(crate) use shown::Shown;
 pub use spread::Spread;
 pub use table::print;
 pub use workloads::{StageTime, Workload};
-pub(crate) use shown::Shown;
 
 use crate::charts::gpu_day::draw;
 use crate::stored::Provenance;
@@ -28,7 +28,7 @@ use anyhow::Context;
 use budget::Budget;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use tldi_wgpu::{Gpu, WgpuBackend};
+use tldi_wgpu::WgpuBackend;
 use workloads::Workloads;
 
 /// Name of the results, as other benches name their rows.

@@ -134,7 +134,10 @@ mod tests {
                 let of_pixel = layers.iter().filter(|layer| layer[0] == *column);
                 let nearest = of_pixel.map(|layer| (layer[1] - depth).abs());
                 let nearest = nearest.fold(f64::MAX, f64::min);
-                assert!(nearest < 0.1 * f64::from(shown.radius), "{column}: {nearest}");
+                assert!(
+                    nearest < 0.1 * f64::from(shown.radius),
+                    "{column}: {nearest}"
+                );
             }
         }
     }
