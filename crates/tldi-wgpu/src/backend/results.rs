@@ -42,13 +42,14 @@ impl WgpuBackend {
             self.times.clear();
             return Ok(Returned::Overflown(needed));
         }
+        let missing = asked.contacts..needed.contacts;
         if wants_further {
             run.first_views = Some(needed);
-            self.submit_further(needed.contacts)?;
+            self.submit_further(missing)?;
             return Ok(Returned::More);
         }
         if !is_complete {
-            self.submit_copy(needed.contacts)?;
+            self.submit_copy(missing)?;
             return Ok(Returned::More);
         }
         for &pair in &self.upload.pairs_of {

@@ -6,6 +6,7 @@ use crate::answer::Answer;
 use crate::layout::{BatchData, CONTACT_WORDS, COUNTERS, GROUP, PAIR_WORDS};
 use crate::pipelines::{Pipeline, is_needed};
 use crate::timer::Timer;
+use std::ops::Range;
 use tldi_shaders::FURTHER_FROM;
 
 /// Workgroups along x of a dispatch.
@@ -41,22 +42,22 @@ impl WgpuBackend {
         self.clear(&mut encoder, 0, &data);
         self.dispatch(&mut encoder, Round::First, &data);
         let contacts = self.expected_contacts.min(data.contacts);
-        self.ask(encoder, contacts, true)
+        self.ask(encoder, 0..contacts, true)
     }
 
-    /// Submits the views that the first ones proved wanting. All `contacts` come back again.
-    pub(super) fn submit_further(&mut self, contacts: u32) -> Result<(), GpuError> {
+    /// Submits the views that the first ones proved wanting. They find no contacts: `missing` did not come back before.
+    pub(super) fn submit_further(&mut self, missing: Range<u32>) -> Result<(), GpuError> {
         let data = self.upload.batch_data(&self.capacities)?;
         let mut encoder = (self.gpu.device).create_command_encoder(&Default::default());
         self.clear(&mut encoder, data.views_at, &data);
         self.dispatch(&mut encoder, Round::Further, &data);
-        self.ask(encoder, contacts, true)
+        self.ask(encoder, missing, true)
     }
 
-    /// Submits the copy of all `contacts`, where fewer came back.
-    pub(super) fn submit_copy(&mut self, contacts: u32) -> Result<(), GpuError> {
+    /// Submits the copy of the contacts that did not come back.
+    pub(super) fn submit_copy(&mut self, missing: Range<u32>) -> Result<(), GpuError> {
         let encoder = (self.gpu.device).create_command_encoder(&Default::default());
-        self.ask(encoder, contacts, false)
+        self.ask(encoder, missing, false)
     }
 
     /// Zeroes the arena from word `from` to the ends of the pixels: all in it that is counted. What lies behind is
@@ -136,11 +137,12 @@ impl WgpuBackend {
         }
     }
 
-    /// Submits what was encoded, and asks for what is counted, what is found of the pairs, and so many contacts.
+    /// Submits what was encoded, and asks for what is counted, what is found of the pairs, and these contacts; those before
+    /// them have come back.
     fn ask(
         &mut self,
         mut encoder: wgpu::CommandEncoder,
-        contacts: u32,
+        contacts: Range<u32>,
         has_stages: bool,
     ) -> Result<(), GpuError> {
         let (Some(work), Some(found), Some(readback)) = (
@@ -150,18 +152,23 @@ impl WgpuBackend {
         ) else {
             return Err(self.gpu.failed("nothing was submitted".to_owned()));
         };
-        let bytes = self.read_bytes(contacts);
         let counters = 4 * u64::from(COUNTERS);
+        let [pairs, from, to] = [0, contacts.start, contacts.end].map(|n| self.read_bytes(n));
         encoder.copy_buffer_to_buffer(work, 0, readback, 0, counters);
-        encoder.copy_buffer_to_buffer(found, 0, readback, counters, bytes - counters);
+        for part in [counters..pairs, from..to] {
+            let (at, bytes) = (part.start, part.end.saturating_sub(part.start));
+            if bytes > 0 {
+                encoder.copy_buffer_to_buffer(found, at - counters, readback, at, bytes);
+            }
+        }
         self.gpu.queue.submit([encoder.finish()]);
         self.traffic.submissions += 1;
-        self.traffic.read_back += bytes;
+        self.traffic.read_back += pairs + to.saturating_sub(from);
         self.gpu.check()?;
         self.asked = Some(Asked {
-            answer: Answer::to_reading(readback.slice(..bytes)),
+            answer: Answer::to_reading(readback.slice(..to.max(from))),
             times: (self.timer.as_ref().filter(|_| has_stages)).map(Timer::ask),
-            contacts,
+            contacts: contacts.end.max(contacts.start),
         });
         Ok(())
     }
