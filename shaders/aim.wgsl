@@ -2,7 +2,6 @@
 // normals are integers and do not depend on their order.
 
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(2) var<storage, read> sides: array<Side>;
 @group(0) @binding(7) var<storage, read_write> views: array<View>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
 @group(0) @binding(10) var<storage, read_write> samples: array<vec4f>;
@@ -81,7 +80,7 @@ fn with_outer(m: Symmetric, weight: f32, v: vec3f) -> Symmetric {
 fn mean_along(pair: u32, s: u32) -> f32 {
     let side = 2u * pair + s;
     let count = f32(atomicLoad(&facing_count[s]));
-    if (sides[side].flags & ORIENTED) == 0u || count < LEAST_SHARE * f32(sample_count(side)) {
+    if (pairs[pair].sides[s].flags & ORIENTED) == 0u || count < LEAST_SHARE * f32(sample_count(side)) {
         return 0.0;
     }
     return f32(atomicLoad(&facing_sum[s])) / STEPS / max(count, 1.0);
@@ -95,7 +94,7 @@ fn conclusive(sign: f32) -> i32 {
 // Mean of the near points of the larger surface, if that may be a sheet; w is 1 then.
 fn sheet_of(pair: u32) -> vec4f {
     let side = 2u * pair + (1u - pairs[pair].body_is_b);
-    if (sides[side].flags & ORIENTED) != 0u {
+    if (pairs[pair].sides[side % 2u].flags & ORIENTED) != 0u {
         return vec4f();
     }
     let state = batch.sides_at + side * SIDE_WORDS;
@@ -268,35 +267,6 @@ fn decide(pair: u32, turn: u32) {
     is_done = !is_zone || is_forced;
 }
 
-// `VirtualCamera::along(z, ..)`.
-fn view_along(z: vec3f) -> View {
-    var view = View();
-    // The sign of a negative zero is negative.
-    let side = select(1.0, -1.0, bitcast<u32>(z.z) >= 0x80000000u);
-    let a = -1.0 / (side + z.z);
-    let b = z.x * z.y * a;
-    view.view_x = vec4f(1.0 + side * z.x * z.x * a, side * b, -side * z.x, 0.0);
-    view.view_y = vec4f(b, side + z.y * z.y * a, -z.y, 0.0);
-    view.view_z = vec4f(z, 0.0);
-    view.axis = z;
-    view.exists = 1u;
-    return view;
-}
-
-// Views across those there are, until axes span all directions: `further_axes`.
-fn push_further_views(pair: u32) {
-    let first = pair * MAX_VIEWS;
-    if view_count == 1u {
-        views[first + 1u] = view_along(views[first].view_x.xyz);
-        views[first + 2u] = view_along(views[first].view_y.xyz);
-    } else {
-        views[first + 2u] = view_along(unit_or(cross(seen[0], seen[1]), views[first].view_x.xyz));
-    }
-    for (var v = view_count; v < MAX_VIEWS; v++) {
-        views[first + v].flags = IS_FURTHER;
-    }
-}
-
 fn push_view(pair: u32, sign: f32) {
     var view = view_along(axis);
     if pairs[pair].policy == FIXED_VIEW {
@@ -305,10 +275,10 @@ fn push_view(pair: u32, sign: f32) {
         view.view_z = pairs[pair].view_z;
     }
     for (var s = 0u; s < 2u; s++) {
-        let side = 2u * pair + s;
-        let middle = dot(view.view_z.xyz, sides[side].middle) + view.view_z.w;
+        let facts = &pairs[pair].sides[s];
+        let middle = dot(view.view_z.xyz, (*facts).middle) + view.view_z.w;
         view.middles[s] = middle;
-        if (sides[side].flags & HAS_MIDDLE) != 0u {
+        if ((*facts).flags & HAS_MIDDLE) != 0u {
             view.flags |= MIDDLE_KNOWN << s;
         }
         let along = sign * mean_along(pair, s);
@@ -328,10 +298,19 @@ fn push_view(pair: u32, sign: f32) {
 @compute @workgroup_size(64)
 fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let pair = min(group_index(group), batch.pairs - 1u);
+    let exists = group_index(group) < batch.pairs;
+    // Nothing is found yet. Workgroups beyond the last pair leave it alone.
+    if exists && lane < MAX_VIEWS {
+        views[pair * MAX_VIEWS + lane].exists = MISSING;
+    }
+    if exists && lane < PAIR_WORDS {
+        atomicStore(&found[pair * PAIR_WORDS + lane], 0u);
+    }
+    storageBarrier();
     if lane == 0u {
         let near_a = atomicLoad(&work[batch.sides_at + 2u * pair * SIDE_WORDS + NEAR_COUNT]);
         let near_b = atomicLoad(&work[batch.sides_at + (2u * pair + 1u) * SIDE_WORDS + NEAR_COUNT]);
-        is_done = near_a == 0u || near_b == 0u || group_index(group) >= batch.pairs;
+        is_done = near_a == 0u || near_b == 0u || !exists;
         is_forced = false;
         is_again = false;
         view_count = 0u;
@@ -394,9 +373,6 @@ fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lan
                 decide(pair, turn);
             }
         }
-    }
-    if lane == 0u && pairs[pair].policy == ALL_DIRECTIONS && 0u < view_count && view_count < MAX_VIEWS {
-        push_further_views(pair);
     }
 }
 

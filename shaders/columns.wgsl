@@ -2,7 +2,6 @@
 // can meet.
 
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(2) var<storage, read> sides: array<Side>;
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
 @group(0) @binding(7) var<storage, read_write> views: array<View>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
@@ -31,8 +30,8 @@ fn columns_bounds(
     if exists {
         for (var v = 0u; v < MAX_VIEWS; v++) {
             let view = side / 2u * MAX_VIEWS + v;
-            if views[view].exists == 0u {
-                break;
+            if views[view].exists != DRAWN {
+                continue;
             }
             let p = moved(views[view].view_x, views[view].view_y, views[view].view_z, survivors[i].position);
             let at = batch.views_at + view * VIEW_WORDS + 6u * (side % 2u);
@@ -67,7 +66,8 @@ struct Footprint {
 }
 
 fn largest_radius(side: u32, params: Params) -> f32 {
-    let radius = sides[side].max_radius * sides[side].radius_scale;
+    let facts = &pairs[side / 2u].sides[side % 2u];
+    let radius = (*facts).max_radius * (*facts).radius_scale;
     return splat_radius(radius, params.pixel_size);
 }
 
@@ -89,34 +89,6 @@ fn footprint(view: u32, s: u32, params: Params) -> Footprint {
     return seen;
 }
 
-var<workgroup> counts: array<u32, 256>;
-var<workgroup> cursor: u32;
-
-// Gives every view of `counts` its place; the last one's end is in `cursor`. Places begin at
-// multiples of GROUP, so that all threads of a workgroup are in one view.
-fn place(lane: u32) -> u32 {
-    workgroupBarrier();
-    if lane == 0u {
-        var sum = cursor;
-        for (var k = 0u; k < GROUP; k++) {
-            let count = counts[k];
-            counts[k] = sum;
-            // More than any memory holds stays more.
-            sum = select(sum + (count + GROUP - 1u) / GROUP * GROUP, 0xf0000000u, count > 0x10000000u || sum >= 0xf0000000u);
-        }
-        cursor = sum;
-    }
-    workgroupBarrier();
-    return counts[lane];
-}
-
-fn set_groups(at: u32, count: u32) {
-    let whole = count / GROUP;
-    groups[at] = min(whole, MAX_GROUPS);
-    groups[at + 1u] = (whole + MAX_GROUPS - 1u) / MAX_GROUPS;
-    groups[at + 2u] = 1u;
-}
-
 // The tiles of every view. One workgroup.
 @compute @workgroup_size(256)
 fn columns_tiles(@builtin(local_invocation_index) lane: u32) {
@@ -131,7 +103,7 @@ fn columns_tiles(@builtin(local_invocation_index) lane: u32) {
         var rect_last = vec2i(-1);
         var edge = 1;
         var dims = vec2u();
-        if view < view_total && views[view].exists != 0u {
+        if view < view_total && views[view].exists == DRAWN {
             let params = pairs[view / MAX_VIEWS].params;
             let a = footprint(view, 0u, params);
             let b = footprint(view, 1u, params);
@@ -174,17 +146,6 @@ fn columns_tiles(@builtin(local_invocation_index) lane: u32) {
     }
 }
 
-// Nothing is known of any tile.
-@compute @workgroup_size(256)
-fn columns_clear(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let tile = group_index(group) * GROUP + lane;
-    if tile < min(atomicLoad(&work[TILES]), batch.tiles) {
-        for (var k = 0u; k < 3u; k++) {
-            atomicStore(&work[batch.tiles_at + k * batch.tiles + tile], 0u);
-        }
-    }
-}
-
 fn tile_of(view: u32, p: vec3f, pixel_size: f32) -> u32 {
     let scale = 1.0 / (pixel_size * f32(views[view].tile_edge));
     let t = p.xy * scale - vec2f(views[view].tile_origin) / f32(views[view].tile_edge);
@@ -211,8 +172,8 @@ fn columns_depths(
     let margin = params.slope_damping * largest_radius(side, params);
     for (var v = 0u; v < MAX_VIEWS; v++) {
         let view = side / 2u * MAX_VIEWS + v;
-        if views[view].exists == 0u {
-            break;
+        if views[view].exists != DRAWN {
+            continue;
         }
         let p = moved(views[view].view_x, views[view].view_y, views[view].view_z, survivors[i].position);
         let tile = tile_of(view, p, params.pixel_size);
@@ -227,6 +188,7 @@ fn columns_depths(
 fn view_of_tile(tile: u32) -> u32 {
     var low = 0u;
     var high = batch.pairs * MAX_VIEWS;
+    // Ends: the middle is between them, so that they come closer.
     while high - low > 1u {
         let middle = (low + high) / 2u;
         if views[middle].first_tile <= tile {
@@ -287,62 +249,8 @@ fn columns_touch(
     }
 }
 
-// The image of every view: the pixels of its touching tiles. One workgroup.
+// The images. One workgroup. Where clouds have no normals, `normals` does it.
 @compute @workgroup_size(256)
 fn columns_pixels(@builtin(local_invocation_index) lane: u32) {
-    let view_total = batch.pairs * MAX_VIEWS;
-    if lane == 0u {
-        cursor = 0u;
-    }
-    for (var first = 0u; first < view_total; first += GROUP) {
-        let view = first + lane;
-        var count = 0u;
-        var origin = vec2i();
-        var size = vec2u();
-        if view < view_total {
-            let at = batch.views_at + view * VIEW_WORDS + TOUCHED;
-            let end = vec2i(vec2u(atomicLoad(&work[at]), atomicLoad(&work[at + 1u])));
-            if end.x > 0 {
-                let low = vec2i(vec2u(
-                    NONE - atomicLoad(&work[at + 2u]),
-                    NONE - atomicLoad(&work[at + 3u]),
-                ));
-                let edge = views[view].tile_edge;
-                let rect_end = views[view].rect_origin + vec2i(views[view].rect_size);
-                origin = max(views[view].tile_origin + low * edge, views[view].rect_origin);
-                let end_pixel = min(views[view].tile_origin + end * edge, rect_end);
-                size = vec2u(max(end_pixel - origin, vec2i(0)));
-                count = u32(min(f32(size.x) * f32(size.y), 4.0e9));
-                if count < 0x10000000u {
-                    count = size.x * size.y;
-                }
-            }
-        }
-        counts[lane] = count;
-        let place_of_view = place(lane);
-        if view < view_total {
-            views[view].rect_origin = origin;
-            views[view].rect_size = size;
-            views[view].pixel_count = count;
-            views[view].first_pixel = place_of_view;
-        }
-        workgroupBarrier();
-    }
-    if lane == 0u {
-        atomicStore(&work[PIXELS], cursor);
-        let fitting = select(cursor, 0u, cursor > batch.pixels);
-        set_groups(PIXEL_GROUPS, 2u * fitting);
-        set_groups(IMAGE_GROUPS, fitting);
-    }
-}
-
-// No pixel has a fragment yet.
-@compute @workgroup_size(256)
-fn pixels_clear(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let k = group_index(group) * GROUP + lane;
-    let pixels = min(atomicLoad(&work[PIXELS]), batch.pixels);
-    if k < 2u * pixels {
-        let s = k / pixels;
-        atomicStore(&work[batch.pixels_at + s * batch.pixels + k - s * pixels], 0u);
-    }
+    place_images(lane);
 }

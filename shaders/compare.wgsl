@@ -290,8 +290,7 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     look.middle_b = select(INFINITE, views[view].middles.y, (flags & (MIDDLE_KNOWN << 1u)) != 0u);
     for (var v = 0u; v < MAX_VIEWS; v++) {
         let other = pair * MAX_VIEWS + v;
-        let is_counted = (flags & IS_FURTHER) != 0u || (views[other].flags & IS_FURTHER) == 0u;
-        if other != view && views[other].exists != 0u && is_counted {
+        if other != view && views[other].exists != MISSING {
             let axis = views[other].axis;
             look.others[look.other_count] =
                 turned(views[view].view_x, views[view].view_y, views[view].view_z, axis);

@@ -2,7 +2,6 @@
 // query; and the cells of the zone's grid that hold them. A workgroup takes one block of one side.
 
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(2) var<storage, read> sides: array<Side>;
 // Side, and first point in its cloud.
 @group(0) @binding(3) var<storage, read> items: array<vec2u>;
 @group(0) @binding(4) var<storage, read> points: array<f32>;
@@ -24,41 +23,42 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     let item = items[min(item_index, batch.items - 1u)];
     let side_index = item.x;
     let pair_index = side_index / 2u;
-    let stride = sides[side_index].stride;
+    let facts = &pairs[pair_index].sides[side_index % 2u];
+    let stride = (*facts).stride;
     // See `tldi::plan::first_taken`.
     let offset = hash(item.y / BLOCK) % stride + lane * stride;
     let index = item.y + offset;
-    var is_kept = exists && offset < BLOCK && index < sides[side_index].len;
+    var is_kept = exists && offset < BLOCK && index < (*facts).len;
     var position = vec3f();
     var radius = 0.0;
     if is_kept {
-        let at = sides[side_index].first_point + index * sides[side_index].point_step;
-        let step = sides[side_index].coordinate_step;
+        let at = (*facts).first_point + index * (*facts).point_step;
+        let step = (*facts).coordinate_step;
         // Where radii are equal, the points have none of their own.
-        radius = sides[side_index].max_radius;
-        if (sides[side_index].flags & RADII_DIFFER) != 0u {
+        radius = (*facts).max_radius;
+        if ((*facts).flags & RADII_DIFFER) != 0u {
             radius = points[at + 3u * step];
         }
         position = moved(
-            sides[side_index].frame_from_cloud_x,
-            sides[side_index].frame_from_cloud_y,
-            sides[side_index].frame_from_cloud_z,
+            (*facts).frame_from_cloud_x,
+            (*facts).frame_from_cloud_y,
+            (*facts).frame_from_cloud_z,
             vec3f(points[at], points[at + step], points[at + 2u * step]),
         );
         let in_other = moved(
-            sides[side_index].other_from_frame_x,
-            sides[side_index].other_from_frame_y,
-            sides[side_index].other_from_frame_z,
+            (*facts).other_from_frame_x,
+            (*facts).other_from_frame_y,
+            (*facts).other_from_frame_z,
             position,
         );
         is_kept = is_within(position, pairs[pair_index].overlap_min, pairs[pair_index].overlap_max)
-            && is_within(in_other, sides[side_index].other_min, sides[side_index].other_max);
+            && is_within(in_other, (*facts).other_min, (*facts).other_max);
     }
     var own = 0u;
     if is_kept {
         own = atomicAdd(&kept, 1u);
-        if (sides[side_index].flags & RADII_DIFFER) != 0u {
-            atomicAdd(&radii, u32(radius / sides[side_index].max_radius * RADIUS_STEPS));
+        if ((*facts).flags & RADII_DIFFER) != 0u {
+            atomicAdd(&radii, u32(radius / (*facts).max_radius * RADIUS_STEPS));
         }
     }
     workgroupBarrier();
@@ -80,7 +80,7 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     if !is_kept || slot >= batch.survivors {
         return;
     }
-    let scaled = radius * sides[side_index].radius_scale;
+    let scaled = radius * (*facts).radius_scale;
     survivors[slot] = Survivor(position, scaled, side_index, index, NONE, 0u);
     // The cell of the zone's grid; points outside count to the nearest one.
     let dims = pairs[pair_index].zone_dims;

@@ -34,6 +34,7 @@ const NORMALS: &str = shader!(
     "shared/eigen.wgsl",
     "shared/bare_normal.wgsl",
     "shared/modelled.wgsl",
+    "shared/places.wgsl",
     "normals.wgsl"
 );
 const NORMALS_SHARPEN: &str = shader!(
@@ -54,9 +55,21 @@ const AIM: &str = shader!(
     "shared/types.wgsl",
     "shared/math.wgsl",
     "shared/eigen.wgsl",
+    "shared/view_along.wgsl",
     "aim.wgsl"
 );
-const COLUMNS: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "columns.wgsl");
+const FURTHER: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/view_along.wgsl",
+    "further.wgsl"
+);
+const COLUMNS: &str = shader!(
+    "shared/types.wgsl",
+    "shared/math.wgsl",
+    "shared/places.wgsl",
+    "columns.wgsl"
+);
 const MARK: &str = shader!(
     "shared/types.wgsl",
     "shared/math.wgsl",
@@ -102,40 +115,35 @@ const fn stage(name: &'static str, source: &'static str, bindings: &'static [u32
 /// Points from a depth image, before a batch. Bindings: camera, depths, points.
 pub const UNPROJECT: Stage = stage("unproject", include_str!("unproject.wgsl"), &[0, 1, 2]);
 
-/// The stages of a batch, in their order.
+/// The stages of a batch, in their order. [`FURTHER_FROM`] and what follows run again where a pair needs further views.
 ///
 /// ```
 /// let names: Vec<_> = tldi_shaders::STAGES.iter().map(|stage| stage.name).collect();
 /// assert_eq!((names[0], names[names.len() - 1]), ("cull", "compare"));
+/// assert_eq!(names[tldi_shaders::FURTHER_FROM], "further");
 /// ```
 pub const STAGES: &[Stage] = &[
-    stage("cull", CULL, &[0, 1, 2, 3, 4, 6, 8]),
-    stage("zone", ZONE, &[0, 1, 2, 6, 8]),
+    stage("cull", CULL, &[0, 1, 3, 4, 6, 8]),
+    stage("zone", ZONE, &[0, 1, 6, 8]),
     stage("normals_alloc", NORMALS_ALLOC, &[0, 8]),
     stage("normals_sort", NORMALS_SORT, &[0, 6, 8, 9]),
-    stage("sample", SAMPLE, &[0, 1, 2, 5, 6, 8, 9, 10]),
-    stage("aim", AIM, &[0, 1, 2, 7, 8, 10, 14]),
+    stage("sample", SAMPLE, &[0, 1, 5, 6, 8, 9, 10]),
+    stage("aim", AIM, &[0, 1, 7, 8, 10, 14]),
+    stage("further", FURTHER, &[0, 1, 7, 8, 14]),
     stage("columns_bounds", COLUMNS, &[0, 6, 7, 8]),
-    stage("columns_tiles", COLUMNS, &[0, 1, 2, 7, 8, 15]),
-    stage("columns_clear", COLUMNS, &[0, 8]),
-    stage("columns_depths", COLUMNS, &[0, 1, 2, 6, 7, 8]),
+    stage("columns_tiles", COLUMNS, &[0, 1, 7, 8, 15]),
+    stage("columns_depths", COLUMNS, &[0, 1, 6, 7, 8]),
     stage("columns_touch", COLUMNS, &[0, 1, 7, 8]),
     stage("columns_pixels", COLUMNS, &[0, 7, 8, 15]),
-    stage("pixels_clear", COLUMNS, &[0, 8]),
-    stage("normals", NORMALS, &[0, 1, 2, 6, 7, 8, 9, 17]),
-    stage(
-        "normals_sharpen",
-        NORMALS_SHARPEN,
-        &[0, 1, 2, 6, 8, 9, 17, 18],
-    ),
-    stage(
-        "normals_settle",
-        NORMALS_SHARPEN,
-        &[0, 1, 2, 6, 8, 9, 17, 18],
-    ),
-    stage("mark", MARK, &[0, 1, 2, 5, 6, 7, 8, 11, 17]),
+    stage("normals", NORMALS, &[0, 1, 6, 7, 8, 9, 15, 17]),
+    stage("normals_sharpen", NORMALS_SHARPEN, &[0, 1, 2, 6, 8, 9, 17]),
+    stage("normals_settle", NORMALS_SHARPEN, &[0, 1, 2, 6, 8, 9, 17]),
+    stage("mark", MARK, &[0, 1, 5, 6, 7, 8, 11, 17]),
     stage("alloc", ALLOC, &[0, 8, 16]),
     stage("splat", SPLAT, &[0, 7, 8, 11, 12]),
-    stage("sweep", SWEEP, &[0, 1, 2, 7, 8, 11, 12, 13, 14]),
+    stage("sweep", SWEEP, &[0, 1, 7, 8, 11, 12, 13, 14]),
     stage("compare", COMPARE, &[0, 1, 7, 8, 13, 14]),
 ];
+
+/// Index in [`STAGES`] of the one that begins a round of further views.
+pub const FURTHER_FROM: usize = 6;

@@ -2,7 +2,6 @@
 // cover are counted.
 
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(2) var<storage, read> sides: array<Side>;
 @group(0) @binding(5) var<storage, read> normals: array<f32>;
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
 @group(0) @binding(7) var<storage, read_write> views: array<View>;
@@ -15,14 +14,15 @@ var<workgroup> base: u32;
 
 fn normal_of(i: u32) -> vec3f {
     let side = survivors[i].side;
-    if (sides[side].flags & HAS_NORMALS) == 0u {
+    let facts = &pairs[side / 2u].sides[side % 2u];
+    if ((*facts).flags & HAS_NORMALS) == 0u {
         return planes[i].normal;
     }
-    let at = 3u * (sides[side].first_normal + survivors[i].index);
+    let at = 3u * ((*facts).first_normal + survivors[i].index);
     return turned(
-        sides[side].frame_from_cloud_x,
-        sides[side].frame_from_cloud_y,
-        sides[side].frame_from_cloud_z,
+        (*facts).frame_from_cloud_x,
+        (*facts).frame_from_cloud_y,
+        (*facts).frame_from_cloud_z,
         vec3f(normals[at], normals[at + 1u], normals[at + 2u]),
     );
 }
@@ -33,7 +33,7 @@ fn splat_of(view: u32, i: u32, normal_in_frame: vec3f) -> Splat {
     let params = pairs[pair].params;
     let p = position_in(view, i);
     let normal = turned(views[view].view_x, views[view].view_y, views[view].view_z, normal_in_frame);
-    let oriented = (sides[side].flags & (HAS_NORMALS | ORIENTED)) == (HAS_NORMALS | ORIENTED);
+    let oriented = (pairs[pair].sides[side % 2u].flags & (HAS_NORMALS | ORIENTED)) == (HAS_NORMALS | ORIENTED);
     var splat: Splat;
     splat.class_bits = u32(!oriented || normal.z > 0.0);
     if abs(normal.z) < EDGE_ON {
@@ -85,8 +85,8 @@ fn mark(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
         let pair = survivors[i].side / 2u;
         for (var v = 0u; v < MAX_VIEWS; v++) {
             let view = pair * MAX_VIEWS + v;
-            if views[view].exists == 0u {
-                break;
+            if views[view].exists != DRAWN || views[view].pixel_count == 0u {
+                continue;
             }
             let p = position_in(view, i);
             modelled |= u32(is_modelled(view, p, pairs[pair].params.pixel_size)) << v;

@@ -3,13 +3,12 @@
 // depend on the order in which points were found.
 
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(2) var<storage, read> sides: array<Side>;
+// After the first pass.
+@group(0) @binding(2) var<storage, read_write> adopted: array<Plane>;
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
 @group(0) @binding(9) var<storage, read_write> entries: array<Entry>;
 @group(0) @binding(17) var<storage, read_write> planes: array<Plane>;
-// After the first pass.
-@group(0) @binding(18) var<storage, read_write> adopted: array<Plane>;
 
 // Steps of a weight: MAX_CANDIDATES = 512 of them stay below 2^31.
 const WEIGHT_STEPS: f32 = 1048576.0;
@@ -26,19 +25,20 @@ fn sharpened(i: u32, is_second: bool) -> Plane {
         own = adopted[i];
     }
     let side = survivors[i].side;
+    let facts = &pairs[side / 2u].sides[side % 2u];
     let radius = support_radius(side);
     let deviation = ON_PLANE / SUPPORT * radius;
-    let noise = sides[side].noise;
+    let noise = (*facts).noise;
     let on_plane = deviation * deviation + OF_NOISE * noise * noise;
     if own.is_needed == 0u || !(own.variance > on_plane) {
         return own;
     }
     let position = survivors[i].position;
     let flat = FLAT_PLANE / SUPPORT * radius;
-    let dims = sides[side].cell_dims;
+    let dims = (*facts).cell_dims;
     let low = cell_of(side, position - radius);
     let high = cell_of(side, position + radius);
-    let begins = batch.cells_at + sides[side].cell_first;
+    let begins = batch.cells_at + (*facts).cell_first;
     let ends = begins + batch.cells;
     let step = selection_step(side, low, high);
     var count = 0u;

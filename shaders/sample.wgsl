@@ -1,7 +1,6 @@
 // Stage `aim`, first half: normals of an even selection of the near points of each side.
 
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(2) var<storage, read> sides: array<Side>;
 @group(0) @binding(5) var<storage, read> normals: array<f32>;
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
@@ -15,6 +14,7 @@ fn sample(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
         return;
     }
     let side = survivors[i].side;
+    let facts = &pairs[side / 2u].sides[side % 2u];
     let state = batch.sides_at + side * SIDE_WORDS;
     let near_count = atomicLoad(&work[state + NEAR_COUNT]);
     let step = max((near_count + AIM_SAMPLES - 1u) / AIM_SAMPLES, 1u);
@@ -22,12 +22,12 @@ fn sample(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
         return;
     }
     var normal = vec3f();
-    if (sides[side].flags & HAS_NORMALS) != 0u {
-        let at = 3u * (sides[side].first_normal + survivors[i].index);
+    if ((*facts).flags & HAS_NORMALS) != 0u {
+        let at = 3u * ((*facts).first_normal + survivors[i].index);
         normal = turned(
-            sides[side].frame_from_cloud_x,
-            sides[side].frame_from_cloud_y,
-            sides[side].frame_from_cloud_z,
+            (*facts).frame_from_cloud_x,
+            (*facts).frame_from_cloud_y,
+            (*facts).frame_from_cloud_z,
             vec3f(normals[at], normals[at + 1u], normals[at + 2u]),
         );
     } else {

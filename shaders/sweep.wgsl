@@ -1,7 +1,6 @@
 // Stage `sweep`: the fragments of each pixel become layers. See the CPU's stage.
 
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(2) var<storage, read> sides: array<Side>;
 @group(0) @binding(7) var<storage, read_write> views: array<View>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
 @group(0) @binding(11) var<storage, read_write> splats: array<Splat>;
@@ -18,6 +17,7 @@ var<workgroup> base: u32;
 fn sift(begin: u32, start: u32, count: u32) {
     var root = start;
     let value = fragments[begin + root];
+    // Ends: a child comes after its root, and roots come before `count`.
     loop {
         var child = 2u * root + 1u;
         if child >= count {
@@ -40,6 +40,7 @@ fn sort_fragments(begin: u32, count: u32) {
         for (var i = 1u; i < count; i++) {
             let value = fragments[begin + i];
             var k = i;
+            // Ends: `k` falls.
             while k > 0u {
                 let before = fragments[begin + k - 1u];
                 if before.x <= value.x {
@@ -225,7 +226,7 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
             end = begin;
         }
     }
-    let merge_steps = sides[view / MAX_VIEWS * 2u + s].merge_steps;
+    let merge_steps = pairs[view / MAX_VIEWS].sides[s].merge_steps;
     if end > begin {
         sort_fragments(begin, end - begin);
         count = 1u;
@@ -251,7 +252,7 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
     if !fitting {
         return;
     }
-    let flags = sides[view / MAX_VIEWS * 2u + s].flags;
+    let flags = pairs[view / MAX_VIEWS].sides[s].flags;
     let oriented = (flags & (HAS_NORMALS | ORIENTED)) == (HAS_NORMALS | ORIENTED);
     // Estimated ones are sharpened.
     let knows_faces = oriented || (flags & HAS_NORMALS) == 0u;
@@ -263,6 +264,7 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
             // In order of depth, then of facing.
             let layer = layer_of(start, i + 1u, oriented, knows_faces, view);
             var place = slot;
+            // Ends: `place` falls.
             while place > first_layer {
                 let before = layers[place - 1u];
                 let is_behind = before.depth > layer.depth

@@ -2,7 +2,6 @@
 // of the grid holds in which `normals` looks for neighbours.
 
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
-@group(0) @binding(2) var<storage, read> sides: array<Side>;
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
 
@@ -44,14 +43,15 @@ fn zone(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
         side_index = survivors[i].side;
         near = is_near(side_index / 2u, 1u - side_index % 2u, survivors[i].position);
         survivors[i].is_near = u32(near);
-        if (sides[side_index].flags & HAS_NORMALS) == 0u {
-            let dims = sides[side_index].cell_dims;
+        let facts = &pairs[side_index / 2u].sides[side_index % 2u];
+        if ((*facts).flags & HAS_NORMALS) == 0u {
+            let dims = (*facts).cell_dims;
             let low = pairs[side_index / 2u].overlap_min;
-            let at = (survivors[i].position - low) * sides[side_index].cell_inv;
+            let at = (survivors[i].position - low) * (*facts).cell_inv;
             let cx = truncated(at.x, f32(dims.x - 1u));
             let cy = truncated(at.y, f32(dims.y - 1u));
             let cz = truncated(at.z, f32(dims.z - 1u));
-            let cell = sides[side_index].cell_first + (cz * dims.y + cy) * dims.x + cx;
+            let cell = (*facts).cell_first + (cz * dims.y + cy) * dims.x + cx;
             survivors[i].cell = cell;
             atomicAdd(&work[batch.cells_at + batch.cells + cell], 1u);
         }

@@ -44,6 +44,41 @@ fn thinned_clouds_are_those_of_the_cpu() {
     assert!(100 * all.other_contacts <= all.contacts, "{all:?}");
 }
 
+/// A ball of so many points that those around one are represented by a selection: it is even. Its normals are those of
+/// the ball, and the same every time, although points come in any order.
+#[test]
+fn crowds_are_represented_evenly() {
+    let Some(mut gpu) = gpu_backend() else {
+        return;
+    };
+    // 36 points in a square of a radius: 1,000 within the neighbourhood's radius of 3 R, and 2,900 in the cells that hold it.
+    let middle = Vec3::new(0.0, 10.0 * R, 0.0);
+    let ball = sampled_sphere(10.0 * R, R / 6.0).bare_cloud(R);
+    let mut rng = fastrand::Rng::with_seed(12);
+    let floor = sampled_plane(0.5, R, &mut rng).cloud(R);
+    let query = aimed(
+        Surface::Cloud(&floor),
+        Surface::Cloud(&ball),
+        Pose3::from_translation(middle - 0.2 * R * Vec3::Y),
+        Params::for_radius(R),
+    );
+    let found = compare_on(&mut gpu, &[query]);
+    for _ in 0..3 {
+        assert_eq!(found, compare_on(&mut gpu, &[query]));
+    }
+    let middle = middle - 0.2 * R * Vec3::Y;
+    let normals = found[0].contacts.iter().map(|contact| {
+        let truth = (contact.point_b - middle).normalize();
+        contact.normal_b.normalize().dot(truth).min(1.0).acos()
+    });
+    let angles: Vec<f32> = normals.collect();
+    let mean = angles.iter().sum::<f32>() / angles.len() as f32;
+    let worst = angles.iter().copied().fold(0.0, f32::max);
+    eprintln!("{} pixels, mean {mean}, worst {worst}", angles.len());
+    assert!(angles.len() > 20, "{}", angles.len());
+    assert!(mean < 0.03, "{mean}");
+}
+
 /// Whole pairs of all kinds, in one batch; of seeds on which nothing was tuned, too.
 ///
 /// Estimated normals differ by about 0.0005, since neighbours' offsets are summed in steps of 1/2047 of their distance. An

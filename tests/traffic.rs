@@ -1,7 +1,7 @@
 //! What a batch on the GPU backend costs beside its stages, by bytes and counts: these do not depend on the machine.
 
-use tldi::glamx::Pose3;
-use tldi::{PairQuery, Params, PointCloud, Surface};
+use tldi::glamx::{Pose3, Vec3};
+use tldi::{CameraPolicy, PairQuery, Params, PointCloud, Surface, View};
 use tldi_tests::{Samples, aimed, compare_on, gpu_backend, sampled_sphere};
 use tldi_wgpu::WgpuBackend;
 
@@ -75,14 +75,99 @@ fn new_points_are_uploaded_as_they_are() {
         let Some(mut backend) = fresh() else {
             return;
         };
-        let query = apart(&cloud, SLIGHT);
+        // All are in reach.
+        let query = apart(&cloud, 0.0);
         compare_on(&mut backend, &[query]);
         let first = backend.traffic().uploaded;
         compare_on(&mut backend, &[query]);
         let known = backend.traffic().uploaded;
         assert_eq!(first - known, bytes * count as u64);
-        // The batch, its pair and sides, and 8 bytes for each block of 256 points of both.
+        // The batch, its pair, and 8 bytes for each block of 256 points of both.
         assert!(known < 1_000 + 8 * 2 * (count as u64 / 256 + 1), "{known}");
+    }
+}
+
+/// Of a long floor, only blocks within reach of a ball are uploaded, each once, and the answers are those of a floor that is there
+/// as a whole.
+#[test]
+fn only_blocks_in_reach_are_uploaded() {
+    // Rows of 16 points across, 256 to a block: a block is 16 rows, 0.32 m long.
+    let position = |i: usize| Vec3::new(R * (i / 16) as f32, 0.0, R * (i % 16) as f32);
+    let points: Vec<Vec3> = (0..16 * 1600).map(position).collect();
+    let count = points.len() as u64;
+    let floor = PointCloud::builder(points).radius(R).build();
+    let floor = floor.expect("they are valid");
+    let ball = sampled_sphere(0.1, R).bare_cloud(R);
+    let balls = 12 * ball.len() as u64;
+    let (a, b) = (Surface::Cloud(&floor), Surface::Cloud(&ball));
+    let at = |x: f32| {
+        let pose = Pose3::translation(x, 0.099, 8.0 * R);
+        aimed(a, b, pose, Params::for_radius(R))
+    };
+    let (Some(mut backend), Some(mut whole)) = (fresh(), fresh()) else {
+        return;
+    };
+    // One that reaches everywhere.
+    let slab = aimed(a, a, Pose3::IDENTITY, Params::for_radius(R));
+    compare_on(&mut whole, &[slab]);
+    let mut uploaded = 0;
+    for step in 0..=16 {
+        let query = at(2.0 * step as f32);
+        let found = compare_on(&mut backend, &[query]);
+        assert!(found[0].collides || !found[0].contacts.is_empty(), "{step}");
+        assert_eq!(found, compare_on(&mut whole, &[query]), "{step}");
+        let before = uploaded;
+        uploaded += backend.traffic().uploaded;
+        // The ball and its margin are less than 0.6 m long: parts of three blocks at most, and of the ball all once.
+        let of_ball = if step == 0 { balls } else { 0 };
+        assert!(
+            uploaded - before <= of_ball + 3 * 256 * 12 + 1_000,
+            "{step}: {uploaded}"
+        );
+        // Known blocks are none.
+        compare_on(&mut backend, &[query]);
+        assert!(backend.traffic().uploaded < 1_000, "{step}");
+    }
+    compare_on(&mut backend, &[slab]);
+    uploaded += backend.traffic().uploaded;
+    let all = 12 * count + balls;
+    // What tells of 18 batches, and the blocks of the last one, is about 20 kB.
+    assert!(
+        (all..all + 30_000).contains(&uploaded),
+        "{uploaded} of {all}"
+    );
+}
+
+/// A round of views takes 12 dispatches, 10 where normals are given; what comes before the views 6, or 4. A
+/// second round, one more, is only drawn where the first shows no crossing.
+#[test]
+fn further_views_are_drawn_where_the_first_show_no_crossing() {
+    let samples = ball();
+    for (cloud, before, round) in [(samples.bare_cloud(R), 6, 12), (samples.cloud(R), 4, 10)] {
+        let Some(mut backend) = fresh() else {
+            return;
+        };
+        let found = compare_on(&mut backend, &[apart(&cloud, DEEP)]);
+        assert!(found[0].collides);
+        assert_eq!(backend.traffic().dispatches, before + round);
+        // Apart by a fifth of a radius: near enough to be drawn, without a crossing.
+        let near = apart(&cloud, 1.0 + 0.2 * R);
+        let found = compare_on(&mut backend, &[near]);
+        assert!(!found[0].collides && !found[0].contacts.is_empty());
+        let both = backend.traffic();
+        assert_eq!(both.dispatches, before + 2 * round + 1);
+        assert_eq!((both.submissions, both.redos), (2, 0));
+        // Who only asks for contacts has no further views.
+        let asked = PairQuery {
+            view: View::Aim {
+                policy: CameraPolicy::ContactZone,
+                motion: Vec3::ZERO,
+                last_axis: None,
+            },
+            ..near
+        };
+        compare_on(&mut backend, &[asked]);
+        assert_eq!(backend.traffic().dispatches, before + round);
     }
 }
 

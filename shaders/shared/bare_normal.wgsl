@@ -7,20 +7,22 @@ const OFFSET_STEPS: f32 = 2047.0;
 
 // Radius of the neighbourhood, metres.
 fn support_radius(side: u32) -> f32 {
-    var mean = sides[side].mean_radius;
-    if (sides[side].flags & RADII_DIFFER) != 0u {
+    let facts = &pairs[side / 2u].sides[side % 2u];
+    var mean = (*facts).mean_radius;
+    if ((*facts).flags & RADII_DIFFER) != 0u {
         let state = batch.sides_at + side * SIDE_WORDS;
         let low = f32(atomicLoad(&work[state + RADIUS_LOW]));
         let high = f32(atomicLoad(&work[state + RADIUS_HIGH]));
         let count = f32(max(atomicLoad(&work[state + KEPT_COUNT]), 1u));
-        mean = (high * 65536.0 + low) / RADIUS_STEPS / count * sides[side].max_radius;
+        mean = (high * 65536.0 + low) / RADIUS_STEPS / count * (*facts).max_radius;
     }
-    return SUPPORT * mean * sides[side].radius_scale;
+    return SUPPORT * mean * (*facts).radius_scale;
 }
 
 fn cell_of(side: u32, position: vec3f) -> vec3u {
-    let dims = sides[side].cell_dims;
-    let at = (position - pairs[side / 2u].overlap_min) * sides[side].cell_inv;
+    let facts = &pairs[side / 2u].sides[side % 2u];
+    let dims = (*facts).cell_dims;
+    let at = (position - pairs[side / 2u].overlap_min) * (*facts).cell_inv;
     return vec3u(
         truncated(at.x, f32(dims.x - 1u)),
         truncated(at.y, f32(dims.y - 1u)),
@@ -31,8 +33,9 @@ fn cell_of(side: u32, position: vec3f) -> vec3u {
 // Of how many points in these cells one is taken: of a crowd, a selection represents it. Hashes select half of what
 // there is room for, give or take 16 points: that some were left out, by their order, takes 16 times as many.
 fn selection_step(side: u32, low: vec3u, high: vec3u) -> u32 {
-    let dims = sides[side].cell_dims;
-    let begins = batch.cells_at + sides[side].cell_first;
+    let facts = &pairs[side / 2u].sides[side % 2u];
+    let dims = (*facts).cell_dims;
+    let begins = batch.cells_at + (*facts).cell_first;
     var total = 0u;
     for (var z = low.z; z <= high.z; z++) {
         for (var y = low.y; y <= high.y; y++) {
@@ -48,11 +51,12 @@ fn selection_step(side: u32, low: vec3u, high: vec3u) -> u32 {
 
 // In the frame of the query; the normal's sign is arbitrary.
 fn bare_plane(side: u32, position: vec3f, near_only: bool) -> Plane {
+    let facts = &pairs[side / 2u].sides[side % 2u];
     let radius = support_radius(side);
-    let dims = sides[side].cell_dims;
+    let dims = (*facts).cell_dims;
     let low = cell_of(side, position - radius);
     let high = cell_of(side, position + radius);
-    let begins = batch.cells_at + sides[side].cell_first;
+    let begins = batch.cells_at + (*facts).cell_first;
     let ends = begins + batch.cells;
     let step = selection_step(side, low, high);
     var count = 0;

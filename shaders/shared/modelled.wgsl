@@ -6,9 +6,6 @@ fn position_in(view: u32, i: u32) -> vec3f {
 
 // Whether a point is in a tile that touches, or next to one.
 fn is_modelled(view: u32, p: vec3f, pixel_size: f32) -> bool {
-    if views[view].pixel_count == 0u {
-        return false;
-    }
     let scale = 1.0 / (pixel_size * f32(views[view].tile_edge));
     let t = p.xy * scale - vec2f(views[view].tile_origin) / f32(views[view].tile_edge);
     let dims = views[view].tile_dims;

@@ -94,6 +94,40 @@ struct Batch {
 }
 
 // Rigid motions are the rows of a matrix, the translation last.
+struct Side {
+    frame_from_cloud_x: vec4f,
+    frame_from_cloud_y: vec4f,
+    frame_from_cloud_z: vec4f,
+    other_from_frame_x: vec4f,
+    other_from_frame_y: vec4f,
+    other_from_frame_z: vec4f,
+    other_min: vec3f,
+    stride: u32,
+    other_max: vec3f,
+    len: u32,
+    middle: vec3f,
+    flags: u32,
+    // Word of the first point's x.
+    first_point: u32,
+    first_normal: u32,
+    // Of every n-th point: they are scaled to cover the surface.
+    radius_scale: f32,
+    // Of all points of the cloud, not scaled.
+    max_radius: f32,
+    cell_dims: vec3u,
+    cell_first: u32,
+    cell_inv: f32,
+    mean_radius: f32,
+    merge_steps: u32,
+    // Told standard deviation of the points, metres.
+    noise: f32,
+    // Words from a point to the next one, and from a coordinate to the next one; the radius is the fourth.
+    point_step: u32,
+    coordinate_step: u32,
+    padding_a: u32,
+    padding_b: u32,
+}
+
 struct Pair {
     params: Params,
     overlap_min: vec3f,
@@ -136,6 +170,8 @@ struct Pair {
     image_size: vec2u,
     depth_step: f32,
     depth_inv_step: f32,
+    // Of `a`, then of `b`.
+    sides: array<Side, 2>,
 }
 
 // Values of `Pair.policy`.
@@ -146,40 +182,6 @@ const COVARIANCE: u32 = 3u;
 const SMALLEST_EXTENT: u32 = 4u;
 const LAST_NORMAL: u32 = 5u;
 const FIXED_VIEW: u32 = 6u;
-
-struct Side {
-    frame_from_cloud_x: vec4f,
-    frame_from_cloud_y: vec4f,
-    frame_from_cloud_z: vec4f,
-    other_from_frame_x: vec4f,
-    other_from_frame_y: vec4f,
-    other_from_frame_z: vec4f,
-    other_min: vec3f,
-    stride: u32,
-    other_max: vec3f,
-    len: u32,
-    middle: vec3f,
-    flags: u32,
-    // Word of the first point's x.
-    first_point: u32,
-    first_normal: u32,
-    // Of every n-th point: they are scaled to cover the surface.
-    radius_scale: f32,
-    // Of all points of the cloud, not scaled.
-    max_radius: f32,
-    cell_dims: vec3u,
-    cell_first: u32,
-    cell_inv: f32,
-    mean_radius: f32,
-    merge_steps: u32,
-    // Told standard deviation of the points, metres.
-    noise: f32,
-    // Words from a point to the next one, and from a coordinate to the next one; the radius is the fourth.
-    point_step: u32,
-    coordinate_step: u32,
-    padding_a: u32,
-    padding_b: u32,
-}
 
 // Bits of `Side.flags`.
 const HAS_NORMALS: u32 = 1u;
@@ -232,6 +234,11 @@ struct View {
     padding_b: u32,
     padding_c: u32,
 }
+
+// Values of `View.exists`. What is known is not drawn in this round.
+const MISSING: u32 = 0u;
+const DRAWN: u32 = 1u;
+const KNOWN: u32 = 2u;
 
 // Bits of `View.flags`: for `a`, then for `b`.
 const MIDDLE_KNOWN: u32 = 1u;

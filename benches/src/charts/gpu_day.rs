@@ -2,26 +2,23 @@
 
 use super::error::ChartError;
 use super::figure::{Axis, Color, Curve, Entry, Figure, Line, Look, Mark, Panel, Point};
+use super::gpu_layers::layers;
 use super::origin::origin;
 use super::{looks, paint};
-use crate::gpu_day::{Bin, Dispatches, Moved, Report, Workload};
+use crate::gpu_day::{Bin, Dispatches, Moved, Report, Shown, Workload};
 use std::path::{Path, PathBuf};
 use tldi::ContactPixel;
 
-/// Draws floors, workloads, stages, differences from the CPU, and the contact pixels of one scene on the device and on
-/// the CPU, with the scene's mean radius in metres. Each as SVG and PNG.
-pub(crate) fn draw(
-    report: &Report,
-    contacts: &[(&str, Vec<ContactPixel>)],
-    radius: f32,
-    out: &Path,
-) -> Result<Vec<PathBuf>, ChartError> {
+/// Draws floors, workloads, stages, differences from the CPU, and of one scene the contact pixels on the device and on
+/// the CPU, and a row of layers. Each as SVG and PNG.
+pub(crate) fn draw(report: &Report, shown: &Shown, out: &Path) -> Result<Vec<PathBuf>, ChartError> {
     let figures = [
         floors(report),
         workloads(report),
         stages(report),
         differences(report),
-        contact_pixels(report, contacts, radius),
+        contact_pixels(report, &shown.contacts, shown.radius),
+        layers(report, shown),
     ];
     let mut files = Vec::new();
     for figure in figures.into_iter().flatten() {
@@ -30,7 +27,12 @@ pub(crate) fn draw(
     Ok(files)
 }
 
-fn figure(report: &Report, name: &str, title: &str, panels: Vec<Panel>) -> Option<Figure> {
+pub(super) fn figure(
+    report: &Report,
+    name: &str,
+    title: &str,
+    panels: Vec<Panel>,
+) -> Option<Figure> {
     let has_points = |panel: &Panel| panel.curves.iter().any(|curve| !curve.points.is_empty());
     panels.iter().any(has_points).then(|| Figure {
         name: format!("gpu_day_{name}"),
@@ -51,7 +53,7 @@ fn look(index: usize) -> Look {
     looks::placement_look(index)
 }
 
-fn points(values: impl Iterator<Item = (f64, f64)>) -> Vec<Point> {
+pub(super) fn points(values: impl Iterator<Item = (f64, f64)>) -> Vec<Point> {
     let plain = values.map(|(x, y)| Point {
         x,
         y,

@@ -2,13 +2,11 @@
 
 use super::budget::Budget;
 use super::workloads::Workloads;
-use super::{Correctness, Floors, KIND, Kind, Report, Scene, Settings, card, frames, host_costs};
+use super::{Correctness, Floors, KIND, Report, Settings, Shown, card, frames, host_costs};
 use crate::charts::gpu_day::draw;
-use crate::placements::{Placement, Source};
 use crate::stored::Provenance;
 use std::path::Path;
-use tldi::{Backend, ContactPixel, CpuBackend};
-use tldi_wgpu::{Gpu, WgpuBackend};
+use tldi_wgpu::WgpuBackend;
 
 impl Report {
     /// Measures everything, and writes points of frames and pictures into `out`, if that is given.
@@ -52,35 +50,8 @@ impl Report {
             settings,
         };
         if let Some(out) = out {
-            let shown = contacts_of_both(gpu)?;
-            draw(&report, &shown.contacts, shown.radius, out)?;
+            draw(&report, &Shown::of(gpu)?, out)?;
         }
         Ok(report)
     }
-}
-
-/// What a picture shows of both backends.
-struct Shown {
-    /// Name of the backend, and its contact pixels.
-    contacts: [(&'static str, Vec<ContactPixel>); 2],
-    /// Mean radius, metres.
-    radius: f32,
-}
-
-/// A small body in a scan on both backends.
-fn contacts_of_both(gpu: Gpu) -> anyhow::Result<Shown> {
-    let (placement, points) = (Placement::BodyOnScan, 100_000);
-    let scene = Scene::new(placement, points, Kind::Bare, 1)?;
-    let pixels = |backend: &mut dyn Backend| -> anyhow::Result<Vec<ContactPixel>> {
-        let mut results = Vec::new();
-        backend.compare(&[scene.query()], &mut results)?;
-        Ok(std::mem::take(&mut results[0].contacts))
-    };
-    let on_device = pixels(&mut WgpuBackend::new(gpu)?)?;
-    let on_cpu = pixels(&mut CpuBackend::without_first_look())?;
-    let radius = Source::Generated(points).radius(placement)?;
-    Ok(Shown {
-        contacts: [("device", on_device), ("CPU", on_cpu)],
-        radius,
-    })
 }

@@ -88,7 +88,7 @@ fn a_run_measures_all_parts() {
     check(&report);
     let pictures = std::fs::read_dir(&out).expect("it is there");
     let names = pictures.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-    assert_eq!(names.filter(|name| name.ends_with(".png")).count(), 5);
+    assert_eq!(names.filter(|name| name.ends_with(".png")).count(), 6);
     assert_eq!(report.frames.len(), 10);
     let json = out.join("report.json");
     report.write(&json).expect("it is writable");

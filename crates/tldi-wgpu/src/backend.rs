@@ -1,25 +1,23 @@
-//! One submission: upload, dispatch, read back.
+//! The backend: what it keeps from batch to batch.
 
+mod in_flight;
 mod parts;
 mod results;
+mod submit;
+
+pub use in_flight::InFlight;
 
 use crate::batch_buffers::BatchBuffers;
-use crate::buffers::{Growable, most_bytes};
+use crate::buffers::most_bytes;
 use crate::counters::Counters;
-use crate::layout::{
-    CONTACT_WORDS, COUNTERS, GROUP, MAX_VIEWS, PAIR_WORDS, VIEW_BYTES, is_for_device,
-    lives_on_device,
-};
-use crate::pipelines::Pipeline;
+use crate::layout::{is_for_device, lives_on_device};
 use crate::resident::Resident;
 use crate::sources::{DepthCamera, Sources};
 use crate::timer::Timer;
 use crate::upload::Upload;
 use crate::{Gpu, GpuError, StageTime, Traffic};
+use submit::Asked;
 use tldi::{Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult, PatchScratch};
-
-/// Workgroups along x of a dispatch.
-const MAX_GROUPS: u32 = 65_535;
 
 /// Compares batches on a GPU.
 ///
@@ -63,11 +61,15 @@ pub struct WgpuBackend {
     resident: Resident,
     sources: Sources,
     buffers: BatchBuffers,
-    /// Elements that the buffers hold: what batches have needed so far.
+    /// Elements for which there is room: what batches have needed so far; of tiles and pixels, what this part
+    /// will need.
     capacities: Counters,
-    /// Elements that the buffers begin with, and the most that the device takes.
-    least: Counters,
+    /// The most that the device takes.
     most: Counters,
+    /// How many times as many tiles, or pixels, as were foreseen the last part needed; at least 1.
+    shortfall: f32,
+    /// What was submitted and has not come back.
+    asked: Option<Asked>,
     /// What the bind groups were made of.
     bound: Vec<Option<wgpu::Buffer>>,
     bind_groups: Vec<wgpu::BindGroup>,
@@ -96,15 +98,15 @@ impl WgpuBackend {
         let resident = Resident::new(&gpu)?;
         gpu.check()?;
         let most = Counters::most(most_bytes(&gpu));
-        let least = Counters::LEAST.min(&most);
         Ok(Self {
             gpu,
             resident,
             sources: Sources::default(),
             buffers: BatchBuffers::default(),
-            capacities: least,
-            least,
+            capacities: Counters::LEAST.min(&most),
             most,
+            shortfall: 1.0,
+            asked: None,
             bound: Vec::new(),
             bind_groups: Vec::new(),
             upload: Upload::default(),
@@ -204,6 +206,17 @@ impl WgpuBackend {
         batch: &[PairQuery<'_>],
         results: &mut Vec<PairResult>,
     ) -> Result<bool, BackendError> {
+        let left_to_cpu = self.select(batch)?;
+        if self.upload.points() < least_points {
+            return Ok(false);
+        }
+        let reused = std::mem::take(results);
+        *results = self.start(batch, reused, left_to_cpu)?.finish()?;
+        Ok(true)
+    }
+
+    /// Selects the pairs for the device; those that it does not take.
+    fn select(&mut self, batch: &[PairQuery<'_>]) -> Result<Vec<usize>, BackendError> {
         let mut left_to_cpu = Vec::new();
         for (pair, query) in batch.iter().enumerate() {
             let is_for_device = is_for_device(query);
@@ -218,144 +231,7 @@ impl WgpuBackend {
             }
         }
         self.upload.select(batch, 0..batch.len());
-        if self.upload.points() < least_points {
-            return Ok(false);
-        }
-        results.resize_with(batch.len(), PairResult::default);
-        results.iter_mut().for_each(PairResult::clear);
-        self.compare_on_device(batch, results, &mut left_to_cpu)?;
-        Ok(true)
-    }
-
-    /// Uploads and submits the batch.
-    fn submit(&mut self) -> Result<(), GpuError> {
-        let data = self.upload.batch_data(&self.capacities)?;
-        self.buffers.fit(&self.gpu, &data, &self.upload)?;
-        self.bind();
-        let Self {
-            gpu,
-            resident,
-            sources,
-            buffers,
-            bind_groups,
-            timer,
-            traffic,
-            expected_contacts,
-            ..
-        } = self;
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        sources.encode(gpu, &mut encoder, resident.points())?;
-        // Only what is counted must be zero: the counters up to the tiles, the views, and what is
-        // read back of the pairs. Tiles and pixels are cleared by stages, which know how many there are.
-        let counted = 4 * u64::from(data.tiles_at);
-        let pairs_found = 4 * u64::from(data.pairs) * u64::from(PAIR_WORDS);
-        for (buffer, bytes) in [
-            (&buffers.work, counted),
-            (
-                &buffers.views,
-                u64::from(MAX_VIEWS) * u64::from(data.pairs) * VIEW_BYTES,
-            ),
-            (&buffers.found, pairs_found),
-        ] {
-            if let Some(buffer) = buffer.get() {
-                traffic.filled += bytes;
-                encoder.clear_buffer(buffer, 0, Some(bytes));
-            }
-        }
-        let pipelines = gpu.pipelines();
-        let direct = |count: u32| [count.min(MAX_GROUPS), count.div_ceil(MAX_GROUPS), 1];
-        let by_survivor = direct(data.items.min(data.survivors.div_ceil(GROUP)));
-        let dispatch = |pass: &mut wgpu::ComputePass, k: usize| {
-            let Pipeline {
-                stage, pipeline, ..
-            } = &pipelines[k];
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &bind_groups[k], &[]);
-            let mut indirect = |groups: &Growable, words: u64| {
-                if let Some(groups) = groups.get() {
-                    pass.dispatch_workgroups_indirect(groups, 4 * words);
-                }
-            };
-            match stage.name {
-                "columns_clear" | "columns_touch" => return indirect(&buffers.groups, 0),
-                "pixels_clear" | "alloc" | "sweep" => return indirect(&buffers.groups, 3),
-                "compare" => return indirect(&buffers.groups, 6),
-                "splat" => return indirect(&buffers.splat_groups, 0),
-                _ => {}
-            }
-            let [x, y, z] = match stage.name {
-                "cull" => direct(data.items),
-                "normals_alloc" => direct(data.cells.div_ceil(GROUP)),
-                "aim" => direct(data.pairs),
-                "columns_tiles" | "columns_pixels" => [1, 1, 1],
-                _ => by_survivor,
-            };
-            pass.dispatch_workgroups(x, y, z);
-        };
-        let needed = |k: &usize| {
-            // Without bare clouds there is nothing to sort.
-            data.cells > 0 || !pipelines[*k].stage.name.starts_with("normals")
-        };
-        let stages = (0..pipelines.len()).filter(needed);
-        traffic.dispatches += stages.clone().count() as u32;
-        match timer {
-            None => {
-                let mut pass = encoder.begin_compute_pass(&Default::default());
-                stages.for_each(|k| dispatch(&mut pass, k));
-            }
-            Some(timer) => {
-                timer.begin();
-                for k in stages {
-                    let mut pass = timer.pass(&mut encoder, pipelines[k].stage.name);
-                    dispatch(&mut pass, k);
-                }
-                timer.resolve(&mut encoder);
-            }
-        }
-        let contacts = (*expected_contacts).min(data.contacts);
-        let contacts = 4 * u64::from(contacts) * u64::from(CONTACT_WORDS);
-        if let (Some(work), Some(found), Some(readback)) = (
-            buffers.work.get(),
-            buffers.found.get(),
-            buffers.readback.get(),
-        ) {
-            let counters = 4 * u64::from(COUNTERS);
-            encoder.copy_buffer_to_buffer(work, 0, readback, 0, counters);
-            encoder.copy_buffer_to_buffer(found, 0, readback, counters, pairs_found + contacts);
-        }
-        gpu.queue.submit([encoder.finish()]);
-        traffic.submissions += 1;
-        traffic.read_back += 4 * u64::from(COUNTERS) + pairs_found + contacts;
-        gpu.check()
-    }
-
-    /// Makes the bind groups, if a buffer is new.
-    fn bind(&mut self) {
-        let bound = self.buffers.bound(&self.resident);
-        if bound == self.bound {
-            return;
-        }
-        self.bind_groups.clear();
-        for Pipeline { stage, layout, .. } in self.gpu.pipelines() {
-            let entries: Vec<_> = (stage.bindings.iter())
-                .filter_map(|&binding| {
-                    Some(wgpu::BindGroupEntry {
-                        binding,
-                        resource: bound[binding as usize].as_ref()?.as_entire_binding(),
-                    })
-                })
-                .collect();
-            self.bind_groups.push(
-                self.gpu
-                    .device
-                    .create_bind_group(&wgpu::BindGroupDescriptor {
-                        label: Some(stage.name),
-                        layout,
-                        entries: &entries,
-                    }),
-            );
-        }
-        self.bound = bound;
+        Ok(left_to_cpu)
     }
 }
 

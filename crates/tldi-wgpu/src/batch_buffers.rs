@@ -15,7 +15,6 @@ use wgpu::BufferUsages;
 pub(crate) struct BatchBuffers {
     pub(crate) batch: Growable,
     pub(crate) pairs: Growable,
-    pub(crate) sides: Growable,
     pub(crate) items: Growable,
     pub(crate) survivors: Growable,
     pub(crate) views: Growable,
@@ -40,10 +39,9 @@ impl Default for BatchBuffers {
         Self {
             batch: Growable::new("batch", BufferUsages::UNIFORM | to),
             pairs: Growable::new("pairs", storage | to),
-            sides: Growable::new("sides", storage | to),
             items: Growable::new("items", storage | to),
             survivors: Growable::new("survivors", storage),
-            views: Growable::new("views", storage | to),
+            views: Growable::new("views", storage),
             work: Growable::new("work", storage | to | from),
             entries: Growable::new("entries", storage),
             planes: Growable::new("planes", storage),
@@ -52,7 +50,7 @@ impl Default for BatchBuffers {
             splats: Growable::new("splats", storage),
             fragments: Growable::new("fragments", storage),
             layers: Growable::new("layers", storage),
-            found: Growable::new("found", storage | to | from),
+            found: Growable::new("found", storage | from),
             groups: Growable::new("groups", storage | BufferUsages::INDIRECT),
             splat_groups: Growable::new("splat groups", storage | BufferUsages::INDIRECT),
             readback: Growable::new("readback", BufferUsages::MAP_READ | to),
@@ -70,7 +68,6 @@ impl BatchBuffers {
     ) -> Result<(), GpuError> {
         self.batch.write(gpu, std::slice::from_ref(data))?;
         self.pairs.write(gpu, &upload.pairs)?;
-        self.sides.write(gpu, &upload.sides)?;
         self.items.write(gpu, &upload.items)?;
         let pairs = u64::from(data.pairs);
         let contact_words = u64::from(CONTACT_WORDS) * u64::from(data.contacts);
@@ -112,7 +109,7 @@ impl BatchBuffers {
         vec![
             grown(&self.batch),
             grown(&self.pairs),
-            grown(&self.sides),
+            grown(&self.adopted),
             grown(&self.items),
             Some(resident.points().clone()),
             Some(resident.normals().clone()),
@@ -128,7 +125,6 @@ impl BatchBuffers {
             grown(&self.groups),
             grown(&self.splat_groups),
             grown(&self.planes),
-            grown(&self.adopted),
         ]
     }
 }

@@ -73,14 +73,16 @@ pub(crate) fn create(
             allowed,
         });
     }
-    let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    // In a browser, what a scope caught is only told later: there, the device's failure tells it.
+    let scope = cfg!(not(target_arch = "wasm32"))
+        .then(|| gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory));
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(name),
         size,
         usage,
         mapped_at_creation: false,
     });
-    match pollster::block_on(scope.pop()) {
+    match scope.and_then(|scope| pollster::block_on(scope.pop())) {
         Some(error) => Err(gpu.failed(format!("no memory for {size} bytes of `{name}`: {error}"))),
         None => Ok(buffer),
     }

@@ -5,6 +5,7 @@ use crate::layout::{
     CONTACT_WORDS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, MOST_SPLATS, MOST_SURVIVORS,
     PIXEL_BYTES, PLANE_BYTES, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, TILE_BYTES,
 };
+use crate::pipelines::is_needed;
 use crate::upload::Upload;
 use bytemuck::{Pod, Zeroable};
 
@@ -53,6 +54,22 @@ impl Counters {
         contacts: 1 << 11,
     };
 
+    /// With so many times the tiles and pixels, rounded down.
+    pub(crate) fn with_image_shares(self, share: f32) -> Self {
+        let times = |count: u32| (f64::from(share) * f64::from(count)) as u32;
+        Self {
+            tiles: times(self.tiles),
+            pixels: times(self.pixels),
+            ..self
+        }
+    }
+
+    /// How many times the tiles, or the pixels, of `other` there are.
+    pub(crate) fn image_shares(&self, other: &Self) -> f32 {
+        let share = |own: u32, other: u32| own as f32 / other.max(1) as f32;
+        share(self.tiles, other.tiles).max(share(self.pixels, other.pixels))
+    }
+
     /// Each with its name.
     pub(crate) fn named(&self) -> [(&'static str, u32); 7] {
         let words: [u32; 7] = bytemuck::cast(*self);
@@ -81,11 +98,9 @@ impl Counters {
             ("aim", 2 * 16 * SAMPLE_SLOTS * upload.pairs.len() as u64),
             ("columns_bounds", survivors),
             ("columns_tiles", 0),
-            ("columns_clear", 3 * tiles),
             ("columns_depths", survivors + 2 * tiles),
             ("columns_touch", 3 * tiles),
             ("columns_pixels", 0),
-            ("pixels_clear", pixels / 2),
             ("normals", survivors + entries + normals),
             ("normals_sharpen", survivors + entries + 2 * normals),
             ("normals_settle", survivors + entries + 2 * normals),
@@ -98,7 +113,7 @@ impl Counters {
                 layers + pixels + times(self.contacts, 4 * u64::from(CONTACT_WORDS)),
             ),
         ];
-        let runs = |stage: &(&str, u64)| bare || !stage.0.starts_with("normals");
+        let runs = |stage: &(&str, u64)| is_needed(stage.0, bare);
         all.into_iter().filter(runs).collect()
     }
 
@@ -131,6 +146,14 @@ impl Counters {
         let (own, other) = (words(self), words(*other));
         let sum: [u32; 7] = std::array::from_fn(|k| own[k].saturating_add(other[k]));
         bytemuck::cast(sum)
+    }
+
+    /// The greater of each.
+    pub(crate) fn max(self, other: &Self) -> Self {
+        let words = |c: Self| -> [u32; 7] { bytemuck::cast(c) };
+        let (own, other) = (words(self), words(*other));
+        let most: [u32; 7] = std::array::from_fn(|k| own[k].max(other[k]));
+        bytemuck::cast(most)
     }
 
     /// The lesser of each.

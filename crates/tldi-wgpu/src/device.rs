@@ -49,25 +49,47 @@ impl Gpu {
         opened.get_or_init(|| Self::open(choice)).clone()
     }
 
-    /// Opens the best adapter.
+    /// Opens the best adapter. Waits for it, which a browser cannot: see [`open_async`](Self::open_async).
     ///
     /// # Errors
     /// [`GpuError::NoAdapter`] where there is none of the kind asked for, [`GpuError::NoDevice`]
     /// where its driver refuses.
     pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
+        if cfg!(target_arch = "wasm32") {
+            let reason = "a browser cannot wait for it: open it with `Gpu::open_async`".to_owned();
+            return Err(GpuError::NoAdapter { reason });
+        }
+        pollster::block_on(Self::open_async(choice))
+    }
+
+    /// Opens the best adapter.
+    ///
+    /// ```
+    /// use tldi_wgpu::{AdapterChoice, Gpu};
+    /// let opened = pollster::block_on(Gpu::open_async(AdapterChoice::Any));
+    /// assert!(opened.is_ok() || opened.is_err_and(|error| error.to_string().contains("GPU")));
+    /// ```
+    ///
+    /// # Errors
+    /// Those of [`open`](Self::open).
+    pub async fn open_async(choice: AdapterChoice) -> Result<Self, GpuError> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         // Not GL: its drivers miscompiled loops without an error.
-        descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+        descriptor.backends = wgpu::Backends::VULKAN
+            | wgpu::Backends::METAL
+            | wgpu::Backends::DX12
+            | wgpu::Backends::BROWSER_WEBGPU;
+        // Checking sizes that the device computes takes a dispatch for each. Our stages bound theirs by `MAX_GROUPS`.
+        (descriptor.flags).remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
         let instance = wgpu::Instance::new(descriptor);
         let options = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
             ..Default::default()
         };
-        let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(|source| {
-            GpuError::NoAdapter {
+        let adapter =
+            (instance.request_adapter(&options).await).map_err(|source| GpuError::NoAdapter {
                 reason: source.to_string(),
-            }
-        })?;
+            })?;
         let info = adapter.get_info();
         if choice == AdapterChoice::Hardware && info.device_type == wgpu::DeviceType::Cpu {
             return Err(GpuError::NoAdapter {
@@ -75,7 +97,7 @@ impl Gpu {
             });
         }
         let offered = adapter.limits();
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+        let opened = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("tldi"),
             required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             // More than the default only where it is offered: larger clouds.
@@ -85,8 +107,8 @@ impl Gpu {
                 ..wgpu::Limits::default()
             },
             ..Default::default()
-        }))
-        .map_err(|source| GpuError::NoDevice {
+        });
+        let (device, queue) = opened.await.map_err(|source| GpuError::NoDevice {
             adapter: info.name.clone(),
             reason: source.to_string(),
         })?;
@@ -186,6 +208,13 @@ impl Gpu {
             Some(error) => Err(error.clone()),
             None => Ok(()),
         }
+    }
+
+    /// Lets the device tell what is done, without waiting. In a browser it tells by itself.
+    pub(crate) fn poll(&self) -> Result<(), GpuError> {
+        let outcome = self.device.poll(wgpu::PollType::Poll);
+        outcome.map_err(|error| self.failed(error.to_string()))?;
+        self.check()
     }
 
     /// Waits until all is done that was submitted.

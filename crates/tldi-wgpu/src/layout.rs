@@ -120,10 +120,11 @@ pub(crate) struct PairData {
     image_size: [u32; 2],
     depth_step: f32,
     depth_inv_step: f32,
+    pub(crate) sides: [SideData; 2],
 }
 
 impl PairData {
-    /// The pair's own data; the words of its zone begin at `zone_first`.
+    /// The pair's own data, without its sides; the words of its zone begin at `zone_first`.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] where the stages cannot number the zone's words.
@@ -175,6 +176,7 @@ impl PairData {
             image_size: image_size.unwrap_or([0, 0]),
             depth_step: scale.step,
             depth_inv_step: scale.inv_step,
+            sides: Zeroable::zeroed(),
         })
     }
 }
@@ -424,7 +426,7 @@ mod tests {
             larger_from_a_z larger_from_a_z, policy policy, half_extents half_extents,
             plainness plainness, toward_b toward_b, has_last has_last, last_axis last_axis,
             body_is_b body_is_b, lies lies, motion motion, body_middle body_middle, body_half_extents body_half_extents, body_from_a body_from_a_x, view view_x, image_size image_size,
-            depth_step depth_step, depth_inv_step depth_inv_step,
+            depth_step depth_step, depth_inv_step depth_inv_step, sides sides,
         ]);
         assert_same_layout!("Side", SideData, [
             frame_from_cloud frame_from_cloud_x, other_from_frame other_from_frame_x,

@@ -5,6 +5,7 @@
 //! within what rounding of products and sums makes of them. Clouds stay on the device until their
 //! points change; a rigid motion is a pose and no upload.
 
+mod answer;
 mod auto;
 mod backend;
 mod bandwidth;
@@ -28,7 +29,7 @@ mod traffic;
 mod upload;
 
 pub use auto::AutoBackend;
-pub use backend::WgpuBackend;
+pub use backend::{InFlight, WgpuBackend};
 pub use bandwidth::copy_bandwidth;
 pub use choice::{BACKEND_VARIABLE, BackendChoice};
 pub use device::{AdapterChoice, Gpu};

@@ -11,17 +11,25 @@ pub(crate) struct Pipeline {
     pub(crate) layout: wgpu::BindGroupLayout,
 }
 
+/// A stage's shader, without the counters that `wgpu` puts into loops, lest these never end. Its indices are checked.
+pub(crate) fn module(device: &wgpu::Device, stage: &Stage) -> wgpu::ShaderModule {
+    let descriptor = wgpu::ShaderModuleDescriptor {
+        label: Some(stage.name),
+        source: wgpu::ShaderSource::Wgsl(stage.source.into()),
+    };
+    let mut checks = wgpu::ShaderRuntimeChecks::checked();
+    checks.force_loop_bounding = false;
+    // SAFETY: all loops of the stages end, and only that is not checked. A `for` counts towards a bound that was read before
+    // it began; a `while` or `loop` says above it why it ends. A test of `tldi-shaders` holds all of them to that.
+    unsafe { device.create_shader_module_trusted(descriptor, checks) }
+}
+
 /// All stages, in their order, with these constants.
 pub(crate) fn pipelines(gpu: &Gpu, constants: &[(&'static str, f64)]) -> Vec<Pipeline> {
     STAGES
         .iter()
         .map(|stage| {
-            let module = gpu
-                .device
-                .create_shader_module(wgpu::ShaderModuleDescriptor {
-                    label: Some(stage.name),
-                    source: wgpu::ShaderSource::Wgsl(stage.source.into()),
-                });
+            let module = module(&gpu.device, stage);
             let pipeline = gpu
                 .device
                 .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -42,4 +50,12 @@ pub(crate) fn pipelines(gpu: &Gpu, constants: &[(&'static str, f64)]) -> Vec<Pip
             }
         })
         .collect()
+}
+
+/// Whether a batch needs a stage. Without bare clouds there is nothing to sort; with them, `normals` places the images.
+pub(crate) fn is_needed(stage: &str, has_bare_sides: bool) -> bool {
+    match stage {
+        "columns_pixels" => !has_bare_sides,
+        _ => has_bare_sides || !stage.starts_with("normals"),
+    }
 }

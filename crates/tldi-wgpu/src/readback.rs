@@ -3,7 +3,7 @@
 use crate::counters::Counters;
 use crate::layout::{CONTACT_WORDS, COUNTERS, FRAGMENTS_WRAPPED, MAX_VIEWS, PAIR_WORDS};
 use tldi::glamx::Vec3;
-use tldi::{ContactPixel, PairQuery, PairResult, View, VirtualCamera, plan};
+use tldi::{CameraPolicy, ContactPixel, PairQuery, PairResult, View, VirtualCamera, plan};
 
 /// The words that were read back: counters, pairs, contacts. The device wrote them, so nothing is
 /// taken from them unchecked.
@@ -57,6 +57,23 @@ impl<'a> Readback<'a> {
     /// Whether the `k`-th pair on the device has a pixel with too many fragments.
     pub(crate) fn is_crowded(&self, k: usize) -> bool {
         self.pairs[k][CROWDED] != 0
+    }
+
+    /// Whether the `k`-th pair on the device is to be looked at from all directions and shows no crossing yet. As `further`
+    /// in WGSL sees it.
+    pub(crate) fn wants_further(&self, k: usize, query: &PairQuery) -> bool {
+        let words = &self.pairs[k];
+        let is_asked = matches!(
+            query.view,
+            View::Aim {
+                policy: CameraPolicy::AllDirections,
+                ..
+            }
+        );
+        is_asked
+            && !self.is_crowded(k)
+            && (1..MAX_VIEWS).contains(&words[VIEWS])
+            && words[CROSSINGS] < plan::CROSSED
     }
 
     /// Fills all but the contacts of the `k`-th pair on the device.

@@ -1,10 +1,12 @@
-//! Clouds on the device: uploaded when their content is new, and kept while they are used.
+//! Clouds on the device: blocks of points are uploaded when they first come into reach, and kept while the cloud is used and its
+//! content stays the same.
 
 use crate::buffers::{create, most_bytes};
 use crate::layout::numbered;
 use crate::{Gpu, GpuError};
 use std::collections::HashMap;
-use tldi::{PointCloud, Radii};
+use std::ops::Range;
+use tldi::{BLOCK, PointCloud, Radii};
 use wgpu::BufferUsages;
 
 /// Batches after which a cloud that is not used gives its place to others.
@@ -108,12 +110,14 @@ impl Place {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 struct Slot {
     /// First word, and number of words.
     points: (u32, u32),
     /// First of the normals, and their number.
     normals: Option<(u32, u32)>,
+    /// Which blocks of points are there.
+    blocks: Vec<bool>,
     used: u64,
 }
 
@@ -158,42 +162,75 @@ impl Resident {
         &self.normals.buffer
     }
 
-    /// Where the points of a cloud are; uploads them if its content is new. Coordinates lie as in the cloud: all x, all
-    /// y, all z, then all radii if they are not equal.
-    pub(crate) fn place(&mut self, gpu: &Gpu, cloud: &PointCloud) -> Result<Place, GpuError> {
+    /// Where the points of a cloud are. There is room for all; those of `blocks`, in ascending order, are uploaded if they are
+    /// not there. Coordinates lie as in the cloud: all x, all y, all z, then all radii if they are not equal.
+    pub(crate) fn place(
+        &mut self,
+        gpu: &Gpu,
+        cloud: &PointCloud,
+        blocks: impl Iterator<Item = usize>,
+    ) -> Result<Place, GpuError> {
         let id = cloud.content_id();
         let count = numbered("points", cloud.len() as u64)?;
-        let at = |(first_point, first_normal)| Place {
-            first_point,
-            first_normal,
-            point_step: 1,
-            coordinate_step: count,
-        };
-        if let Some(slot) = self.slots.get_mut(&id) {
-            slot.used = self.batch;
-            return Ok(at(slot.firsts()));
-        }
-        let normals = cloud.normals();
         let radii = match cloud.radii() {
             Radii::Global(_) => None,
             Radii::PerPoint(radii) => Some(&radii[..]),
         };
         let arrays = cloud.coordinates().into_iter().chain(radii);
         let words = numbered("points", arrays.clone().count() as u64 * u64::from(count))?;
-        let normal_count = normals.map(|_| count);
-        let (first, first_normal) = self.reserve(gpu, id, words, normal_count)?;
-        if let Some(normals) = normals {
-            self.staging.clear();
-            self.staging
-                .extend(normals.iter().flat_map(|n| n.to_array()));
-            let bytes = bytemuck::cast_slice(&self.staging);
-            gpu.write(&self.normals.buffer, 12 * u64::from(first_normal), bytes);
+        let normals = cloud.normals();
+        let (first_point, first_normal) = self.reserve(gpu, id, words, normals.map(|_| count))?;
+        for points in self.missing(id, cloud.len(), blocks) {
+            if let Some(normals) = normals {
+                self.staging.clear();
+                let some = normals[points.clone()].iter();
+                self.staging.extend(some.flat_map(|n| n.to_array()));
+                let at = 12 * (u64::from(first_normal) + points.start as u64);
+                gpu.write(
+                    &self.normals.buffer,
+                    at,
+                    bytemuck::cast_slice(&self.staging),
+                );
+            }
+            for (k, array) in arrays.clone().enumerate() {
+                let word =
+                    u64::from(first_point) + k as u64 * u64::from(count) + points.start as u64;
+                let some = bytemuck::cast_slice(&array[points.clone()]);
+                gpu.write(&self.points.buffer, 4 * word, some);
+            }
         }
-        for (k, array) in arrays.enumerate() {
-            let word = u64::from(first) + k as u64 * u64::from(count);
-            gpu.write(&self.points.buffer, 4 * word, bytemuck::cast_slice(array));
+        Ok(Place {
+            first_point,
+            first_normal,
+            point_step: 1,
+            coordinate_step: count,
+        })
+    }
+
+    /// Points of those of the `blocks` of cloud `id` that are not on the device, blocks in a row together. They count as there
+    /// from now on.
+    fn missing(
+        &mut self,
+        id: u64,
+        len: usize,
+        blocks: impl Iterator<Item = usize>,
+    ) -> Vec<Range<usize>> {
+        let mut missing: Vec<Range<usize>> = Vec::new();
+        let Some(slot) = self.slots.get_mut(&id) else {
+            return missing;
+        };
+        slot.blocks.resize(len.div_ceil(BLOCK), false);
+        for block in blocks {
+            if std::mem::replace(&mut slot.blocks[block], true) {
+                continue;
+            }
+            let points = block * BLOCK..((block + 1) * BLOCK).min(len);
+            match missing.last_mut() {
+                Some(last) if last.end == points.start => last.end = points.end,
+                _ => missing.push(points),
+            }
         }
-        Ok(at((first, first_normal)))
+        missing
     }
 
     /// Room for the points of cloud `id`, of so many words, and for its normals if it has any: the first word and the
@@ -225,10 +262,12 @@ impl Resident {
         let slot = Slot {
             points: (first, words),
             normals,
+            blocks: Vec::new(),
             used: self.batch,
         };
+        let firsts = slot.firsts();
         self.slots.insert(id, slot);
-        Ok(slot.firsts())
+        Ok(firsts)
     }
 
     /// A range of `count` elements: free, else of clouds that are no longer used, else new.
@@ -298,17 +337,20 @@ mod tests {
         };
         let (first, second, third) = (cloud(3000), cloud(3500), cloud(2000));
         let mut resident = Resident::new(&gpu).expect("there is room");
+        let place = |resident: &mut Resident, cloud: &PointCloud| {
+            resident.place(&gpu, cloud, 0..cloud.blocks().len())
+        };
         resident.begin();
-        resident.place(&gpu, &first).expect("there is room");
+        place(&mut resident, &first).expect("there is room");
         resident.begin();
-        let place = resident.place(&gpu, &second);
-        let place = place.expect("the first cloud is not used any more");
-        let refused = resident.place(&gpu, &third);
+        let there = place(&mut resident, &second);
+        let there = there.expect("the first cloud is not used any more");
+        let refused = place(&mut resident, &third);
         assert!(
             matches!(refused, Err(GpuError::TooLarge { .. })),
             "{refused:?}"
         );
-        assert_eq!(resident.place(&gpu, &second), Ok(place));
+        assert_eq!(place(&mut resident, &second), Ok(there));
         gpu.check().expect("nothing failed");
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::buffers::Growable;
 use crate::layout::numbered;
+use crate::pipelines::module;
 use crate::resident::{Place, Resident};
 use crate::{Gpu, GpuError};
 use bytemuck::{Pod, Zeroable};
@@ -304,12 +305,7 @@ impl Sources {
 
 fn unproject(gpu: &Gpu) -> wgpu::ComputePipeline {
     let stage = tldi_shaders::UNPROJECT;
-    let module = gpu
-        .device
-        .create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(stage.name),
-            source: wgpu::ShaderSource::Wgsl(stage.source.into()),
-        });
+    let module = module(&gpu.device, &stage);
     gpu.device
         .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(stage.name),

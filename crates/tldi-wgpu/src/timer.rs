@@ -1,5 +1,6 @@
 //! Device time of each stage, by timestamps.
 
+use crate::answer::Answer;
 use crate::{Gpu, GpuError};
 
 /// How long a stage took.
@@ -80,24 +81,28 @@ impl Timer {
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, bytes);
     }
 
-    /// The times of the batch that is done.
-    pub(crate) fn read(&self, gpu: &Gpu, times: &mut Vec<StageTime>) -> Result<(), GpuError> {
-        let slice = self.readback.slice(..);
-        slice.map_async(wgpu::MapMode::Read, |_| {});
-        let failed = |reason| gpu.failed(reason);
-        gpu.wait()?;
-        let view = slice
-            .get_mapped_range()
-            .map_err(|e| failed(e.to_string()))?;
+    /// Asks for the times of what was submitted.
+    pub(crate) fn ask(&self) -> Answer {
+        Answer::to_reading(self.readback.slice(..))
+    }
+
+    /// Gives up what was asked for.
+    pub(crate) fn abandon(&self) {
+        self.readback.unmap();
+    }
+
+    /// Adds the times that came back to those of the same stages.
+    pub(crate) fn take(&self, gpu: &Gpu, times: &mut Vec<StageTime>) -> Result<(), GpuError> {
+        let view =
+            (self.readback.slice(..).get_mapped_range()).map_err(|e| gpu.failed(e.to_string()))?;
         let ticks: &[[u64; 2]] = bytemuck::cast_slice(&view);
-        let seconds =
-            |[begin, end]: [u64; 2]| end.saturating_sub(begin) as f64 * self.seconds_per_tick;
-        times.extend(
-            (self.stages.iter().zip(ticks)).map(|(stage, ticks)| StageTime {
-                stage,
-                seconds: seconds(*ticks),
-            }),
-        );
+        for (&stage, [begin, end]) in self.stages.iter().zip(ticks) {
+            let seconds = end.saturating_sub(*begin) as f64 * self.seconds_per_tick;
+            match times.iter_mut().find(|time| time.stage == stage) {
+                Some(time) => time.seconds += seconds,
+                None => times.push(StageTime { stage, seconds }),
+            }
+        }
         drop(view);
         self.readback.unmap();
         Ok(())

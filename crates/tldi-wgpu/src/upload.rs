@@ -9,6 +9,7 @@ use crate::prediction::predicted;
 use crate::resident::Resident;
 use crate::sources::Sources;
 use crate::{Gpu, GpuError};
+use std::ops::Range;
 use tldi::plan::PairPlan;
 use tldi::{Aabb, BLOCK, PairQuery, Surface};
 
@@ -19,9 +20,10 @@ pub(crate) struct Upload {
     pub(crate) pairs_of: Vec<usize>,
     plans: Vec<PairPlan>,
     pub(crate) pairs: Vec<PairData>,
-    pub(crate) sides: Vec<SideData>,
     /// Side and first point of each block that may have points in reach.
     pub(crate) items: Vec<[u32; 2]>,
+    /// Which of them are of each side of each pair.
+    items_of: Vec<[Range<usize>; 2]>,
     /// What the selected pairs will need, about.
     pub(crate) predicted: Counters,
     zone_words: u64,
@@ -35,6 +37,7 @@ impl Upload {
         self.pairs_of.clear();
         self.plans.clear();
         self.items.clear();
+        self.items_of.clear();
         self.predicted = Counters::default();
         for pair in among {
             let query = &batch[pair];
@@ -45,7 +48,7 @@ impl Upload {
                 continue;
             };
             let first_item = self.items.len();
-            let mut blocks = [0; 2];
+            let mut items_of = [0..0, 0..0];
             let is_reached = (0..2).all(|k| {
                 let side = &plan.sides[k];
                 let index = (2 * self.plans.len() + k) as u32;
@@ -67,11 +70,13 @@ impl Upload {
                     }
                     Surface::Exact(_) => {}
                 }
-                blocks[k] = self.items.len() - before;
-                blocks[k] > 0
+                items_of[k] = before..self.items.len();
+                !items_of[k].is_empty()
             });
             if is_reached {
+                let blocks = [0, 1].map(|k| items_of[k].len());
                 let of_pair = predicted(query, &plan, blocks);
+                self.items_of.push(items_of);
                 self.predicted = self.predicted.plus(&of_pair);
                 self.plans.push(plan);
                 self.pairs_of.push(pair);
@@ -96,7 +101,7 @@ impl Upload {
         2 * 4 * self.cells
     }
 
-    /// Puts the clouds of the selected pairs on the device, and fills what tells of them.
+    /// Puts the blocks in reach of the selected pairs on the device, and fills what tells of them.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] where there is no room for the clouds, or the stages cannot number
@@ -111,28 +116,61 @@ impl Upload {
         resident.begin();
         sources.begin();
         self.pairs.clear();
-        self.sides.clear();
         (self.zone_words, self.cells) = (0, 0);
-        for (plan, &pair) in self.plans.iter().zip(&self.pairs_of) {
+        let selected = self.plans.iter().zip(&self.items_of);
+        for ((plan, items_of), &pair) in selected.zip(&self.pairs_of) {
             let query = &batch[pair];
-            let data = PairData::new(query, plan, self.zone_words)?;
+            let mut data = PairData::new(query, plan, self.zone_words)?;
             self.zone_words += 2 * u64::from(data.zone_words);
-            self.pairs.push(data);
-            for (surface, side) in [query.a, query.b].iter().zip(&plan.sides) {
+            for (k, surface) in [query.a, query.b].iter().enumerate() {
                 let place = match surface {
-                    Surface::Cloud(cloud) => resident.place(gpu, cloud)?,
+                    Surface::Cloud(cloud) => {
+                        let items = self.items[items_of[k].clone()].iter();
+                        let blocks = items.map(|[_, first_point]| *first_point as usize / BLOCK);
+                        resident.place(gpu, cloud, blocks)?
+                    }
                     Surface::Device(cloud) => sources.place(gpu, cloud, resident)?,
                     Surface::Exact(_) => continue,
                 };
                 let Some(facts) = CloudFacts::of(surface) else {
                     continue;
                 };
-                let side = SideData::new(&facts, side, &query.params, &place, self.cells)?;
+                let side =
+                    SideData::new(&facts, &plan.sides[k], &query.params, &place, self.cells)?;
                 self.cells += side.cells();
-                self.sides.push(side);
+                data.sides[k] = side;
             }
+            self.pairs.push(data);
         }
         Ok(())
+    }
+
+    /// As many as `wanted`, but of what shares a buffer with other things no more than `allowed` bytes have room for beside
+    /// these: what is foreseen, or was needed before, may be more than this part needs.
+    pub(crate) fn fitted(&self, wanted: Counters, allowed: u64) -> Counters {
+        let pairs = self.pairs.len() as u64;
+        let beside = |bytes: u64, element: u64| {
+            u32::try_from(allowed.saturating_sub(bytes) / element).unwrap_or(u32::MAX)
+        };
+        let contacts = beside(
+            4 * u64::from(PAIR_WORDS) * pairs,
+            4 * u64::from(CONTACT_WORDS),
+        );
+        let of_images =
+            TILE_BYTES * u64::from(wanted.tiles) + PIXEL_BYTES * u64::from(wanted.pixels);
+        let room = allowed.saturating_sub(4 * self.words_before_tiles());
+        let share = (room as f32 / of_images.max(1) as f32).min(1.0);
+        Counters {
+            contacts: wanted.contacts.min(contacts),
+            ..wanted.with_image_shares(share)
+        }
+    }
+
+    /// Words of the arena before the tiles: counters, sides, zones, cells, views.
+    fn words_before_tiles(&self) -> u64 {
+        let per_pair = 2 * SIDE_WORDS + MAX_VIEWS * VIEW_WORDS;
+        let pairs = u64::from(per_pair) * self.pairs.len() as u64;
+        u64::from(COUNTERS) + pairs + self.zone_words + 2 * self.cells
     }
 
     /// Sizes of the batch and where the parts of the arena are.
@@ -143,10 +181,11 @@ impl Upload {
     pub(crate) fn batch_data(&self, capacities: &Counters) -> Result<BatchData, GpuError> {
         let pairs = self.pairs.len() as u64;
         let sides_at = u64::from(COUNTERS);
-        let views_at = sides_at + 2 * pairs * u64::from(SIDE_WORDS);
-        let zone_at = views_at + pairs * u64::from(MAX_VIEWS * VIEW_WORDS);
+        let zone_at = sides_at + 2 * pairs * u64::from(SIDE_WORDS);
         let cells_at = zone_at + self.zone_words;
-        let tiles_at = cells_at + 2 * self.cells;
+        // From here on, a round of further views begins anew.
+        let views_at = cells_at + 2 * self.cells;
+        let tiles_at = self.words_before_tiles();
         let pixels_at = tiles_at + TILE_BYTES / 4 * u64::from(capacities.tiles);
         let work_words = pixels_at + PIXEL_BYTES / 4 * u64::from(capacities.pixels);
         // The stages compute places anywhere in it.

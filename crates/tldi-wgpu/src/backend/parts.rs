@@ -1,134 +1,243 @@
 //! A batch in as many parts as the device has room for, each grown and redone where a buffer was
 //! too small.
 
-use super::WgpuBackend;
+use super::{InFlight, WgpuBackend};
+use crate::buffers::most_bytes;
+use crate::counters::Counters;
 use crate::layout::lives_on_device;
 use crate::{GpuError, Traffic};
+use std::task::Waker;
 use tldi::{Backend, BackendError, PairQuery, PairResult};
 
 /// Times that a part is redone with larger buffers before that counts as a fault: every time at
 /// least one of seven has doubled.
 const MOST_TRIES: usize = 64;
 
-/// Why a part was not compared.
-enum Stop {
-    /// It needs larger buffers than the device allows.
-    TooLarge,
-    Failed(BackendError),
+/// How far a batch is.
+pub(super) struct Run<'q> {
+    pub(super) batch: Vec<PairQuery<'q>>,
+    pub(super) results: Vec<PairResult>,
+    /// Pairs that the device does not take, and that are not compared yet.
+    pub(super) left_to_cpu: Vec<usize>,
+    /// Pairs of each part that is not begun yet, the next one last.
+    parts: Vec<Vec<usize>>,
+    /// Of the present part: sizes for which there was room, how often it was redone, and what its first
+    /// views needed, where further ones are drawn.
+    fitting: Option<Counters>,
+    tries: usize,
+    pub(super) first_views: Option<Counters>,
 }
 
-impl From<GpuError> for Stop {
-    fn from(error: GpuError) -> Self {
-        match error {
-            GpuError::TooLarge { .. } => Self::TooLarge,
-            error => Self::Failed(error.into()),
-        }
+impl Run<'_> {
+    /// The results, where the batch is done.
+    pub(super) fn take_results(&mut self) -> Vec<PairResult> {
+        std::mem::take(&mut self.results)
     }
 }
 
-impl From<BackendError> for Stop {
-    fn from(error: BackendError) -> Self {
-        Self::Failed(error)
+impl std::fmt::Debug for Run<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Run")
+            .field("pairs", &self.batch.len())
+            .field("parts_left", &self.parts.len())
+            .finish_non_exhaustive()
     }
+}
+
+/// What has come back of a part.
+pub(super) enum Returned {
+    /// All, and it is in the results.
+    Done,
+    /// It needs larger buffers.
+    Overflown(Counters),
+    /// More was asked for.
+    More,
 }
 
 impl WgpuBackend {
-    /// Compares the selected pairs on the device, in halves where it has no room for all, and the
-    /// others on the CPU meanwhile.
-    pub(super) fn compare_on_device(
+    /// Begins to compare the selected pairs. Entries of `results` are reused.
+    pub(super) fn start<'q>(
         &mut self,
-        batch: &[PairQuery<'_>],
-        results: &mut [PairResult],
-        left_to_cpu: &mut Vec<usize>,
-    ) -> Result<(), BackendError> {
+        batch: &[PairQuery<'q>],
+        mut results: Vec<PairResult>,
+        left_to_cpu: Vec<usize>,
+    ) -> Result<InFlight<'_, 'q>, BackendError> {
+        // Of a batch that was dropped.
+        self.abandon();
         self.gpu.check()?;
         self.pairs_on_cpu = 0;
         self.traffic = Traffic::default();
-        let mut parts = vec![self.upload.pairs_of.clone()];
-        while let Some(part) = parts.pop() {
+        self.times.clear();
+        results.resize_with(batch.len(), PairResult::default);
+        results.iter_mut().for_each(PairResult::clear);
+        let mut run = Run {
+            batch: batch.to_vec(),
+            results,
+            left_to_cpu,
+            parts: vec![self.upload.pairs_of.clone()],
+            fitting: None,
+            tries: 0,
+            first_views: None,
+        };
+        self.begin_next_part(&mut run)?;
+        Ok(InFlight::new(self, run))
+    }
+
+    /// Goes on without waiting; whether the batch is done. Else `waker` is woken when there is more to do.
+    pub(super) fn advance(
+        &mut self,
+        run: &mut Run<'_>,
+        waker: Option<&Waker>,
+    ) -> Result<bool, BackendError> {
+        loop {
+            // While the device works.
+            self.compare_on_cpu(run)?;
+            if self.asked.is_none() && !self.begin_next_part(run)? && run.left_to_cpu.is_empty() {
+                return Ok(true);
+            }
+            let Some(asked) = &self.asked else {
+                continue;
+            };
+            self.gpu.poll()?;
+            let times = asked.times.as_ref().map(|times| times.outcome(waker));
+            let (Some(outcome), Some(times)) =
+                (asked.answer.outcome(waker), times.unwrap_or(Some(Ok(()))))
+            else {
+                return Ok(false);
+            };
+            let failed = |error: wgpu::BufferAsyncError| self.gpu.failed(error.to_string());
+            outcome.and(times).map_err(failed)?;
+            self.go_on(run)?;
+        }
+    }
+
+    /// Waits until the device has answered.
+    ///
+    /// # Errors
+    /// [`GpuError::TimedOut`] where that takes too long.
+    pub(super) fn wait_for_answer(&self) -> Result<(), GpuError> {
+        let Some(asked) = &self.asked else {
+            return Ok(());
+        };
+        self.gpu.wait()?;
+        // Whoever shares the device may have been the one to see the end of the work.
+        for answer in [Some(&asked.answer), asked.times.as_ref()]
+            .into_iter()
+            .flatten()
+        {
+            if !answer.wait(self.gpu.patience) {
+                return Err(self.gpu.give_up());
+            }
+        }
+        Ok(())
+    }
+
+    /// Submits the next part that has pairs, in halves where the device has no room for all of it; whether there is one.
+    fn begin_next_part(&mut self, run: &mut Run<'_>) -> Result<bool, BackendError> {
+        while let Some(part) = run.parts.pop() {
             if part.is_empty() {
                 continue;
             }
             if part != self.upload.pairs_of {
-                self.upload.select(batch, part.iter().copied());
+                self.upload.select(&run.batch, part.iter().copied());
             }
-            match self.compare_part(batch, results, left_to_cpu) {
-                Ok(()) => {}
-                Err(Stop::Failed(error)) => return Err(error),
-                Err(Stop::TooLarge) if part.len() > 1 => {
-                    let (first, second) = part.split_at(part.len() / 2);
-                    parts.extend([second.to_vec(), first.to_vec()]);
-                }
-                Err(Stop::TooLarge) => {
-                    left_to_cpu.extend(&part);
-                    let reason = "it needs larger buffers than the device allows, and points that live \
-                                  on the device cannot be left to the CPU: use larger pixels or fewer points";
-                    check_left(batch, left_to_cpu, reason)?;
-                }
+            (run.fitting, run.tries, run.first_views) = (None, 0, None);
+            let placed = self.place(&run.batch).and_then(|()| self.submit());
+            if self.is_submitted(run, placed)? {
+                return Ok(true);
             }
         }
-        self.traffic.uploaded = self.gpu.take_uploaded();
-        self.compare_on_cpu(batch, results, left_to_cpu)
+        self.traffic.uploaded += self.gpu.take_uploaded();
+        Ok(false)
     }
 
-    /// Compares the pairs of the present selection on the device.
-    fn compare_part(
-        &mut self,
-        batch: &[PairQuery<'_>],
-        results: &mut [PairResult],
-        left_to_cpu: &mut Vec<usize>,
-    ) -> Result<(), Stop> {
+    /// Puts the clouds of the selection on the device, and makes room for what it will need.
+    fn place(&mut self, batch: &[PairQuery<'_>]) -> Result<(), GpuError> {
         let (resident, sources) = (&mut self.resident, &mut self.sources);
         self.upload.place(batch, &self.gpu, resident, sources)?;
-        let predicted = self.upload.predicted.min(&self.most);
-        self.capacities = self.capacities.grown(&predicted, &self.most)?;
-        let mut fitting = None;
-        for _ in 0..MOST_TRIES {
-            if let Err(error) = self.submit() {
-                if matches!(error, GpuError::TooLarge { .. }) {
-                    match fitting {
-                        Some(former) => self.capacities = former,
-                        // What earlier batches needed may take the room that this one needs.
-                        None if self.capacities != self.least => {
-                            self.capacities = self.least;
-                            continue;
-                        }
-                        None => {}
-                    }
-                }
-                return Err(error.into());
+        let predicted = (self.upload.predicted)
+            .with_image_shares(self.shortfall)
+            .min(&self.most);
+        let grown = self.capacities.grown(&predicted, &self.most)?;
+        // Tiles and pixels are cleared, so that there are no more than this part needs.
+        let wanted = Counters {
+            tiles: predicted.tiles,
+            pixels: predicted.pixels,
+            ..grown
+        };
+        self.capacities = self.upload.fitted(wanted, most_bytes(&self.gpu));
+        Ok(())
+    }
+
+    /// Whether the part was submitted. One that is too large is split, or left to the CPU.
+    fn is_submitted(
+        &mut self,
+        run: &mut Run<'_>,
+        outcome: Result<(), GpuError>,
+    ) -> Result<bool, BackendError> {
+        match outcome {
+            Ok(()) => {
+                run.fitting = Some(self.capacities);
+                return Ok(true);
             }
-            fitting = Some(self.capacities);
-            self.compare_on_cpu(batch, results, left_to_cpu)?;
-            let needed = self.read_back(batch, results, left_to_cpu)?;
-            let reason = "a pixel has more than 1024 fragments, and points that live on the device \
-                          cannot be left to the CPU: use smaller pixels or fewer points";
-            check_left(batch, left_to_cpu, reason)?;
-            if self.capacities.holds(&needed) {
-                return Ok(());
-            }
-            self.capacities = self.capacities.grown(&needed, &self.most)?;
-            self.traffic.redos += 1;
+            Err(GpuError::TooLarge { .. }) => {}
+            Err(error) => return Err(error.into()),
         }
-        Err(self
-            .gpu
-            .failed("its counters never settled".to_owned())
-            .into())
+        if let Some(former) = run.fitting {
+            self.capacities = former;
+        }
+        let part = self.upload.pairs_of.clone();
+        if part.len() > 1 {
+            let (first, second) = part.split_at(part.len() / 2);
+            run.parts.extend([second.to_vec(), first.to_vec()]);
+        } else {
+            run.left_to_cpu.extend(&part);
+            let reason = "it needs larger buffers than the device allows, and points that live \
+                          on the device cannot be left to the CPU: use larger pixels or fewer points";
+            check_left(&run.batch, &run.left_to_cpu, reason)?;
+        }
+        Ok(false)
+    }
+
+    /// Takes what the device has answered; redoes the part with larger buffers where it needs them.
+    fn go_on(&mut self, run: &mut Run<'_>) -> Result<(), BackendError> {
+        let needed = match self.take_answer(run)? {
+            Returned::More => return Ok(()),
+            Returned::Done => {
+                let reason = "a pixel has more than 1024 fragments, and points that live on the device \
+                              cannot be left to the CPU: use smaller pixels or fewer points";
+                return check_left(&run.batch, &run.left_to_cpu, reason);
+            }
+            Returned::Overflown(needed) => needed,
+        };
+        run.tries += 1;
+        if run.tries == MOST_TRIES {
+            let reason = "its counters never settled".to_owned();
+            return Err(self.gpu.failed(reason).into());
+        }
+        run.first_views = None;
+        let grown = self.capacities.grown(&needed, &self.most);
+        let redone = grown.and_then(|grown| {
+            self.capacities = grown;
+            self.traffic.redos += 1;
+            self.submit()
+        });
+        self.is_submitted(run, redone).map(|_| ())
     }
 
     /// Compares what is left to the CPU, and leaves nothing.
-    fn compare_on_cpu(
-        &mut self,
-        batch: &[PairQuery<'_>],
-        results: &mut [PairResult],
-        left_to_cpu: &mut Vec<usize>,
-    ) -> Result<(), BackendError> {
-        self.pairs_on_cpu += left_to_cpu.len();
-        let queries: Vec<PairQuery> = left_to_cpu.iter().map(|&pair| batch[pair]).collect();
+    fn compare_on_cpu(&mut self, run: &mut Run<'_>) -> Result<(), BackendError> {
+        if run.left_to_cpu.is_empty() {
+            return Ok(());
+        }
+        self.pairs_on_cpu += run.left_to_cpu.len();
+        let queries: Vec<PairQuery> = (run.left_to_cpu.iter())
+            .map(|&pair| run.batch[pair])
+            .collect();
         let mut compared = Vec::new();
         self.cpu.compare(&queries, &mut compared)?;
-        for (pair, result) in left_to_cpu.drain(..).zip(compared) {
-            results[pair] = result;
+        for (pair, result) in run.left_to_cpu.drain(..).zip(compared) {
+            run.results[pair] = result;
         }
         Ok(())
     }
@@ -200,8 +309,7 @@ mod tests {
             ..backend.most
         };
         backend.most = most;
-        backend.least = backend.least.min(&most);
-        backend.capacities = backend.least;
+        backend.capacities = backend.capacities.min(&most);
         assert_eq!(whole, compared(&mut backend, &batch));
         assert_eq!(backend.pairs_on_cpu(), 0);
         assert!(backend.capacities.splats <= most.splats);
@@ -229,12 +337,8 @@ mod tests {
         let small = sheet(40);
         let batch = queries(&small, 2);
         let cold = compared(&mut backend, &batch);
-        // Tiles and pixels share a buffer: each has room in it, both have not.
-        backend.capacities = Counters {
-            tiles: backend.most.tiles,
-            pixels: backend.most.pixels,
-            ..backend.least
-        };
+        // Contacts share a buffer with the pairs: there is room for either.
+        backend.capacities.contacts = backend.most.contacts;
         assert_eq!(cold, compared(&mut backend, &batch));
         assert_eq!(backend.pairs_on_cpu(), 0);
     }
@@ -286,8 +390,7 @@ mod tests {
         assert_eq!(refused(&mut backend, &[batch[0], neither]).0, 1);
         // Half of what the large pair has.
         backend.most.splats = of_two;
-        backend.least = backend.least.min(&backend.most);
-        backend.capacities = backend.least;
+        backend.capacities = backend.capacities.min(&backend.most);
         let (pair, reason) = refused(&mut backend, &batch);
         assert_eq!(pair, 2);
         assert!(reason.contains("larger buffers"), "{reason}");
