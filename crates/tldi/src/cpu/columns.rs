@@ -16,7 +16,7 @@ use glamx::{Mat3, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
 
 /// Least edge of a tile in pixels: smaller ones cost more than they leave out.
-const LEAST_TILE: i32 = 2;
+pub(crate) const LEAST_TILE: i32 = 2;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 1] = [("LEAST_TILE", LEAST_TILE as f64)];
