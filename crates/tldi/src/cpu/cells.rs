@@ -7,6 +7,7 @@
 //! on the order of the points.
 
 use super::columns::Columns;
+use super::lanes::multiversioned;
 use super::rect::Rect;
 use crate::{Facing, Layer, Tldi, VirtualCamera};
 use glamx::Vec3;
@@ -37,7 +38,8 @@ const FLAT: f32 = 0.05;
 /// The points and cells of an image, kept from call to call.
 #[derive(Default)]
 pub(super) struct Cells {
-    pixels: Vec<u32>,
+    /// Pixel of each point, one beyond the last where it is beside the image, and what it is there.
+    located: Vec<(u32, Point)>,
     /// First point of each pixel; one entry more than pixels.
     starts: Vec<u32>,
     points: Vec<Point>,
@@ -184,29 +186,38 @@ impl Cells {
     }
 
     /// The cells around one that continue it, at most one a pixel, and how far they are aside, in pixels.
+    #[inline(always)]
     fn neighbors(
         &self,
         cell: usize,
         [i, j]: [usize; 2],
         rect: &Rect,
-    ) -> impl Iterator<Item = (usize, [f32; 2])> {
+        mut put: impl FnMut(usize, [f32; 2]),
+    ) {
         let own = &self.cells[cell];
         let [width, height] = rect.size.map(|s| s as usize);
         let merged = (MERGED * STEPS) as i32;
-        let around = (j.saturating_sub(1)..(j + 2).min(height))
-            .flat_map(move |y| (i.saturating_sub(1)..(i + 2).min(width)).map(move |x| [x, y]));
-        around
-            .filter(move |at| *at != [i, j])
-            .filter_map(move |[x, y]| {
-                let continues = |c: &usize| {
-                    let c = &self.cells[*c];
-                    c.class == own.class && c.near <= own.far + merged && own.near <= c.far + merged
-                };
-                let apart = |c: &usize| (self.cells[*c].middle - own.middle).abs();
-                let there = self.of_pixel(y * width + x).filter(continues);
-                let next = there.min_by_key(apart)?;
-                Some((next, [x as f32 - i as f32, y as f32 - j as f32]))
-            })
+        for y in j.saturating_sub(1)..(j + 2).min(height) {
+            for x in i.saturating_sub(1)..(i + 2).min(width) {
+                if [x, y] == [i, j] {
+                    continue;
+                }
+                let there = self.of_pixel(y * width + x);
+                let (mut next, mut least) = (None, i32::MAX);
+                for (k, c) in there.clone().zip(&self.cells[there]) {
+                    let continues = c.class == own.class
+                        && c.near <= own.far + merged
+                        && own.near <= c.far + merged;
+                    let apart = (c.middle - own.middle).abs();
+                    if continues && apart < least {
+                        (next, least) = (Some(k), apart);
+                    }
+                }
+                if let Some(next) = next {
+                    put(next, [x as f32 - i as f32, y as f32 - j as f32]);
+                }
+            }
+        }
     }
 
     /// Fits a plane to each cell and its neighbours.
@@ -216,12 +227,12 @@ impl Cells {
             for cell in self.of_pixel(k) {
                 let own = &self.cells[cell];
                 let mut all = own.sums;
-                for (next, aside) in self.neighbors(cell, pixel, rect) {
+                self.neighbors(cell, pixel, rect, |next, aside| {
                     let next = &self.cells[next];
                     let [x, y] = aside.map(|d| d * STEPS);
                     let moved = moved(&next.sums, [x, y, (next.middle - own.middle) as f32]);
                     all.iter_mut().zip(moved).for_each(|(all, sum)| *all += sum);
-                }
+                });
                 let plane = Plane::of(&own.sums, &all);
                 self.planes.push(plane);
             }
@@ -239,23 +250,24 @@ impl Cells {
         let own = &self.cells[cell];
         let [least, most] = [own.near, own.far].map(|depth| (depth - own.middle) as f32);
         let reached = least - ON_PLANE * STEPS..=most + ON_PLANE * STEPS;
-        let through = self
-            .neighbors(cell, pixel, rect)
-            .filter_map(|(next, [x, y])| {
-                let Plane {
+        let mut flattest = None;
+        self.neighbors(cell, pixel, rect, |next, [x, y]| {
+            let Plane {
+                slope,
+                above,
+                variance,
+            } = self.planes[next];
+            let there = (self.cells[next].middle - own.middle) as f32 + above;
+            let above = there - STEPS * (slope[0] * x + slope[1] * y);
+            let is_flatter = flattest.is_none_or(|best: Plane| variance < best.variance);
+            if is_flatter && variance <= square(FLAT) && reached.contains(&above) {
+                flattest = Some(Plane {
                     slope,
                     above,
                     variance,
-                } = self.planes[next];
-                let there = (self.cells[next].middle - own.middle) as f32 + above;
-                let above = there - STEPS * (slope[0] * x + slope[1] * y);
-                (variance <= square(FLAT) && reached.contains(&above)).then_some(Plane {
-                    slope,
-                    above,
-                    variance,
-                })
-            });
-        let flattest = through.min_by(|p, q| p.variance.total_cmp(&q.variance));
+                });
+            }
+        });
         flattest.unwrap_or(plane)
     }
 
@@ -267,25 +279,18 @@ impl Cells {
         exits: Option<&dyn Fn(usize) -> bool>,
         imaging: &CellImaging,
     ) {
-        let Rect { origin, size } = imaging.rect;
-        let inv_pixel = 1.0 / imaging.pixel_size;
         let count = imaging.rect.pixels();
-        self.pixels.clear();
+        self.located.resize(kept.len(), (0, Point::default()));
+        locate(columns, kept, imaging, &mut self.located);
+        if let Some(is_exit) = exits {
+            for ((_, point), &i) in self.located.iter_mut().zip(kept) {
+                point.key |= if is_exit(i as usize) { EXIT } else { 0 };
+            }
+        }
         self.starts.clear();
         self.starts.resize(count + 1, 0);
-        let at = |i: usize| [columns.x[i] * inv_pixel, columns.y[i] * inv_pixel];
-        for i in kept.iter().map(|&i| i as usize) {
-            let pixel = at(i).map(|c| c.floor() as i64);
-            let [x, y] = [0, 1].map(|k| pixel[k] - i64::from(origin[k]));
-            let [width, height] = size.map(i64::from);
-            let inside = (0..width).contains(&x) && (0..height).contains(&y);
-            let pixel = if inside {
-                (y * width + x) as usize
-            } else {
-                count
-            };
-            self.pixels.push(pixel as u32);
-            self.starts[pixel] += 1;
+        for (pixel, _) in &self.located {
+            self.starts[*pixel as usize] += 1;
         }
         let mut end = 0;
         for start in &mut self.starts {
@@ -295,17 +300,10 @@ impl Cells {
         // Filled from the end, so that each start ends up where it belongs.
         self.points.clear();
         self.points.resize(end as usize, Point::default());
-        for (&i, pixel) in kept.iter().zip(&self.pixels).rev() {
-            let i = i as usize;
+        for (pixel, point) in self.located.iter().rev() {
             let slot = &mut self.starts[*pixel as usize];
             *slot -= 1;
-            let aside = at(i).map(|c| ((c - c.floor() - 0.5) * STEPS) as i16);
-            let depth = (columns.depth[i] - imaging.near) * inv_pixel * STEPS;
-            let exit = exits.is_some_and(|is_exit| is_exit(i));
-            self.points[*slot as usize] = Point {
-                key: (depth.max(0.0) as u32).min(DEEPEST) | if exit { EXIT } else { 0 },
-                aside,
-            };
+            self.points[*slot as usize] = *point;
         }
     }
 
@@ -374,6 +372,29 @@ impl Cells {
             color: [0; 4],
         }
     }
+}
+
+multiversioned! {
+/// Finds where points are.
+fn locate(columns: &Columns, kept: &[u32], imaging: &CellImaging, located: &mut [(u32, Point)]) {
+    let inv_pixel = 1.0 / imaging.pixel_size;
+    let Rect { origin, size } = imaging.rect;
+    let count = imaging.rect.pixels() as u32;
+    let [width, height] = size.map(i64::from);
+    for (&i, to) in kept.iter().zip(located) {
+        let i = i as usize;
+        let at = [columns.x[i] * inv_pixel, columns.y[i] * inv_pixel];
+        let floor = at.map(f32::floor);
+        let [x, y] = [0, 1].map(|k| floor[k] as i64 - i64::from(origin[k]));
+        let inside = (0..width).contains(&x) && (0..height).contains(&y);
+        let depth = (columns.depth[i] - imaging.near) * inv_pixel * STEPS;
+        let point = Point {
+            key: (depth.max(0.0) as u32).min(DEEPEST),
+            aside: [0, 1].map(|k| ((at[k] - floor[k] - 0.5) * STEPS) as i16),
+        };
+        *to = (if inside { (y * width + x) as u32 } else { count }, point);
+    }
+}
 }
 
 /// Columns and rows of the pixels of a rectangle, row by row, from its first.

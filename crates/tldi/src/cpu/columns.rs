@@ -7,7 +7,7 @@
 
 use super::cull::Survivors;
 use super::fold::{FARTHEST_PIXEL, ViewFold};
-use super::lanes::{multiversioned, truncated};
+use super::lanes::{bounds, multiversioned, truncated};
 use super::rect::{Footprint, Rect};
 use super::splat::splat_radius;
 use crate::pair::plan::AIM_SAMPLES;
@@ -16,13 +16,10 @@ use glamx::{Mat3, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
 
 /// Least edge of a tile in pixels: smaller ones cost more than they leave out.
-const LEAST_TILE: i32 = 2;
+pub(crate) const LEAST_TILE: i32 = 2;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 1] = [("LEAST_TILE", LEAST_TILE as f64)];
-
-/// Lanes of the bounds' reduction.
-const LANES: usize = 16;
 
 /// The culled points of one side in the view frame, metres.
 #[derive(Default)]
@@ -395,27 +392,6 @@ fn transform(r: &Mat3, t: Vec3, from: [&[f32]; 3], to: [&mut [f32]; 3]) -> (Vec3
     let [x, y, z] = [bounds(to_x), bounds(to_y), bounds(to_z)];
     (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1))
 }
-}
-
-/// Least and greatest value.
-#[inline(always)]
-fn bounds(values: &[f32]) -> (f32, f32) {
-    let mut lo = [f32::INFINITY; LANES];
-    let mut hi = [f32::NEG_INFINITY; LANES];
-    let (chunks, rest) = values.as_chunks::<LANES>();
-    for chunk in chunks {
-        for l in 0..LANES {
-            lo[l] = if chunk[l] < lo[l] { chunk[l] } else { lo[l] };
-            hi[l] = if chunk[l] > hi[l] { chunk[l] } else { hi[l] };
-        }
-    }
-    let all = |of: [f32; LANES], op: fn(f32, f32) -> f32, start: f32| {
-        of.iter().chain(rest).fold(start, |m, &v| op(m, v))
-    };
-    (
-        all(lo, f32::min, f32::INFINITY),
-        all(hi, f32::max, f32::NEG_INFINITY),
-    )
 }
 
 multiversioned! {

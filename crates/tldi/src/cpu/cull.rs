@@ -82,12 +82,13 @@ impl Survivors {
     pub(crate) fn select(&mut self, all: &Self, region: &Region) {
         self.clear();
         self.stride = all.stride;
-        for (i, point) in all.points().enumerate() {
-            if region.contains(point) {
-                self.x.push(point.x);
-                self.y.push(point.y);
-                self.z.push(point.z);
-                self.index.push(all.index[i]);
+        let kernel = Kernel::new(&Pose3::IDENTITY, region);
+        let mut moved = Moved::default();
+        for first in (0..all.len()).step_by(BLOCK) {
+            let range = first..all.len().min(first + BLOCK);
+            let [x, y, z] = [&all.x, &all.y, &all.z].map(|c| &c[range.clone()]);
+            if classify(&kernel, x, y, z, &[1; BLOCK], &mut moved) {
+                self.extend(&mut moved, |i| all.index[first + i]);
             }
         }
     }
@@ -101,7 +102,7 @@ impl Survivors {
     }
 
     /// Appends the points of a block that are inside the region, after moving them to its front.
-    fn extend(&mut self, moved: &mut Moved, first: usize, stride: usize) {
+    fn extend(&mut self, moved: &mut Moved, index_of: impl Fn(usize) -> u32) {
         let Moved { x, y, z, inside } = moved;
         let mut index = [0; BLOCK];
         let mut kept = 0;
@@ -112,7 +113,7 @@ impl Survivors {
                 let i = 64 * word + mask.trailing_zeros() as usize;
                 mask &= mask - 1;
                 (x[kept], y[kept], z[kept]) = (x[i], y[i], z[i]);
-                index[kept] = (first + i * stride) as u32;
+                index[kept] = index_of(i);
                 kept += 1;
             }
         }
@@ -303,55 +304,74 @@ fn cull_blocks(
     let uneven = Uneven::of(cloud);
     let widest = region.of_radius(cloud.max_radius());
     let mut kernel = Kernel::new(frame_from_cloud, &widest);
+    let thinning = Thinning::new(stride);
     let [x, y, z] = cloud.coordinates();
     let mut moved = Moved::default();
-    let mut thinned = [[0.0; BLOCK]; 3];
     for block in blocks {
-        let bounds = cloud.blocks()[block].transformed(frame_from_cloud);
+        let bounds = &cloud.blocks()[block];
+        let bounds = match kernel.frame_from_cloud {
+            Some(_) => bounds.transformed(frame_from_cloud),
+            None => *bounds,
+        };
         if !bounds.intersects(&widest.overlap) {
             continue;
         }
-        let end = ((block + 1) * BLOCK).min(x.len());
+        let range = block * BLOCK..((block + 1) * BLOCK).min(x.len());
         if let Some(uneven) = &uneven {
-            let region = region.of_radius(uneven.largest(block * BLOCK..end));
+            let region = region.of_radius(uneven.largest(range.clone()));
             if !bounds.intersects(&region.overlap) {
                 continue;
             }
             kernel = Kernel::new(frame_from_cloud, &region);
         }
-        let range = (block * BLOCK + first_taken(block, stride)).min(end)..end;
-        if stride == 1 {
-            let [x, y, z] = [x, y, z].map(|c| &c[range.clone()]);
-            classify(&kernel, x, y, z, &mut moved);
-        } else {
-            let thin = |c: &[f32], to: &mut [f32; BLOCK]| {
-                let taken = c[range.clone()].iter().step_by(stride);
-                to.iter_mut().zip(taken).for_each(|(to, from)| *to = *from);
-            };
-            thin(x, &mut thinned[0]);
-            thin(y, &mut thinned[1]);
-            thin(z, &mut thinned[2]);
-            let n = range.len().div_ceil(stride);
-            let [x, y, z] = &thinned;
-            classify(&kernel, &x[..n], &y[..n], &z[..n], &mut moved);
+        let [x, y, z] = [x, y, z].map(|c| &c[range.clone()]);
+        let taken = thinning.of_block(block);
+        if !classify(&kernel, x, y, z, taken, &mut moved) {
+            continue;
         }
+        let first = range.start;
         if let Some(uneven) = &uneven {
-            keep_own(uneven, &mut moved, range.start, stride, region);
+            keep_own(uneven, &mut moved, first, region);
         }
-        let first = out.len();
-        out.extend(&mut moved, range.start, stride);
+        let before = out.len();
+        out.extend(&mut moved, |i| (first + i) as u32);
         if let Some(uneven) = &uneven {
-            let kept = out.index[first..].iter();
+            let kept = out.index[before..].iter();
             (out.further).extend(kept.map(|&i| uneven.further(i as usize)));
         }
     }
 }
 
+/// Which points of a block are taken.
+struct Thinning {
+    stride: usize,
+    /// 1 for every `stride`-th, else 0.
+    taken: [u8; 2 * BLOCK],
+}
+
+impl Thinning {
+    fn new(stride: usize) -> Self {
+        Self {
+            stride,
+            taken: std::array::from_fn(|i| u8::from(i.is_multiple_of(stride))),
+        }
+    }
+
+    /// 1 for the points of a block that are taken, else 0.
+    fn of_block(&self, block: usize) -> &[u8; BLOCK] {
+        let first = first_taken(block, self.stride);
+        let from = (self.stride - first) % self.stride;
+        self.taken[from..]
+            .first_chunk()
+            .expect("a stride is no longer than a block")
+    }
+}
+
 /// Of the points in the region of the coarsest point, keeps those that are in their own region.
-fn keep_own(uneven: &Uneven, moved: &mut Moved, first: usize, stride: usize, region: &Region) {
+fn keep_own(uneven: &Uneven, moved: &mut Moved, first: usize, region: &Region) {
     for i in 0..BLOCK {
         if moved.inside[i] > 0 {
-            let own = region.of_radius(uneven.radius(first + i * stride));
+            let own = region.of_radius(uneven.radius(first + i));
             let point = Vec3::new(moved.x[i], moved.y[i], moved.z[i]);
             moved.inside[i] = u8::from(own.contains(point));
         }
@@ -401,14 +421,22 @@ impl Kernel {
 }
 
 multiversioned! {
-fn classify(k: &Kernel, x: &[f32], y: &[f32], z: &[f32], moved: &mut Moved) {
+/// Moves points, and tells which are inside of those that are `taken`; whether any is.
+fn classify(
+    k: &Kernel,
+    x: &[f32],
+    y: &[f32],
+    z: &[f32],
+    taken: &[u8; BLOCK],
+    moved: &mut Moved,
+) -> bool {
     let stay = |p: [f32; 3]| p;
     let mover = |(r, t): (Mat3, Vec3)| move |[x, y, z]: [f32; 3]| [
         r.x_axis.x * x + r.y_axis.x * y + r.z_axis.x * z + t.x,
         r.x_axis.y * x + r.y_axis.y * y + r.z_axis.y * z + t.y,
         r.x_axis.z * x + r.y_axis.z * y + r.z_axis.z * z + t.z,
     ];
-    let points = [x, y, z];
+    let points = ([x, y, z], taken);
     let other = &k.other_bounds;
     match (k.frame_from_cloud, k.other_from_frame) {
         (None, None) => sort_out(points, stay, &k.overlap, stay, other, moved),
@@ -422,13 +450,13 @@ fn classify(k: &Kernel, x: &[f32], y: &[f32], z: &[f32], moved: &mut Moved) {
 /// Moves points to where `overlap` is, then on to where `other` is, and tells which are in both boxes.
 #[inline(always)]
 fn sort_out(
-    [x, y, z]: [&[f32]; 3],
+    ([x, y, z], taken): ([&[f32]; 3], &[u8; BLOCK]),
     to_frame: impl Fn([f32; 3]) -> [f32; 3],
     overlap: &Aabb,
     to_other: impl Fn([f32; 3]) -> [f32; 3],
     other: &Aabb,
     moved: &mut Moved,
-) {
+) -> bool {
     let n = x.len().min(y.len()).min(z.len()).min(BLOCK);
     let (x, y, z) = (&x[..n], &y[..n], &z[..n]);
     let (mx, my, mz) = (&mut moved.x[..n], &mut moved.y[..n], &mut moved.z[..n]);
@@ -446,8 +474,9 @@ fn sort_out(
         let p = to_frame([x[i], y[i], z[i]]);
         let is_inside = within(p, overlap) & within(to_other(p), other);
         [mx[i], my[i], mz[i]] = p;
-        inside[i] = u8::from(is_inside);
+        inside[i] = u8::from(is_inside) & taken[i];
     }
+    inside.iter().fold(0, |any, flag| any | flag) > 0
 }
 
 #[cfg(test)]

@@ -14,6 +14,30 @@ macro_rules! multiversioned {
 }
 pub(super) use multiversioned;
 
+/// Lanes of [`bounds`].
+const LANES: usize = 16;
+
+/// Least and greatest value; infinite of none.
+#[inline(always)]
+pub(super) fn bounds(values: &[f32]) -> (f32, f32) {
+    let mut lo = [f32::INFINITY; LANES];
+    let mut hi = [f32::NEG_INFINITY; LANES];
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    for chunk in chunks {
+        for l in 0..LANES {
+            lo[l] = if chunk[l] < lo[l] { chunk[l] } else { lo[l] };
+            hi[l] = if chunk[l] > hi[l] { chunk[l] } else { hi[l] };
+        }
+    }
+    let all = |of: [f32; LANES], op: fn(f32, f32) -> f32, start: f32| {
+        of.iter().chain(rest).fold(start, |m, &v| op(m, v))
+    };
+    (
+        all(lo, f32::min, f32::INFINITY),
+        all(hi, f32::max, f32::NEG_INFINITY),
+    )
+}
+
 /// Largest bound of [`truncated`], the largest `f32` below 2³¹.
 const MOST: f32 = 2_147_483_520.0;
 

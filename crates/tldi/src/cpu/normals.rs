@@ -6,7 +6,7 @@
 //! moments are summed in lanes.
 
 use super::fold::{SpaceFold, is_coarse};
-use super::lanes::multiversioned;
+use super::lanes::{bounds, multiversioned, truncated};
 use super::normals_sharpen::SharpenScratch;
 use super::planes::{Batch, Moments, Plane};
 use glamx::Vec3;
@@ -27,6 +27,9 @@ pub(super) const MAX_CANDIDATES: usize = 512;
 /// Candidates that are summed side by side.
 pub(super) const LANES: usize = 8;
 
+/// Coordinates that are copied at once, needed or not: as many as a row of cells has on a surface, or half of them.
+const RUN: usize = 16;
+
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 2] = [
     ("SUPPORT", SUPPORT as f64),
@@ -36,6 +39,8 @@ pub(crate) const CONSTANTS: [(&str, f64); 2] = [
 /// Memory of the stage, kept from call to call.
 #[derive(Default)]
 pub(crate) struct NormalScratch {
+    /// Coordinates of the points, folded, and their cells.
+    points: [Vec<f32>; 3],
     cells: Vec<u32>,
     fold: SpaceFold,
     pub(super) sorted: Sorted,
@@ -50,26 +55,24 @@ pub(crate) struct NormalScratch {
 #[derive(Default)]
 pub(super) struct Sorted {
     pub(super) entries: Vec<Entry>,
+    /// Their coordinates, and [`RUN`] more of no meaning.
+    coordinates: [Vec<f32>; 3],
     /// First point of each cell; one entry more than cells.
     offsets: Vec<u32>,
     /// Numbers of cells along x and y.
     dims: [usize; 2],
 }
 
-/// Coordinates of the points around a cell, in whole lanes.
+/// Coordinates of the points around a cell, in whole lanes, and room for a run of no meaning.
 struct Candidates {
-    x: [f32; MAX_CANDIDATES],
-    y: [f32; MAX_CANDIDATES],
-    z: [f32; MAX_CANDIDATES],
+    coordinates: [[f32; MAX_CANDIDATES + RUN]; 3],
     count: usize,
 }
 
 impl Default for Candidates {
     fn default() -> Self {
         Self {
-            x: [0.0; MAX_CANDIDATES],
-            y: [0.0; MAX_CANDIDATES],
-            z: [0.0; MAX_CANDIDATES],
+            coordinates: [[0.0; MAX_CANDIDATES + RUN]; 3],
             count: 0,
         }
     }
@@ -78,7 +81,6 @@ impl Default for Candidates {
 /// A point in the order of the cells.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Entry {
-    pub(super) position: Vec3,
     id: u32,
     pub(super) cell: u32,
     wanted: bool,
@@ -92,12 +94,10 @@ struct Grid {
 }
 
 impl Grid {
-    fn around(points: impl ExactSizeIterator<Item = Vec3>, support: f32) -> Self {
-        let count = points.len();
-        let (min, max) = points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| {
-            (min.min(p), max.max(p))
-        });
-        Self::new(min, max, support, count)
+    fn around(points: &[Vec<f32>; 3], support: f32) -> Self {
+        let [x, y, z] = points.each_ref().map(|c| bounds(c));
+        let (min, max) = (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1));
+        Self::new(min, max, support, points[0].len())
     }
 
     fn new(min: Vec3, max: Vec3, support: f32, points: usize) -> Self {
@@ -114,12 +114,6 @@ impl Grid {
             inv_cell: 1.0 / cell,
             dims: [d.x as usize, d.y as usize, d.z as usize],
         }
-    }
-
-    fn cell(&self, p: Vec3) -> u32 {
-        let c = ((p - self.min) * self.inv_cell).to_array();
-        let [x, y, z] = [0, 1, 2].map(|k| (c[k] as u32 + 1).min(self.dims[k] as u32 - 2));
-        (z * self.dims[1] as u32 + y) * self.dims[0] as u32 + x
     }
 
     fn cells(&self) -> usize {
@@ -148,15 +142,17 @@ pub(crate) fn estimate(
         scratch.sorted.entries.clear();
         return;
     }
-    let mut fold = std::mem::take(&mut scratch.fold);
-    fold.clear();
-    let mut grid = Grid::around(support.iter().map(|&id| position(id)), radius);
+    scratch.put(support.iter().map(|&id| position(id)));
+    let mut grid = Grid::around(&scratch.points, radius);
     if is_coarse(grid.inv_cell, radius) {
+        let mut fold = std::mem::take(&mut scratch.fold);
+        fold.clear();
         fold.find(radius, support.iter().map(|&id| position(id)));
-        grid = Grid::around(support.iter().map(|&id| fold.folded(position(id))), radius);
+        scratch.put(support.iter().map(|&id| fold.folded(position(id))));
+        scratch.fold = fold;
+        grid = Grid::around(&scratch.points, radius);
     }
-    scratch.sort(support, |id| fold.folded(position(id)), wanted, &grid);
-    scratch.fold = fold;
+    scratch.sort(support, wanted, &grid);
     let NormalScratch {
         sorted,
         candidates,
@@ -174,7 +170,8 @@ pub(crate) fn estimate(
             candidates.gather(sorted, cell as usize);
         }
         targets.push(entry.id);
-        batch.push(k, moments(entry.position, radius * radius, candidates));
+        let around = moments(sorted.position(k as usize), radius * radius, candidates);
+        batch.push(k, around);
         if batch.is_full() {
             batch.solve(planes);
         }
@@ -184,25 +181,36 @@ pub(crate) fn estimate(
 }
 
 impl NormalScratch {
+    /// Takes the coordinates of points.
+    fn put(&mut self, points: impl ExactSizeIterator<Item = Vec3>) {
+        let [x, y, z] = &mut self.points;
+        for coordinate in [&mut *x, &mut *y, &mut *z] {
+            coordinate.resize(points.len(), 0.0);
+        }
+        for (((x, y), z), point) in x.iter_mut().zip(y).zip(z).zip(points) {
+            (*x, *y, *z) = (point.x, point.y, point.z);
+        }
+    }
+
     /// Counting sort of the points by cell.
-    fn sort(
-        &mut self,
-        support: &[u32],
-        position: impl Fn(u32) -> Vec3,
-        wanted: impl Fn(usize) -> bool,
-        grid: &Grid,
-    ) {
-        let Self { cells, sorted, .. } = self;
+    fn sort(&mut self, support: &[u32], wanted: impl Fn(usize) -> bool, grid: &Grid) {
+        let Self {
+            points,
+            cells,
+            sorted,
+            ..
+        } = self;
         let Sorted {
             entries,
+            coordinates,
             offsets,
             dims,
         } = sorted;
         *dims = [grid.dims[0], grid.dims[1]];
         offsets.clear();
         offsets.resize(grid.cells() + 1, 0);
-        cells.clear();
-        cells.extend(support.iter().map(|&id| grid.cell(position(id))));
+        cells.resize(support.len(), 0);
+        locate(grid, points, cells);
         // Counts go one further, so that after the prefix sum an entry is its cell's cursor, and
         // after the sort its end: the next cell's first point.
         for &cell in &*cells {
@@ -214,15 +222,21 @@ impl NormalScratch {
             *offset = sum;
         }
         entries.resize(support.len(), Entry::default());
+        for coordinate in &mut *coordinates {
+            coordinate.resize(support.len() + RUN, 0.0);
+        }
         for (k, (&id, &cell)) in support.iter().zip(&*cells).enumerate().rev() {
             let cursor = &mut offsets[cell as usize + 1];
             *cursor -= 1;
-            entries[*cursor as usize] = Entry {
-                position: position(id),
+            let place = *cursor as usize;
+            entries[place] = Entry {
                 id,
                 cell,
                 wanted: wanted(k),
             };
+            for (to, from) in coordinates.iter_mut().zip(&*points) {
+                to[place] = from[k];
+            }
         }
         // Every entry has moved to its cell's first point, one index too far.
         offsets.copy_within(1.., 0);
@@ -233,6 +247,11 @@ impl NormalScratch {
 }
 
 impl Sorted {
+    /// Of the `k`-th point.
+    pub(super) fn position(&self, k: usize) -> Vec3 {
+        Vec3::from_array(self.coordinates.each_ref().map(|c| c[k]))
+    }
+
     /// The points whose normals are wanted.
     pub(super) fn wanted(&self) -> impl Iterator<Item = u32> {
         let all = self.entries.iter().zip(0..);
@@ -243,12 +262,7 @@ impl Sorted {
     /// [`MAX_CANDIDATES`] an even selection. Returns how many.
     #[inline(always)]
     pub(super) fn around(&self, cell: usize, mut put: impl FnMut(usize)) -> usize {
-        let [row, slice] = [self.dims[0], self.dims[0] * self.dims[1]];
-        // Three cells in a row along x are consecutive.
-        let rows: [Range<usize>; 9] = std::array::from_fn(|k| {
-            let first = cell + k / 3 * slice + k % 3 * row - slice - row - 1;
-            self.offsets[first] as usize..self.offsets[first + 3] as usize
-        });
+        let rows = self.rows(cell);
         let total: usize = rows.iter().map(|row| row.len()).sum();
         let step = total.div_ceil(MAX_CANDIDATES).max(1);
         let mut skip = 0;
@@ -262,31 +276,69 @@ impl Sorted {
         }
         total.div_ceil(step)
     }
+
+    /// The points in a cell and its neighbours: three cells in a row along x are consecutive.
+    #[inline(always)]
+    fn rows(&self, cell: usize) -> [Range<usize>; 9] {
+        let [row, slice] = [self.dims[0], self.dims[0] * self.dims[1]];
+        std::array::from_fn(|k| {
+            let first = cell + k / 3 * slice + k % 3 * row - slice - row - 1;
+            self.offsets[first] as usize..self.offsets[first + 3] as usize
+        })
+    }
 }
 
 impl Candidates {
     /// Collects the points of a cell and its neighbours, filled up to whole lanes with points out of
     /// reach.
     fn gather(&mut self, sorted: &Sorted, cell: usize) {
-        let Self { x, y, z, count } = self;
+        let rows = sorted.rows(cell);
+        let total: usize = rows.iter().map(|row| row.len()).sum();
         let mut n = 0;
-        let mut put = |p: Vec3| {
-            (x[n], y[n], z[n]) = (p.x, p.y, p.z);
-            n += 1;
-        };
-        let used = sorted.around(cell, |k| put(sorted.entries[k].position));
-        for _ in used..used.next_multiple_of(LANES) {
-            put(Vec3::INFINITY);
+        if total <= MAX_CANDIDATES {
+            for row in rows {
+                for first in row.clone().step_by(RUN) {
+                    let at = n + (first - row.start);
+                    for (to, from) in self.coordinates.iter_mut().zip(&sorted.coordinates) {
+                        to[at..at + RUN].copy_from_slice(&from[first..first + RUN]);
+                    }
+                }
+                n += row.len();
+            }
+        } else {
+            sorted.around(cell, |k| {
+                for (to, from) in self.coordinates.iter_mut().zip(&sorted.coordinates) {
+                    to[n] = from[k];
+                }
+                n += 1;
+            });
         }
-        *count = n;
+        self.count = n.next_multiple_of(LANES);
+        for to in &mut self.coordinates {
+            to[n..self.count].fill(f32::INFINITY);
+        }
     }
+}
+
+multiversioned! {
+/// Finds the cells of points.
+fn locate(grid: &Grid, [x, y, z]: &[Vec<f32>; 3], cells: &mut [u32]) {
+    let (min, most) = (grid.min, grid.dims.map(|d| d as f32 - 3.0));
+    let [width, height] = [grid.dims[0] as u32, grid.dims[1] as u32];
+    for (((x, y), z), cell) in x.iter().zip(y).zip(z).zip(cells) {
+        let x = 1 + truncated((x - min.x) * grid.inv_cell, most[0]);
+        let y = 1 + truncated((y - min.y) * grid.inv_cell, most[1]);
+        let z = 1 + truncated((z - min.z) * grid.inv_cell, most[2]);
+        *cell = (z * height + y) * width + x;
+    }
+}
 }
 
 multiversioned! {
 /// Of the candidates within the neighbourhood of `p`.
 fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> Moments {
     let mut sums = [[0.0f32; LANES]; 10];
-    let [x, y, z] = [&candidates.x, &candidates.y, &candidates.z].map(|c| c.as_chunks::<LANES>().0);
+    let [x, y, z] = candidates.coordinates.each_ref().map(|c| c.as_chunks::<LANES>().0);
     let chunks = x.iter().zip(y).zip(z).take(candidates.count / LANES);
     for ((x, y), z) in chunks {
         for l in 0..LANES {

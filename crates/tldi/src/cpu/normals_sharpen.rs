@@ -81,7 +81,7 @@ impl FlatPlanes {
         let mut count = 0;
         sorted.around(cell as usize, |k| {
             if planes[k].variance < misfit {
-                put(sorted.entries[k].position, &planes[k]);
+                put(sorted.position(k), &planes[k]);
                 count += 1;
             }
         });
@@ -122,7 +122,7 @@ pub(crate) fn sharpen(radius: f32, noise: f32, scratch: &mut NormalScratch, norm
                 continue;
             }
             for &k in in_cell {
-                let (point, own) = (sorted.entries[k as usize].position, &planes[k as usize]);
+                let (point, own) = (sorted.position(k as usize), &planes[k as usize]);
                 let Some((face, weight)) = mean(point, own, limits, flat) else {
                     continue;
                 };

@@ -15,11 +15,9 @@ pub use crate::cpu::zone::ZoneGrid;
 pub use crate::view::approach::{Approach, Body};
 pub use crate::view::camera_policy::MAX_VIEWS;
 
-/// Columns in which the surfaces are farther apart along the view than this many thicknesses, or
-/// prediction distances, are not drawn. A contact at the prediction distance is that far along the
-/// view if its normal is 60° off; beyond 60°, depths along the view are no distances. Surfaces that
-/// cross between neighbouring pixels are at most two thicknesses apart in both.
-const REACH: f32 = 2.0;
+/// Tangent of the largest angle (60°) between a normal and the view at which a contact at the prediction distance is
+/// found: beyond it, depths along the view are no distances. There, the surfaces are twice as far apart along the view.
+const STEEPEST: f32 = 1.732_050_8;
 
 /// Depth in pixels to which a body is searched that has sunk below all of a surface. Points that
 /// are culled in vain cost little, but two large clouds have many deeper points.
@@ -169,8 +167,13 @@ impl PairPlan {
 }
 
 /// See [`PairPlan::column_reach`].
+///
+/// It is the distance between the nearest points of both in a tile and around it, at least [`LEAST_TILE`] pixels on all
+/// sides. Surfaces that are inclined by 60° come nearer there, each by as much as it rises over these pixels.
 pub(crate) fn column_reach(params: &Params) -> f32 {
-    REACH * params.thickness.max(params.prediction)
+    let rise = STEEPEST * columns::LEAST_TILE as f32 * params.pixel_size;
+    let inclined = 2.0 * (params.prediction - rise);
+    params.thickness.max(params.prediction).max(inclined)
 }
 
 /// Least number of pixels across the smaller body, in its second longest extent. With fewer, a
