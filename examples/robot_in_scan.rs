@@ -58,7 +58,7 @@ struct Args {
     /// Leave points of the scan that lie on the robot where they are
     #[arg(long)]
     no_self_filter: bool,
-    /// Folder for initial.png, mid.png and final.png
+    /// Folder for initial.png, mid.png (most contacts), hardest.png (largest force) and final.png
     #[arg(long, value_name = "DIR", default_value = "out/robot_in_scan")]
     out: PathBuf,
     /// Also write motion.png, an animated PNG
@@ -142,9 +142,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(recording) = &mut recording {
         record_start(recording, &simulation, up)?;
     }
-    let snapshots = simulate(&mut simulation, args.steps, recording)?;
+    let (snapshots, hardest) = simulate(&mut simulation, args.steps, recording)?;
     let report = simulation.report();
-    draw(&simulation, up, &snapshots, args)?;
+    draw(&simulation, up, &snapshots, &hardest, args)?;
     if let Some(path) = &args.common.json {
         output::write_json(path, &report)?;
     }
@@ -173,12 +173,13 @@ fn load_robot(args: &Args) -> anyhow::Result<Description> {
     Ok(robot)
 }
 
-/// Takes all steps; a snapshot before the first, and after every [`ANIMATION_STEPS`].
+/// Takes all steps; a snapshot before the first, and after every [`ANIMATION_STEPS`], and one of the moment in which a
+/// link is pushed most.
 fn simulate(
     simulation: &mut RobotSimulation,
     steps: Option<usize>,
     mut recording: Option<Recording>,
-) -> anyhow::Result<Vec<RobotSnapshot>> {
+) -> anyhow::Result<(Vec<RobotSnapshot>, RobotSnapshot)> {
     let seconds = match simulation.motion_seconds() {
         seconds if seconds.is_finite() => (seconds + 0.5).min(LONGEST_SECONDS),
         _ => ENDLESS_SECONDS,
@@ -186,6 +187,7 @@ fn simulate(
     let steps = steps.unwrap_or((seconds / DT).ceil() as usize);
     let bar = output::progress_bar(steps, "steps");
     let mut snapshots = vec![simulation.snapshot()];
+    let mut hardest = (0.0, simulation.snapshot());
     for step in 1..=steps {
         (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
         if let Some(recording) = &mut recording {
@@ -196,10 +198,13 @@ fn simulate(
         if step % ANIMATION_STEPS == 0 || step == steps {
             snapshots.push(simulation.snapshot());
         }
+        if simulation.largest_force() > hardest.0 {
+            hardest = (simulation.largest_force(), simulation.snapshot());
+        }
         bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(snapshots)
+    Ok((snapshots, hardest.1))
 }
 
 /// The start, and a camera that sees the robot well.
@@ -223,6 +228,7 @@ fn draw(
     simulation: &RobotSimulation,
     up: Vec3,
     snapshots: &[RobotSnapshot],
+    hardest: &RobotSnapshot,
     args: &Args,
 ) -> anyhow::Result<()> {
     let scan = simulation.scan();
@@ -247,6 +253,7 @@ fn draw(
     for (snapshot, name) in [
         (initial, "initial.png"),
         (mid, "mid.png"),
+        (hardest, "hardest.png"),
         (last, "final.png"),
     ] {
         output::write_file(&args.out.join(name), &picture(snapshot, &large).to_png()?)?;

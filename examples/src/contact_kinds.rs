@@ -3,6 +3,7 @@
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::CloudContact;
 use serde::Serialize;
+use std::collections::HashSet;
 use std::io::{self, Write};
 use tldi::glamx::Vec3;
 
@@ -21,7 +22,7 @@ pub struct WorstContact {
 }
 
 /// The deepest contacts, by kind; null where nothing penetrated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ContactKinds {
     /// Between two things neither of which gives way, such as a hoof on a scripted path and the ground. It is as
     /// deep as the script says.
@@ -30,47 +31,56 @@ pub struct ContactKinds {
     /// step.
     pub squeezed: Option<WorstContact>,
     /// Of a body that what does not give way moves into, such as what comes into the view of a depth camera: it is
-    /// as deep as the way that it moved, less what the body gave way.
+    /// as deep as the way that it moved, less what the body gave way. It is that until the body is out again.
     pub pushed: Option<WorstContact>,
     /// Of all others, which the solver answers for.
     pub resting: Option<WorstContact>,
+    /// Bodies that something moved into and that are not out again.
+    #[serde(skip)]
+    inside: HashSet<ColliderHandle>,
 }
 
 impl ContactKinds {
     /// Counts the contacts of a step. `moved_in` says of a contact with what does not give way whether it has moved to
-    /// where it touches.
+    /// where it touches. A body is out again when no contact of it is deeper than what rapier leaves
+    /// (`allowed_linear_error`).
     pub fn count(
         &mut self,
         step: usize,
         contacts: &[CloudContact],
-        bodies: &RigidBodySet,
-        colliders: &ColliderSet,
+        world: &PhysicsWorld,
         moved_in: impl Fn(&CloudContact) -> bool,
     ) {
         let gives_way = |collider: ColliderHandle| {
-            let parent = colliders.get(collider).and_then(Collider::parent);
-            let body = parent.and_then(|parent| bodies.get(parent));
+            let parent = world.colliders.get(collider).and_then(Collider::parent);
+            let body = parent.and_then(|parent| world.bodies.get(parent));
             body.is_some_and(RigidBody::is_dynamic)
         };
-        // Bodies, where to what does not give way pushes them, and whether it moved there.
-        let pushes: Vec<(ColliderHandle, Vec3, bool)> = (contacts.iter())
+        // Contacts of bodies with what does not give way, and where to that pushes them.
+        let pushes: Vec<(ColliderHandle, Vec3, &CloudContact)> = (contacts.iter())
             .filter(|contact| contact.depth > 0.0)
             .filter_map(|c| match [c.collider1, c.collider2].map(gives_way) {
-                [false, true] => Some((c.collider2, c.normal, moved_in(c))),
-                [true, false] => Some((c.collider1, -c.normal, moved_in(c))),
+                [false, true] => Some((c.collider2, c.normal, c)),
+                [true, false] => Some((c.collider1, -c.normal, c)),
                 _ => None,
             })
             .collect();
+        let left = world.integration_parameters.allowed_linear_error();
+        let is_deep = |push: &&(ColliderHandle, Vec3, &CloudContact)| push.2.depth > left;
+        let still_deep: HashSet<ColliderHandle> =
+            (pushes.iter().filter(is_deep)).map(|push| push.0).collect();
+        self.inside.retain(|body| still_deep.contains(body));
+        let comes = pushes.iter().filter(|push| moved_in(push.2));
+        self.inside.extend(comes.map(|push| push.0));
         let own = |body: ColliderHandle| pushes.iter().filter(move |push| push.0 == body);
         let is_squeezed = |body| own(body).any(|a| own(body).any(|b| a.1.dot(b.1) < OPPOSED));
-        let is_pushed = |body| own(body).any(|push| push.2);
         for contact in contacts.iter().filter(|contact| contact.depth > 0.0) {
             let pair = [contact.collider1, contact.collider2];
             let worst = if !pair.into_iter().any(gives_way) {
                 &mut self.scripted
             } else if pair.into_iter().any(is_squeezed) {
                 &mut self.squeezed
-            } else if pair.into_iter().any(is_pushed) {
+            } else if pair.iter().any(|body| self.inside.contains(body)) {
                 &mut self.pushed
             } else {
                 &mut self.resting
@@ -121,12 +131,9 @@ mod tests {
     /// A hoof over the ground, and a body on it, then between the two: the depths are given.
     #[test]
     fn every_contact_is_of_its_kind() {
-        let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
-        let ground = colliders.insert(ColliderBuilder::ball(1.0));
-        let mut with = |builder: RigidBodyBuilder| {
-            let body = bodies.insert(builder);
-            colliders.insert_with_parent(ColliderBuilder::ball(1.0), body, &mut bodies)
-        };
+        let mut world = PhysicsWorld::default();
+        let ground = world.colliders.insert(ColliderBuilder::ball(1.0));
+        let mut with = |builder| world.insert(builder, ColliderBuilder::ball(1.0)).1;
         let hoof = with(RigidBodyBuilder::kinematic_velocity_based());
         let body = with(RigidBodyBuilder::dynamic());
         let contact = |collider1, collider2, normal, depth| CloudContact {
@@ -148,9 +155,9 @@ mod tests {
         let on_ground = contact(ground, body, Vec3::Y, 0.01);
         let stamped = contact(ground, hoof, Vec3::Y, 0.3);
         let still = |_: &CloudContact| false;
-        kinds.count(1, &[on_ground, stamped], &bodies, &colliders, still);
+        kinds.count(1, &[on_ground, stamped], &world, still);
         let gap = contact(ground, body, Vec3::Y, -0.01);
-        kinds.count(2, &[gap], &bodies, &colliders, still);
+        kinds.count(2, &[gap], &world, still);
         assert_eq!(
             (kinds.scripted, kinds.resting),
             (worst(0.3, 1), worst(0.01, 1))
@@ -158,7 +165,7 @@ mod tests {
         assert_eq!(kinds.squeezed, None);
         // The hoof comes from above: its normal leads from the hoof down into the body.
         let under_hoof = contact(hoof, body, -Vec3::Y, 0.2);
-        kinds.count(3, &[on_ground, under_hoof], &bodies, &colliders, still);
+        kinds.count(3, &[on_ground, under_hoof], &world, still);
         assert_eq!(
             (kinds.squeezed, kinds.resting),
             (worst(0.2, 3), worst(0.01, 1))
@@ -167,10 +174,26 @@ mod tests {
         // Something comes from the side: the body is not only resting, wherever it touches.
         let from_side = contact(ground, body, Vec3::X, 0.1);
         let comes = |c: &CloudContact| c.normal == Vec3::X;
-        kinds.count(4, &[on_ground, from_side], &bodies, &colliders, comes);
+        kinds.count(4, &[on_ground, from_side], &world, comes);
         assert_eq!(
             (kinds.pushed, kinds.resting),
             (worst(0.1, 4), worst(0.01, 1))
+        );
+        // What came stands still, and the body is still inside, even deeper: it is not resting yet.
+        let deeper = contact(ground, body, Vec3::X, 0.12);
+        kinds.count(5, &[on_ground, deeper], &world, still);
+        assert_eq!(
+            (kinds.pushed, kinds.resting),
+            (worst(0.12, 5), worst(0.01, 1))
+        );
+        // It is out when all that is left is what rapier leaves, a millimetre, and rests from then on.
+        let left = contact(ground, body, Vec3::Y, 0.0009);
+        kinds.count(6, &[left], &world, still);
+        let again = contact(ground, body, Vec3::Y, 0.02);
+        kinds.count(7, &[again], &world, still);
+        assert_eq!(
+            (kinds.pushed, kinds.resting),
+            (worst(0.12, 5), worst(0.02, 7))
         );
     }
 }

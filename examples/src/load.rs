@@ -2,9 +2,10 @@
 
 use crate::surface_sampling::SampledSurface;
 use anyhow::Context;
+use rayon::prelude::*;
 use std::path::Path;
 use tldi::glamx::Vec3;
-use tldi::{CloudBuilder, CloudError, PointCloud};
+use tldi::{CloudBuilder, CloudError, KdTree, PointCloud};
 
 /// Neighbours for the normals of a scan: enough to average the noise of a depth camera.
 const SCAN_NORMAL_NEIGHBORS: usize = 24;
@@ -89,16 +90,33 @@ pub fn default_size(file_size: f32, scan_radius: f32) -> f32 {
 
 /// Times the median radius of a cloud beyond which a point is on no surface: its seven nearest neighbours are
 /// that much farther away than those of other points. Half of it would take coarse parts of an uneven scan;
-/// with twice of it, a speck in the air would stay as a splat as large as a hand.
+/// with twice of it, dust in the air would stay as splats as large as a hand.
 const ON_NO_SURFACE: f32 = 8.0;
+/// Neighbours that are asked whether a point is among theirs: as many as radii are made of.
+const NEIGHBORS: usize = 7;
 
-/// The points of a scan that lie on a surface, by index: not those with radii that are many times those of
-/// others. Dust and flying pixels far from everything would be splats as large as a robot's links.
+/// The points of a scan that lie on a surface, by index. The points of a surface are neighbours of each other. Dust far
+/// from everything has a radius many times that of others. A speck just over a surface is none of the seven nearest of
+/// its own seven nearest. Either would be a splat as large as its distance: a foot's way into it is no depth.
 pub fn on_surfaces(scan: &PointCloud<'_>) -> Vec<bool> {
     let mut radii: Vec<f32> = (0..scan.len()).map(|i| scan.radius(i)).collect();
     let middle = radii.len() / 2;
     let most = ON_NO_SURFACE * *radii.select_nth_unstable_by(middle, f32::total_cmp).1;
-    (0..scan.len()).map(|i| scan.radius(i) <= most).collect()
+    let tree = KdTree::new(scan);
+    let neighbors_of = |i: usize| {
+        let mut near = Vec::with_capacity(NEIGHBORS + 1);
+        // The point itself is one of those nearest to it.
+        tree.k_nearest(scan.point(i), NEIGHBORS + 1, &mut near);
+        near.into_iter().map(|n| n.index).filter(move |n| *n != i)
+    };
+    let neighbors: Vec<Vec<usize>> = (0..scan.len())
+        .into_par_iter()
+        .map(|i| neighbors_of(i).take(NEIGHBORS).collect())
+        .collect();
+    let is_of_theirs = |i: usize| neighbors[i].iter().any(|n| neighbors[*n].contains(&i));
+    (0..scan.len())
+        .map(|i| scan.radius(i) <= most && is_of_theirs(i))
+        .collect()
 }
 
 /// The cloud moved so that its bounds are centred on its origin, and scaled so that its largest

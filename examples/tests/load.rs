@@ -2,7 +2,7 @@
 
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
-use tldi_examples::load::{resized, subset};
+use tldi_examples::load::{on_surfaces, resized, subset};
 
 #[test]
 fn a_resized_cloud_is_scaled_about_its_middle_and_so_are_its_radii() {
@@ -42,4 +42,24 @@ fn only_normals_with_a_side_count_as_such() {
             assert!(normals.iter().all(|n| n.z.abs() > 0.999));
         }
     }
+}
+
+/// A level grid, a hundred specks of dust over it and one far away: what lies on the surface is known. The specks are at
+/// least three spacings over the grid, and five apart.
+#[test]
+fn dust_and_specks_are_on_no_surface_and_the_surface_is() {
+    let grid = (0..3600).map(|k| Vec3::new((k % 60) as f32, (k / 60) as f32, 0.0));
+    let specks = (0..100).map(|k| {
+        let place = Vec3::new((k % 10) as f32, (k / 10) as f32, 0.0);
+        6.0 * place + Vec3::new(2.3, 2.4, 3.0 + 0.2 * (k % 7) as f32)
+    });
+    let dust = std::iter::once(Vec3::new(30.0, 30.0, 90.0));
+    let points: Vec<Vec3> = grid.chain(specks).chain(dust).collect();
+    let cloud = PointCloud::builder(points)
+        .knn_radii(7, 0.65)
+        .build()
+        .unwrap();
+    let on = on_surfaces(&cloud);
+    assert!(on[..3600].iter().all(|is_on| *is_on));
+    assert!(on[3600..].iter().all(|is_on| !is_on));
 }

@@ -261,8 +261,7 @@ impl DepthSimulation {
         let report = self.tldi.step(&mut self.world)?;
         self.totals.count(&report, report.pairs_in_contact > 0);
         self.max_penetration = self.max_penetration.max(report.max_penetration);
-        let (bodies, colliders) = (&self.world.bodies, &self.world.colliders);
-        let contacts = self.tldi.contacts(&self.world.narrow_phase, colliders);
+        let contacts = (self.tldi).contacts(&self.world.narrow_phase, &self.world.colliders);
         let contacts: Vec<_> = contacts.collect();
         let moved_in = |contact: &CloudContact| {
             // Where the surface is: up to half the depth beyond the middle between the two.
@@ -275,7 +274,7 @@ impl DepthSimulation {
             let mut former = self.former.iter();
             former.any(|(camera, from_world)| camera.sees_through(place, from_world))
         };
-        (self.deepest).count(self.totals.steps, &contacts, bodies, colliders, moved_in);
+        (self.deepest).count(self.totals.steps, &contacts, &self.world, moved_in);
         Ok(report.pairs_in_contact)
     }
 
@@ -320,7 +319,7 @@ impl DepthSimulation {
             frame_rate: 1.0 / (DT * STEPS_PER_FRAME as f32),
             up: self.up.to_array(),
             max_penetration: self.max_penetration,
-            deepest: self.deepest,
+            deepest: self.deepest.clone(),
             missing_frames,
             median_latency_ms: latency(last / 2),
             max_latency_ms: latency(last),

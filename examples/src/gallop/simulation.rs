@@ -160,10 +160,12 @@ impl GallopSimulation {
         self.max_penetration = self.max_penetration.max(report.max_penetration);
         let contacts = self.runner_contacts();
         self.totals.count(&report, !contacts.is_empty());
-        let (bodies, colliders) = (&self.world.bodies, &self.world.colliders);
-        let all = self.tldi.contacts(&self.world.narrow_phase, colliders);
+        let all = (self.tldi).contacts(&self.world.narrow_phase, &self.world.colliders);
         let all: Vec<_> = all.collect();
-        (self.deepest).count(self.totals.steps, &all, bodies, colliders, |_| false);
+        // Hooves move into bodies; waves only carry them.
+        let runner = self.runner.1;
+        let kicks = |c: &CloudContact| [c.collider1, c.collider2].contains(&runner);
+        (self.deepest).count(self.totals.steps, &all, &self.world, kicks);
         self.totals.add_wall_seconds(stepped.as_secs_f64());
         for body in &mut self.bodies {
             body.kicked |= contacts
@@ -235,7 +237,7 @@ impl GallopSimulation {
             mean_radius: self.mean_radius,
             speed: self.scene.speed,
             max_penetration: self.max_penetration,
-            deepest: self.deepest,
+            deepest: self.deepest.clone(),
             frames: self.frames.clone(),
             bodies: (self.bodies.iter())
                 .map(|body| {

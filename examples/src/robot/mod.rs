@@ -15,6 +15,7 @@ mod report;
 mod self_filter;
 mod simulation;
 mod standing;
+mod tally;
 
 pub use description::{BUILT_IN, Description, DescriptionError};
 pub use kinematics::{Aim, JointKind, JointModel, Kinematics};
@@ -23,7 +24,7 @@ pub use motion::{Motion, Waypoint};
 pub use placing::{NoPlace, Placement, Site, place};
 pub use plan::{Base, Tip};
 pub use quadruped::{Walk, quadruped};
-pub use report::{LinkReport, LooseBodyReport, RobotReport};
+pub use report::{Hardest, LinkReport, LooseBodyReport, RobotReport};
 pub use self_filter::SelfFilter;
 pub use simulation::{DT, RobotScene, RobotSimulation, RobotSnapshot};
 pub use standing::StandingReport;

@@ -53,6 +53,17 @@ pub struct LinkReport {
     pub max_force: f32,
     /// Mean contact force over the steps with contact, N.
     pub mean_force: f32,
+    /// When that largest force was, and what pushed; null if nothing touched it.
+    pub hardest: Option<Hardest>,
+}
+
+/// When a link was pushed most.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Hardest {
+    /// Number of the step, from 1.
+    pub step: usize,
+    /// What pushed most in it: the scan, a loose body or another link.
+    pub against: String,
 }
 
 /// One loose body.
@@ -80,13 +91,16 @@ impl RobotReport {
     pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(
             out,
-            "{:<28} {:>8} {:>14} {:>12} {:>12}",
+            "{:<28} {:>8} {:>14} {:>12} {:>12}  most pushed by",
             "link", "points", "contact steps", "max force N", "mean force N"
         )?;
         for link in &self.links {
+            let hardest = (link.hardest.as_ref()).map_or(String::new(), |hardest| {
+                format!("{} in step {}", hardest.against, hardest.step)
+            });
             writeln!(
                 out,
-                "{:<28} {:>8} {:>14} {:>12.1} {:>12.1}",
+                "{:<28} {:>8} {:>14} {:>12.1} {:>12.1}  {hardest}",
                 link.name, link.points, link.contact_steps, link.max_force, link.mean_force
             )?;
         }

@@ -9,6 +9,7 @@ use super::placing::{Site, place};
 use super::plan::{Base, Build, Tip, plan_motion, start_pose};
 use super::report::{LinkReport, RobotReport};
 use super::standing::Standing;
+use super::tally::{self, LinkTally};
 use super::{Motion, SelfFilter};
 use crate::load;
 use crate::step_totals::StepTotals;
@@ -106,17 +107,6 @@ pub struct RobotSimulation {
     standing: Option<Standing>,
     totals: StepTotals,
     max_penetration: f32,
-}
-
-/// Contacts of a link so far.
-#[derive(Clone, Copy, Default)]
-struct LinkTally {
-    touches: bool,
-    /// Contact force in the last step, N.
-    force: f32,
-    contact_steps: usize,
-    max_force: f32,
-    force_sum: f64,
 }
 
 impl RobotSimulation {
@@ -317,43 +307,31 @@ impl RobotSimulation {
     /// Adds to the tallies; gives whether the robot touches the scan or a loose body.
     fn count_contacts(&mut self) -> bool {
         let link_of: &HashMap<ColliderHandle, usize> = &self.assembled.cloud_of_collider;
-        let mut impulses = vec![Vec3::ZERO; self.clouds.len()];
-        let mut touches_world = false;
-        for tally in &mut self.tally {
-            tally.touches = false;
-            tally.force = 0.0;
+        let name_of = |collider: ColliderHandle| {
+            let body = self.loose.iter().find(|body| body.collider == collider);
+            match (body, link_of.get(&collider)) {
+                (Some(body), _) => body.name.clone(),
+                (None, Some(link)) => self.clouds[*link].name.clone(),
+                (None, None) => "scan".to_owned(),
+            }
+        };
+        let touched = tally::count(
+            &mut self.tally,
+            self.totals.steps + 1,
+            &self.world.narrow_phase,
+            |collider| link_of.get(&collider).copied(),
+            name_of,
+        );
+        for body in &mut self.loose {
+            body.touched |= touched.contains(&body.collider);
         }
-        for pair in self.world.narrow_phase.contact_pairs() {
-            let links = [pair.collider1, pair.collider2].map(|c| link_of.get(&c).copied());
-            if links == [None, None] || pair.total_impulse_magnitude() <= 0.0 {
-                continue;
-            }
-            for (link, sign) in links.iter().zip([-1.0, 1.0]) {
-                if let Some(link) = *link {
-                    impulses[link] += sign * pair.total_impulse();
-                    self.tally[link].touches = true;
-                }
-            }
-            let other = match links {
-                [None, Some(_)] => pair.collider1,
-                [Some(_), None] => pair.collider2,
-                _ => continue,
-            };
-            touches_world = true;
-            if let Some(body) = self.loose.iter_mut().find(|body| body.collider == other) {
-                body.touched = true;
-            }
-        }
-        for (tally, impulse) in self.tally.iter_mut().zip(impulses) {
-            if tally.touches {
-                let force = impulse.length() / DT;
-                tally.force = force;
-                tally.contact_steps += 1;
-                tally.max_force = tally.max_force.max(force);
-                tally.force_sum += f64::from(force);
-            }
-        }
-        touches_world
+        !touched.is_empty()
+    }
+
+    /// Contact force in N on the link that was pushed most in the last step.
+    pub fn largest_force(&self) -> f32 {
+        let forces = self.tally.iter().map(|tally| tally.force);
+        forces.fold(0.0, f32::max)
     }
 
     fn observe_standing(&mut self) {
@@ -421,13 +399,8 @@ impl RobotSimulation {
 
     /// What happened so far.
     pub fn report(&self) -> RobotReport {
-        let link = |(link, tally): (&LinkCloud, &LinkTally)| LinkReport {
-            name: link.name.clone(),
-            points: link.cloud.len(),
-            contact_steps: tally.contact_steps,
-            max_force: tally.max_force,
-            mean_force: (tally.force_sum / tally.contact_steps.max(1) as f64) as f32,
-        };
+        let link =
+            |(link, tally): (&LinkCloud, &LinkTally)| tally.report(&link.name, link.cloud.len());
         let links: Vec<LinkReport> = self.clouds.iter().zip(&self.tally).map(link).collect();
         RobotReport {
             totals: self.totals.clone(),
