@@ -2,8 +2,8 @@
 
 use super::error::ChartError;
 use super::figure::{Axis, Color, Curve, Entry, Figure, Line, Look, Mark, Panel, Point};
+use super::gpu_figure::{figure, points};
 use super::gpu_layers::layers;
-use super::origin::origin;
 use super::{looks, paint};
 use crate::gpu_day::{Bin, Dispatches, Moved, Report, Shown, Workload};
 use std::path::{Path, PathBuf};
@@ -27,39 +27,8 @@ pub(crate) fn draw(report: &Report, shown: &Shown, out: &Path) -> Result<Vec<Pat
     Ok(files)
 }
 
-pub(super) fn figure(
-    report: &Report,
-    name: &str,
-    title: &str,
-    panels: Vec<Panel>,
-) -> Option<Figure> {
-    let has_points = |panel: &Panel| panel.curves.iter().any(|curve| !curve.points.is_empty());
-    panels.iter().any(has_points).then(|| Figure {
-        name: format!("gpu_day_{name}"),
-        title: title.to_owned(),
-        subtitle: vec![format!(
-            "{} ({}, {} {})",
-            report.card.name, report.card.api, report.card.driver, report.card.driver_info
-        )],
-        columns: panels.len().min(3),
-        panels,
-        panel_size: [400, 330],
-        legend: Vec::new(),
-        notes: vec![origin([&report.provenance])],
-    })
-}
-
 fn look(index: usize) -> Look {
     looks::placement_look(index)
-}
-
-pub(super) fn points(values: impl Iterator<Item = (f64, f64)>) -> Vec<Point> {
-    let plain = values.map(|(x, y)| Point {
-        x,
-        y,
-        ..Point::default()
-    });
-    plain.collect()
 }
 
 /// A panel of curves with both axes logarithmic.

@@ -1,7 +1,7 @@
 //! One row of pixels of a run of `gpu_day`: layers, and the contacts that the device found on them.
 
 use super::figure::{Axis, Color, Curve, Entry, Figure, Line, Look, Mark, Panel};
-use super::gpu_day::{figure, points};
+use super::gpu_figure::{figure, points};
 use crate::gpu_day::{Report, Shown};
 
 const OF_CLOUDS: [Color; 2] = [[90, 140, 200], [220, 130, 60]];

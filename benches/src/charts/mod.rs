@@ -7,6 +7,7 @@ mod figure;
 mod frames;
 mod front;
 pub(crate) mod gpu_day;
+mod gpu_figure;
 mod gpu_layers;
 mod looks;
 mod origin;
