@@ -1,7 +1,7 @@
 //! The bowl that gaps form around the contact of a round surface: where it is lowest, and how
 //! certain that is.
 
-use crate::contact::supports::ramp;
+use crate::contact::ramp::ramp;
 use crate::{ContactPixel, ContactPoint};
 use glamx::{Vec2, Vec3};
 

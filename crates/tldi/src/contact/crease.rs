@@ -5,7 +5,7 @@
 //! where the planes of the faces meet. An edge that is rounded by less than two pixels counts as
 //! sharp, because in its pixels all edges are round.
 
-use crate::contact::supports::ramp;
+use crate::contact::ramp::ramp;
 use crate::{ContactPixel, ContactPoint};
 use arrayvec::ArrayVec;
 use glamx::{Mat3, Vec2, Vec3};

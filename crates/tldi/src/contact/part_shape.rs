@@ -3,7 +3,7 @@
 use crate::contact::bowl::{Floor, GAP_PER_SLOPE, Lowest, relative_radius, slope_error};
 use crate::contact::crease::{Face, Frame, lower_by};
 use crate::contact::links::Links;
-use crate::contact::patches::Smooth;
+use crate::contact::smooth::{Smooth, common_normal};
 use crate::contact::supports::{longest_axis, supports};
 use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, Params};
 use glamx::Vec3;
@@ -50,11 +50,6 @@ const OFF_PLANE: f32 = 0.4;
 /// of faces of at least so many pixels go to the mean of themselves and their linked neighbours, which is as far
 /// inwards at a rim or a corner, and nowhere within.
 const LEAST_INWARDS: usize = 12;
-
-/// Variance (1 − mean length) that a surface's normals are taken to have at least, 1.4°: keeps the weights
-/// of two perfectly flat surfaces finite. Were it 0.01, a box's sides, which a moving view sees as
-/// well, would tilt the normal by 0.6°, and a floor brake what slides over it by 2 % more.
-const LEAST_VARIANCE: f32 = 3e-4;
 
 /// Normal and main direction of a part.
 pub(crate) struct Shape {
@@ -281,17 +276,6 @@ impl Shape {
             gap,
         }
     }
-}
-
-/// Unit normal from the first surface towards the second. It is the mean of both surfaces' mean
-/// normals, weighted by the inverse of their variances. So a face decides at an edge, and the
-/// smooth side decides on a noisy scan.
-pub(crate) fn common_normal(mean_a: Vec3, mean_b: Vec3) -> Option<Vec3> {
-    let weighted = |mean: Vec3| {
-        let spread = (1.0 - mean.length()).max(0.0);
-        mean.normalize_or_zero() / (spread + LEAST_VARIANCE)
-    };
-    (weighted(mean_a) - weighted(mean_b)).try_normalize()
 }
 
 /// Weight of a gap `above` the smallest one: 1 there, falling smoothly to 0 at `band`.

@@ -4,11 +4,11 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
-use crate::contact::gap_fit::GapFit;
 use crate::contact::links::{Groups, Links, join, root};
 use crate::contact::lone_points::{Culled, LonePoints};
 use crate::contact::noise::allow_for_noise;
-use crate::contact::part_shape::{Pixels, Shape, ShapeScratch, common_normal};
+use crate::contact::part_shape::{Pixels, Shape, ShapeScratch};
+use crate::contact::smooth::{Smooth, smooth};
 use crate::contact::way_out::WayOut;
 use crate::cpu::sweep::SAME_FACE;
 use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params};
@@ -36,16 +36,6 @@ const MAX_SPLITS: u32 = 3;
 /// takes (rapier merges manifolds within 5.1° and keeps the deepest points, which need not be those
 /// that bear the load).
 pub const SAME_PLANE: f32 = 0.985;
-
-/// A contact pixel after averaging over its linked neighbours.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Smooth {
-    pub(crate) gap: f32,
-    pub(crate) normal_a: Vec3,
-    pub(crate) normal_b: Vec3,
-    /// Unit normal from the first surface towards the second.
-    pub(crate) normal: Vec3,
-}
 
 /// Memory of [`PatchScratch::reduce`], kept from call to call.
 #[derive(Debug, Default)]
@@ -135,7 +125,7 @@ impl PatchScratch {
         if contacts.is_empty() {
             return;
         }
-        self.smooth(contacts);
+        smooth(contacts, &self.links, &mut self.smooth);
         self.group();
         self.groups.sort(&self.group);
         self.stack.clear();
@@ -240,28 +230,6 @@ impl PatchScratch {
             links: &self.links,
         };
         shape.patch(members, &pixels, &mut self.shape, params)
-    }
-
-    /// Averages normals over linked neighbours and fits the gaps to them. A third of a sensor's
-    /// noise is left.
-    fn smooth(&mut self, contacts: &[ContactPixel]) {
-        let mut fit = GapFit::default();
-        for (k, contact) in contacts.iter().enumerate() {
-            let (mut normal_a, mut normal_b) = (contact.normal_a, contact.normal_b);
-            let neighbors = self.links.neighbors(k as u32);
-            for neighbor in neighbors.iter().map(|&l| &contacts[l as usize]) {
-                normal_a += neighbor.normal_a;
-                normal_b += neighbor.normal_b;
-            }
-            let count = 1.0 + neighbors.len() as f32;
-            let (normal_a, normal_b) = (normal_a / count, normal_b / count);
-            self.smooth.push(Smooth {
-                gap: fit.gap(k as u32, contacts, &self.links),
-                normal_a,
-                normal_b,
-                normal: common_normal(normal_a, normal_b).unwrap_or_else(|| contact.normal()),
-            });
-        }
     }
 
     /// Union-find over linked pixels of like normal.

@@ -2,6 +2,7 @@
 
 use crate::contact::bowl::{Bowl, Floor, Lowest, Valley};
 use crate::contact::main_plane::Plane;
+use crate::contact::ramp::ramp;
 use crate::{ContactPoint, PATCH_POINTS};
 use arrayvec::ArrayVec;
 use glamx::{Vec2, Vec3};
@@ -216,11 +217,6 @@ fn corner_angle(places: impl Iterator<Item = Vec2>) -> f32 {
         square.rotate(square)
     };
     0.25 * places.map(fourth_power).sum::<Vec2>().to_angle()
-}
-
-/// 0 up to `start`, 1 from `end` on.
-pub(crate) fn ramp(value: f32, [start, end]: [f32; 2]) -> f32 {
-    ((value - start) / (end - start)).clamp(0.0, 1.0)
 }
 
 /// Direction across `normal`, of unit length, in which points about `centre` extend the most.

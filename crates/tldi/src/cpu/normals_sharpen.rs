@@ -9,7 +9,7 @@
 use super::lanes::multiversioned;
 use super::normals::{LANES, MAX_CANDIDATES, NormalScratch, SUPPORT, Sorted};
 use super::planes::Plane;
-use crate::contact::supports::ramp;
+use crate::contact::ramp::ramp;
 use glamx::Vec3;
 
 /// Standard deviation of neighbours from their plane, in mean radii, up to which they are on it: a tenth of
