@@ -541,7 +541,26 @@ mod tests {
                 let expected: Vec<Vec3> = moved.filter(is_kept).collect();
                 let (mut kept, mut scratch) = (Survivors::default(), CullScratch::default());
                 let frame = &frame_from_cloud;
+                let wide = Region {
+                    overlap: aabb(9.0),
+                    other_bounds: aabb(9.0),
+                    ..region
+                };
+                let (mut all, mut third) = (Survivors::default(), Survivors::default());
+                cull(&cloud, frame, &wide, 1, &mut scratch, &mut all);
+                cull(&cloud, frame, &region, 3, &mut scratch, &mut third);
                 cull(&cloud, frame, &region, 1, &mut scratch, &mut kept);
+                let mut selected = Survivors::default();
+                selected.select(&all, &region);
+                assert_eq!(selected.index, kept.index);
+                assert_eq!(selected.x, kept.x);
+                let is_taken = |&i: &u32| {
+                    let (block, place) = (i as usize / BLOCK, i as usize % BLOCK);
+                    let first = first_taken(block, 3);
+                    place >= first && (place - first).is_multiple_of(3)
+                };
+                let thirds = kept.index.iter().copied().filter(is_taken);
+                assert!(thirds.eq(third.index.iter().copied()));
                 assert_eq!(kept.len(), expected.len());
                 for (k, &p) in expected.iter().enumerate() {
                     // Rotations by quaternions and by matrices differ by rounding.
