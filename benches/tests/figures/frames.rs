@@ -165,3 +165,35 @@ fn work_of_the_bumpy_ball() {
     );
     done(wrong);
 }
+
+/// A plain build, and one with all instructions of the machine.
+#[test]
+fn frames_with_the_same_instruction_sets() {
+    let page = page("docs/benchmarks.md");
+    let mut wrong = Vec::new();
+    let builds = ["plain", "native"].map(|build| {
+        let rows = stored(&format!("instruction_sets/{build}.json"));
+        assert!(rows.iter().all(|row| row["quartiles_ms"].is_array()));
+        rows
+    });
+    Table::new(&page, "`RUSTFLAGS=\"-C target-cpu=native\"`").check(
+        &mut wrong,
+        |_| true,
+        |name, k| {
+            let method = match name {
+                "bit grid, culled" => "bit grid, culled",
+                "grid, culled" => "grid (counting sort), culled",
+                "voxels, culled" => "voxels rebuild, culled",
+                "BVH rebuild, binned, culled" => "bvh rebuild (binned), culled",
+                "kiddo, culled" => "k-d tree rebuild (kiddo), culled",
+                other => panic!("no method {other:?}"),
+            };
+            let ratio = |rows: &Vec<Value>| {
+                let of = |method| frame(rows, Some(134_000), method, 1, k)[0];
+                of("tldi (cpu)") / of(method)
+            };
+            Some(builds.iter().map(ratio).collect())
+        },
+    );
+    done(wrong);
+}
