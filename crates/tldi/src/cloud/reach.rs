@@ -5,7 +5,7 @@
 //! near. In an even cloud, all points reach as far as the mean radius. In an
 //! [uneven](PointCloud::is_uneven) one, they reach at least that far.
 
-use crate::pair::plan::largest_pixel;
+use crate::pair::pixels::largest_pixel;
 use crate::{Params, PointCloud, Radii, Surface};
 
 /// How many times as large as `expected` a mean radius is where surfaces are near: the nearest

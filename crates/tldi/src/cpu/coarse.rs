@@ -9,7 +9,9 @@ use super::cells::CellImaging;
 use super::compare::{self, Crossings, Seen};
 use super::pair::{CommonPixels, Scratch};
 use super::side::CloudView;
-use crate::pair::plan::{PairPlan, largest_pixel, ring, stride};
+use crate::pair::pixels::largest_pixel;
+use crate::pair::plan::{PairPlan, ring};
+use crate::pair::sampling::stride;
 use crate::view::camera_policy::{MAX_VIEWS, aim};
 use crate::{
     Aabb, BLOCK, PairQuery, PairResult, Params, Surface, Tldi, Variant, View, VirtualCamera,

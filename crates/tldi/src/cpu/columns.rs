@@ -10,7 +10,7 @@ use super::fold::{FARTHEST_PIXEL, ViewFold};
 use super::lanes::{bounds, multiversioned, truncated};
 use super::rect::{Footprint, Rect};
 use super::splat::splat_radius;
-use crate::pair::plan::AIM_SAMPLES;
+use crate::pair::sampling::AIM_SAMPLES;
 use crate::{Projection, VirtualCamera};
 use glamx::{Mat3, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;

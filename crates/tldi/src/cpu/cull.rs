@@ -12,7 +12,7 @@
 use super::fold::SpaceFold;
 use super::lanes::multiversioned;
 use crate::cloud::reach::{Ring, Uneven};
-use crate::pair::plan::first_taken;
+use crate::pair::sampling::first_taken;
 use crate::{Aabb, BLOCK, PointCloud, Radii};
 use glamx::{Mat3, Pose3, Vec3};
 use rayon::prelude::*;

@@ -12,7 +12,8 @@ use super::side::{CloudView, ExactView, Scope};
 use super::splat::splat_radius;
 use super::sweep::is_edge_on;
 use crate::contact::lone_points::is_alone;
-use crate::pair::plan::{ring, stride};
+use crate::pair::plan::ring;
+use crate::pair::sampling::stride;
 use crate::{
     Aabb, Facing, Impact, ImpactQuery, Layer, Params, Penetration, Surface, Tldi, VirtualCamera,
 };

@@ -11,7 +11,7 @@ use super::normals;
 use super::rect::Rect;
 use super::side::Side;
 use super::zone::ZoneGrid;
-use crate::pair::plan::{AIM_SAMPLES, is_aim_sample};
+use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
 use crate::{Aabb, PointCloud, RaySurface, VirtualCamera};
 use glamx::{Pose3, Vec3};
 

@@ -14,7 +14,8 @@ use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneScratch, ZoneSide};
 use crate::cloud::reach::Place;
 use crate::contact::patches::PatchScratch;
-use crate::pair::plan::{Approach, PairPlan, SidePlan, column_reach, stride};
+use crate::pair::plan::{Approach, PairPlan, SidePlan, column_reach};
+use crate::pair::sampling::stride;
 use crate::view::camera_policy::{MAX_VIEWS, ZoneNormals, aim, further_axes, seen_from_behind};
 use crate::{
     CameraPolicy, Looked, PairQuery, PairResult, RayHit, Surface, Variant, View, VirtualCamera,

@@ -14,7 +14,8 @@ use super::room::{Cost, Room};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
 use super::sweep;
 use crate::contact::lone_points::Culled;
-use crate::pair::plan::{AIM_SAMPLES, SidePlan, is_aim_sample};
+use crate::pair::plan::SidePlan;
+use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
 use crate::{Params, PointCloud, RayHit, Tldi, VirtualCamera};
 use glamx::{DVec3, Mat3, Pose3, Vec3};
 

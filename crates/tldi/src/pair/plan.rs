@@ -1,10 +1,8 @@
-//! What is known about a pair before any of its points is read, and the constants of the stages.
-//! All backends start from here.
+//! What is known about a pair before any of its points is read. All backends start from here.
 
 use crate::cloud::reach::{Ring, farthest};
-use crate::cpu::{columns, compare, normals, normals_sharpen, planes, splat, sweep};
-use crate::view::{approach, camera_policy};
-use crate::{Aabb, BLOCK, PairQuery, Params, PointCloud, Surface, View};
+use crate::cpu::{columns, normals};
+use crate::{Aabb, PairQuery, Params, Surface, View};
 use glamx::{Pose3, Vec3};
 
 pub use crate::cpu::compare::CROSSED;
@@ -12,6 +10,9 @@ pub use crate::cpu::cull::Region;
 pub use crate::cpu::normals::SUPPORT;
 pub use crate::cpu::splat::DepthScale;
 pub use crate::cpu::zone::ZoneGrid;
+pub use crate::pair::pixels::{largest_pixel, least_pixel};
+pub use crate::pair::sampling::{AIM_SAMPLES, first_taken, is_aim_sample, stride};
+pub use crate::pair::stage_constants::stage_constants;
 pub use crate::view::approach::{Approach, Body};
 pub use crate::view::camera_policy::MAX_VIEWS;
 
@@ -22,28 +23,6 @@ const STEEPEST: f32 = 1.732_050_8;
 /// Depth in pixels to which a body is searched that has sunk below all of a surface. Points that
 /// are culled in vain cost little, but two large clouds have many deeper points.
 const SUNK: f32 = 16.0;
-
-/// Points that are kept per pixel of a surface seen face on: enough for the mean of a layer. With 1,
-/// coarse pixels cost a tenth, but bodies fall asleep later on scans.
-const POINTS_PER_PIXEL: f32 = 8.0;
-
-/// Most near points of a cloud whose normals aim the camera, or that are projected onto an exact
-/// surface to aim it; more do not sharpen the mean of their normals.
-pub const AIM_SAMPLES: usize = 512;
-
-/// Whether the normal at a near point is one of those that aim the camera. About every `step`-th
-/// is. The point's index in its cloud decides, so the order in which points are found does not
-/// matter.
-pub fn is_aim_sample(index: u32, step: u32) -> bool {
-    hash(index).is_multiple_of(step.max(1))
-}
-
-/// A mixing of the bits without structure, so that none of a grid of points meets it.
-fn hash(index: u32) -> u32 {
-    let mut hash = (index ^ (index >> 16)).wrapping_mul(0x7feb_352d);
-    hash = (hash ^ (hash >> 15)).wrapping_mul(0x846c_a68b);
-    hash ^ (hash >> 16)
-}
 
 /// What a pair's stages `cull`, `zone` and `aim` need beside the points.
 #[derive(Clone, Debug)]
@@ -176,60 +155,6 @@ pub(crate) fn column_reach(params: &Params) -> f32 {
     params.thickness.max(params.prediction).max(inclined)
 }
 
-/// Least number of pixels across the smaller body, in its second longest extent. With fewer, a
-/// penetration looks like the noise of single rays. There are fewer only if the body's own points
-/// are no finer.
-const LEAST_PIXELS: f32 = 8.0;
-
-/// Edge in metres of the largest pixels that resolve a body of these extents, metres, whose points have this mean
-/// radius, metres: eight across its second longest extent, or as large as its points. Cost: O(1).
-///
-/// ```
-/// use tldi::{glamx::Vec3, plan::largest_pixel};
-/// let ruler = Vec3::new(0.3, 0.04, 0.005);
-/// assert_eq!(largest_pixel(ruler, 0.001), 0.005);
-/// assert_eq!(largest_pixel(ruler, 0.02), 0.02);
-/// ```
-pub fn largest_pixel(extents: Vec3, radius: f32) -> f32 {
-    let mut extents = extents.to_array();
-    extents.sort_by(f32::total_cmp);
-    (extents[1] / LEAST_PIXELS).max(radius)
-}
-
-/// Most pixels from a cloud's origin to a point: an `i32` holds eight times as many. Only pixels far smaller than radii
-/// have more, since coordinates have no more than 2¹⁹ radii.
-const MOST_PIXELS: f32 = (1 << 28) as f32;
-
-/// The smallest pixels, metres, that can be counted from the cloud's origin to its points. Cost: O(1).
-///
-/// ```
-/// use tldi::{PointCloud, glamx::Vec3, plan::least_pixel};
-/// let cloud = PointCloud::builder(vec![127.0 * Vec3::X]).radius(1.0).build()?;
-/// assert_eq!(least_pixel(&cloud), 128.0 / 2f32.powi(28));
-/// # Ok::<(), tldi::CloudError>(())
-/// ```
-pub fn least_pixel(cloud: &PointCloud) -> f32 {
-    let bounds = cloud.bounds();
-    let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
-    (farthest + cloud.max_radius()) / MOST_PIXELS
-}
-
-/// Every how many points of a cloud of this mean radius are enough for pixels of this size, metres.
-///
-/// With radii of 0.65 × the distance of the 7th neighbour there are 0.94 (pixel / r̄)² points to a
-/// pixel.
-pub fn stride(mean_radius: f32, pixel_size: f32) -> usize {
-    let per_pixel = 0.94 * (pixel_size / mean_radius).powi(2);
-    ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
-}
-
-/// The first point that is taken of a cloud's `block`-th block, less than `stride`. It differs from
-/// block to block. Otherwise only some columns would remain of a depth image, whose rows may fill
-/// whole blocks.
-pub fn first_taken(block: usize, stride: usize) -> usize {
-    hash(block as u32) as usize % stride
-}
-
 /// Whether the bounds are within `reach` metres of each other in the frames of both surfaces.
 fn within_reach(query: &PairQuery, reach: f32) -> bool {
     let (a, b) = (query.a.bounds().loosened(reach), query.b.bounds());
@@ -284,20 +209,4 @@ fn middles(query: &PairQuery) -> [Option<Vec3>; 2] {
         (size_a <= size_b).then(|| a.center()),
         (size_b <= size_a).then(|| query.a_from_b * b.center()),
     ]
-}
-
-/// The numbers of the stages, by the names of the override constants that a GPU backend's shaders
-/// declare for them.
-pub fn stage_constants() -> Vec<(&'static str, f64)> {
-    let mut all = vec![("BLOCK", BLOCK as f64), ("AIM_SAMPLES", AIM_SAMPLES as f64)];
-    all.extend(normals::CONSTANTS);
-    all.extend(planes::CONSTANTS);
-    all.extend(normals_sharpen::CONSTANTS);
-    all.extend(splat::CONSTANTS);
-    all.extend(sweep::CONSTANTS);
-    all.extend(columns::CONSTANTS);
-    all.extend(compare::CONSTANTS);
-    all.extend(camera_policy::CONSTANTS);
-    all.extend(approach::CONSTANTS);
-    all
 }

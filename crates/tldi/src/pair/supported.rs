@@ -1,6 +1,6 @@
 //! Which pairs can be compared, and why others cannot.
 
-use crate::pair::plan::least_pixel;
+use crate::pair::pixels::least_pixel;
 use crate::{ImpactQuery, PairQuery, Params, Projection, Surface, Variant, View, paper};
 use glamx::Vec3;
 use std::ops::RangeInclusive;

@@ -1,0 +1,22 @@
+//! The numbers of the stages, for backends on a device.
+
+use crate::BLOCK;
+use crate::cpu::{columns, compare, normals, normals_sharpen, planes, splat, sweep};
+use crate::pair::sampling::AIM_SAMPLES;
+use crate::view::{approach, camera_policy};
+
+/// The numbers of the stages, by the names of the override constants that a GPU backend's shaders
+/// declare for them.
+pub fn stage_constants() -> Vec<(&'static str, f64)> {
+    let mut all = vec![("BLOCK", BLOCK as f64), ("AIM_SAMPLES", AIM_SAMPLES as f64)];
+    all.extend(normals::CONSTANTS);
+    all.extend(planes::CONSTANTS);
+    all.extend(normals_sharpen::CONSTANTS);
+    all.extend(splat::CONSTANTS);
+    all.extend(sweep::CONSTANTS);
+    all.extend(columns::CONSTANTS);
+    all.extend(compare::CONSTANTS);
+    all.extend(camera_policy::CONSTANTS);
+    all.extend(approach::CONSTANTS);
+    all
+}
