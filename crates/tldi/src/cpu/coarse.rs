@@ -7,15 +7,14 @@
 
 use super::cells::CellImaging;
 use super::compare::{self, Crossings, Seen};
-use super::pair::{CommonPixels, Scratch};
+use super::scratch::{CommonPixels, Scratch};
 use super::side::CloudView;
+use super::window::Window;
 use crate::pair::pixels::largest_pixel;
-use crate::pair::plan::{PairPlan, ring};
+use crate::pair::plan::PairPlan;
 use crate::pair::sampling::stride;
 use crate::view::camera_policy::{MAX_VIEWS, aim};
-use crate::{
-    Aabb, BLOCK, PairQuery, PairResult, Params, Surface, Tldi, Variant, View, VirtualCamera,
-};
+use crate::{BLOCK, PairQuery, PairResult, Params, Surface, Tldi, Variant, View, VirtualCamera};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
 
@@ -36,55 +35,9 @@ const THROUGH: f32 = 3.0;
 /// points one in seven. Twice as many take twice the time.
 const POINTS_PER_PIXEL: f32 = 4.0;
 
-/// Edge of a window, in pixels. Windows of 32 take twice the time and prove the same.
-const WINDOW: f32 = 16.0;
-
 /// Most windows that are drawn. In all measured frames, the first window proves a real crossing.
 /// The others are for large pixels that only seem to cross, where limbs are close.
 const MOST_WINDOWS: usize = 3;
-
-/// A cube of a view's frame in which surfaces swap their order.
-#[derive(Clone, Copy)]
-pub(super) struct Window {
-    view: usize,
-    /// Place along columns, rows and depth, in edges of a window.
-    cube: [i32; 3],
-    /// Pairs of neighbouring large pixels between which they do.
-    swaps: u32,
-}
-
-impl Window {
-    /// Edge, metres.
-    fn edge(query: &PairQuery) -> f32 {
-        WINDOW * query.params.pixel_size
-    }
-
-    /// The view of it, with the pixel grid of the look at all of the contact zone: it starts at a whole number of pixels.
-    fn camera(&self, query: &PairQuery, axes: &[Vec3]) -> VirtualCamera {
-        let mut camera = VirtualCamera::along(axes[self.view], query.params.pixel_size);
-        let [x, y, _] = self.cube.map(|c| c as f32);
-        camera.view_from_frame.translation = -Self::edge(query) * Vec3::new(x, y, 0.0);
-        camera.size = Some([WINDOW as u32; 2]);
-        camera
-    }
-
-    /// The plan of the pair for what `camera` sees of it.
-    fn plan(&self, query: &PairQuery, plan: &PairPlan, camera: &VirtualCamera) -> PairPlan {
-        let edge = Self::edge(query);
-        let near = edge * self.cube[2] as f32;
-        let cube = Aabb {
-            min: Vec3::new(0.0, 0.0, near),
-            max: Vec3::new(edge, edge, near + edge),
-        };
-        let [a, b] = [&query.a, &query.b].map(|surface| ring(surface, &query.params).widest());
-        let mut plan = plan.clone();
-        for side in &mut plan.sides {
-            side.region.other_from_frame = camera.view_from_frame;
-            side.region.other_bounds = cube.loosened(a.max(b));
-        }
-        plan
-    }
-}
 
 /// What a first look came to.
 pub(super) enum FirstLook {

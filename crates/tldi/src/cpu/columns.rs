@@ -9,7 +9,7 @@ use super::cull::Survivors;
 use super::fold::{FARTHEST_PIXEL, ViewFold};
 use super::lanes::{bounds, multiversioned, truncated};
 use super::rect::{Footprint, Rect};
-use super::splat::splat_radius;
+use super::splat_radius::splat_radius;
 use crate::pair::sampling::AIM_SAMPLES;
 use crate::{Projection, VirtualCamera};
 use glamx::{Mat3, Vec3};

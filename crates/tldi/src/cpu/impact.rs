@@ -4,80 +4,24 @@
 //! ray enters the other one. The least of these distances is the distance to the impact. The images hold all that the
 //! motion passes, so no surface is too thin, and none too fast.
 
-use super::columns::{Columns, dilate};
+use super::core::{BORDER, CORE, OUTSIDE, RIM};
 use super::cull::{self, PointRadii, Region};
-use super::near_exact::Placed;
-use super::pair::Scratch;
+use super::meeting::Meeting;
+use super::placed::Placed;
+use super::scratch::Scratch;
 use super::side::{CloudView, ExactView, Scope};
-use super::splat::splat_radius;
 use super::sweep::is_edge_on;
 use crate::contact::lone_points::is_alone;
 use crate::pair::plan::ring;
 use crate::pair::sampling::stride;
-use crate::{
-    Aabb, Facing, Impact, ImpactQuery, Layer, Params, Penetration, Surface, Tldi, VirtualCamera,
-};
+use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Penetration, Surface, VirtualCamera};
 use glamx::{Pose3, Vec3};
-
-/// Width in pixels of the rim that [`ImpactQuery::core_only`] leaves out. Splats stand out by one pixel on either side,
-/// and one more is for roughness. A surface missed in the rim penetrates by at most that pixel, and contacts push it
-/// out again.
-const RIM: i32 = 3;
-
-/// Width in pixels of the outer rim, which is always left out: a splat of either side stands out by that much. The inner
-/// rim stops a motion only if it would go on, past what it meets there, by more than the whole rim.
-const OUTER_RIM: u8 = 2;
-
-/// Pixels added around an image so that a rim shows there: its width, and one for closing gaps.
-pub(super) const BORDER: i32 = RIM + 1;
 
 /// Normals are averaged over the pixels whose distance is within this many pixels of the least.
 const NORMAL_BAND: f32 = 0.5;
 
 /// Least cosine between the normal of a penetration and the normal of the surface that it leaves from behind.
 const FROM_BEHIND: f32 = 0.5;
-
-/// In which part of a moving surface a pixel lies.
-const OUTSIDE: u8 = 0;
-const INNER_RIM: u8 = 1;
-const CORE: u8 = 2;
-
-/// Which pixels of a moving surface count, kept from call to call.
-#[derive(Default)]
-pub(super) struct CoreScratch {
-    covered: Vec<u8>,
-    inner: Vec<u8>,
-    /// Distance from the edge in pixels, counted up to the width of the rim.
-    depth: Vec<u8>,
-    spare: Vec<u8>,
-}
-
-/// Where the ray of a pixel sees the surfaces meet.
-pub(super) struct Meeting {
-    pixel: usize,
-    /// Distance of the moving surface from there, metres.
-    distance: f32,
-    depth: f32,
-    /// Least cosine between the motion and the normals of both.
-    facing: f32,
-    /// Unit normal towards the moving surface, in the view frame.
-    normal: Vec3,
-}
-
-impl Meeting {
-    fn new(pixel: usize, met: &Layer, leading: &Layer, params: &Params) -> Self {
-        let against = |normal: Vec3| if normal.z > 0.0 { -normal } else { normal };
-        let facing = met.normal.z.abs().min(leading.normal.z.abs());
-        let depth = front(met, params);
-        Self {
-            pixel,
-            distance: depth - back(leading, params),
-            facing,
-            depth,
-            normal: (against(met.normal) + against(leading.normal)).normalize_or(-Vec3::Z),
-        }
-    }
-}
 
 impl Scratch {
     /// The first meeting.
@@ -346,87 +290,6 @@ impl ImpactQuery<'_> {
     }
 }
 
-impl CoreScratch {
-    /// Covers the pixels that `image` covers. Beyond the image, its border is continued.
-    fn cover_by_image(&mut self, image: &Tldi) {
-        let [width, height] = image.size.map(|n| n as i32);
-        self.covered.clear();
-        for j in -BORDER..height + BORDER {
-            for i in -BORDER..width + BORDER {
-                let pixel = j.clamp(0, height - 1) * width + i.clamp(0, width - 1);
-                let covered = !image.layers_of(pixel as usize).is_empty();
-                self.covered.push(u8::from(covered));
-            }
-        }
-    }
-
-    /// Covers the pixels in and around `image` within `radius` metres of a point.
-    fn cover_by_points(&mut self, image: &Tldi, points: &Columns, radius: f32) {
-        let dims = image.size.map(|n| n as i32 + 2 * BORDER);
-        let first = image.origin.map(|o| (o - BORDER) as f32);
-        let radius_px =
-            splat_radius(radius, image.camera.pixel_size_at(0.0)) / image.camera.pixel_size_at(0.0);
-        self.covered.clear();
-        self.covered.resize((dims[0] * dims[1]) as usize, 0);
-        for k in 0..points.x.len() {
-            let [u, v] = image.camera.pixel_from_view(points.view(k));
-            let (u, v) = (u - first[0], v - first[1]);
-            let range = |c: f32, dim: i32| {
-                let from = (c - radius_px - 0.5).ceil().max(0.0) as i32;
-                from..dim.min((c + radius_px + 0.5).floor() as i32)
-            };
-            for j in range(v, dims[1]) {
-                for i in range(u, dims[0]) {
-                    let (du, dv) = (i as f32 + 0.5 - u, j as f32 + 0.5 - v);
-                    if du * du + dv * dv <= radius_px * radius_px {
-                        self.covered[(j * dims[0] + i) as usize] = 1;
-                    }
-                }
-            }
-        }
-    }
-
-    /// Marks what is covered as core, rim or outside; the image is `width` pixels wide.
-    fn find(&mut self, width: u32) {
-        let row = width as usize + 2 * BORDER as usize;
-        // Gaps are closed first: a gap of one pixel has no rim.
-        let (covered, inner, depth) = (&mut self.covered, &mut self.inner, &mut self.depth);
-        inner.clone_from(covered);
-        dilate(inner, &mut self.spare, row, u8::max);
-        depth.clone_from(covered);
-        for _ in 0..=RIM {
-            dilate(inner, &mut self.spare, row, u8::min);
-            for (depth, inner) in depth.iter_mut().zip(&*inner) {
-                *depth += *inner;
-            }
-        }
-        // Even a thin part has a core: its innermost pixels.
-        let deepest_around = inner;
-        deepest_around.clone_from(depth);
-        // Twice, since along a round border the core grows by only one in two pixels in places.
-        for _ in 0..2 {
-            dilate(deepest_around, &mut self.spare, row, u8::max);
-        }
-        let rim = 1 + RIM as u8;
-        for ((covered, depth), around) in covered.iter_mut().zip(depth).zip(deepest_around) {
-            *covered *= if *depth > rim || depth == around {
-                CORE
-            } else if *depth > 1 + OUTER_RIM {
-                INNER_RIM
-            } else {
-                OUTSIDE
-            };
-        }
-    }
-
-    /// [`CORE`], [`INNER_RIM`] or [`OUTSIDE`].
-    fn place(&self, pixel: usize, width: u32) -> u8 {
-        let (i, j) = (pixel % width as usize, pixel / width as usize);
-        let row = width as usize + 2 * BORDER as usize;
-        self.covered[(j + BORDER as usize) * row + i + BORDER as usize]
-    }
-}
-
 /// Whether the ray has entered a solid and leaves it at the last of `layers`. What is inside such a solid may leave. A
 /// sheet that the ray leaves without having entered is met from behind.
 fn leaves_solid(layers: &[Layer]) -> bool {
@@ -452,27 +315,4 @@ fn is_leading(layers: &[Layer], index: usize) -> bool {
             is_last || before.count() % 2 == 1
         }
     }
-}
-
-/// Depth at which a ray meets a layer.
-fn front(layer: &Layer, params: &Params) -> f32 {
-    if is_edge_on(layer) {
-        layer.depth.min(layer.near + rise(params))
-    } else {
-        layer.depth
-    }
-}
-
-/// Depth at which a ray has left a layer.
-fn back(layer: &Layer, params: &Params) -> f32 {
-    if is_edge_on(layer) {
-        layer.depth.max(layer.far - rise(params))
-    } else {
-        layer.depth
-    }
-}
-
-/// How far a splat seen edge-on stands out in depth beyond its point, metres.
-fn rise(params: &Params) -> f32 {
-    0.5 * params.thickness * params.slope_damping
 }

@@ -10,20 +10,26 @@ mod cells;
 mod coarse;
 pub(crate) mod columns;
 pub(crate) mod compare;
+mod core;
 pub(crate) mod cull;
 mod fold;
 mod impact;
 mod lanes;
+mod meeting;
 mod near_exact;
 pub(crate) mod normals;
 pub(crate) mod normals_sharpen;
 mod pair;
+mod placed;
 pub(crate) mod planes;
 mod rect;
 pub(crate) mod room;
+mod scratch;
 mod side;
 pub(crate) mod splat;
+mod splat_radius;
 pub(crate) mod sweep;
+mod window;
 pub(crate) mod zone;
 
 use crate::cloud::reach::Ring;
@@ -33,9 +39,9 @@ use crate::{
 };
 use cull::Region;
 use glamx::{Pose3, Vec3};
-use pair::Scratch;
 use rayon::prelude::*;
 use room::{Cost, Room};
+use scratch::Scratch;
 use side::{CloudView, Side};
 use std::sync::Mutex;
 

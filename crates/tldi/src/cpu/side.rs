@@ -3,12 +3,12 @@
 use super::cast::{self, Rays};
 use super::cells::{CellImaging, Cells};
 use super::columns::{Columns, Tiles, Touching};
+use super::core::BORDER;
 use super::cull::{CullScratch, PointRadii, Survivors};
 use super::fold::{FARTHEST_PIXEL, ViewFold};
-use super::impact::BORDER;
-use super::near_exact::{CellDistances, Placed};
 use super::normals::{self, NormalScratch};
 use super::normals_sharpen::sharpen;
+use super::placed::{CellDistances, Placed};
 use super::rect::{Footprint, Rect};
 use super::room::{Cost, Room};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};

@@ -9,12 +9,9 @@ use super::columns::{Columns, Tiles};
 use super::cull::PointRadii;
 use super::lanes::{multiversioned, truncated};
 use super::rect::Rect;
+use super::splat_radius::{LEAST_RADIUS_PX, splat_radius};
 use crate::{Params, Projection, VirtualCamera};
 use glamx::Vec3;
-
-/// Least radius of a splat in pixels: half a pixel's diagonal and a bit. A smaller disc may reach no pixel's centre but its
-/// own, and each pixel of a fine cloud would then show a single point. A larger one blurs edges.
-const LEAST_RADIUS_PX: f32 = 0.75;
 
 /// |n·v| below which a surface is seen edge-on (78°). There, its tangent plane says nothing about depth.
 pub(crate) const EDGE_ON: f32 = 0.2;
@@ -124,11 +121,6 @@ impl DepthScale {
     pub(crate) fn metres(&self, steps: f32) -> f32 {
         self.zero + steps * self.step
     }
-}
-
-/// Radius of a point's splat in metres.
-pub(crate) fn splat_radius(radius: f32, pixel_size: f32) -> f32 {
-    radius.max(LEAST_RADIUS_PX * pixel_size)
 }
 
 /// The points that become fragments: those of the culled points that a view keeps.

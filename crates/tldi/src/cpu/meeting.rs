@@ -1,0 +1,55 @@
+//! Where a surface that moves along the view meets another.
+
+use super::sweep::is_edge_on;
+use crate::{Layer, Params};
+use glamx::Vec3;
+
+/// Where the ray of a pixel sees the surfaces meet.
+pub(super) struct Meeting {
+    pub(super) pixel: usize,
+    /// Distance of the moving surface from there, metres.
+    pub(super) distance: f32,
+    pub(super) depth: f32,
+    /// Least cosine between the motion and the normals of both.
+    pub(super) facing: f32,
+    /// Unit normal towards the moving surface, in the view frame.
+    pub(super) normal: Vec3,
+}
+
+impl Meeting {
+    pub(super) fn new(pixel: usize, met: &Layer, leading: &Layer, params: &Params) -> Self {
+        let against = |normal: Vec3| if normal.z > 0.0 { -normal } else { normal };
+        let facing = met.normal.z.abs().min(leading.normal.z.abs());
+        let depth = front(met, params);
+        Self {
+            pixel,
+            distance: depth - back(leading, params),
+            facing,
+            depth,
+            normal: (against(met.normal) + against(leading.normal)).normalize_or(-Vec3::Z),
+        }
+    }
+}
+
+/// Depth at which a ray meets a layer.
+fn front(layer: &Layer, params: &Params) -> f32 {
+    if is_edge_on(layer) {
+        layer.depth.min(layer.near + rise(params))
+    } else {
+        layer.depth
+    }
+}
+
+/// Depth at which a ray has left a layer.
+fn back(layer: &Layer, params: &Params) -> f32 {
+    if is_edge_on(layer) {
+        layer.depth.max(layer.far - rise(params))
+    } else {
+        layer.depth
+    }
+}
+
+/// How far a splat seen edge-on stands out in depth beyond its point, metres.
+fn rise(params: &Params) -> f32 {
+    0.5 * params.thickness * params.slope_damping
+}

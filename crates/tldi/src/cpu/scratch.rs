@@ -1,0 +1,285 @@
+//! What one pair needs while it is compared, and the steps that all looks at it share.
+
+use super::columns::{Tiles, Touching};
+use super::compare::{Crossings, Middles, Seen};
+use super::core::CoreScratch;
+use super::cull;
+use super::fold::ViewFold;
+use super::meeting::Meeting;
+use super::placed::Placed;
+use super::rect::Rect;
+use super::room::{Cost, Room};
+use super::side::{CloudView, Side};
+use super::splat::{DepthScale, Imaging};
+use super::window::Window;
+use super::zone::{self, ZoneScratch, ZoneSide};
+use crate::cloud::reach::Place;
+use crate::contact::patches::PatchScratch;
+use crate::pair::plan::{Approach, PairPlan, SidePlan};
+use crate::view::camera_policy::{ZoneNormals, seen_from_behind};
+use crate::{Looked, PairQuery, RayHit, Surface, View, VirtualCamera, Work, paper};
+use glamx::{Pose3, Vec3};
+/// Where two clouds meet in a view.
+pub(super) struct CommonPixels {
+    pub(super) rect: Rect,
+    tiles: Tiles,
+    /// Least depth of both, metres.
+    pub(super) near: f32,
+}
+
+/// Everything one pair needs while it is compared.
+#[derive(Default)]
+pub(super) struct Scratch {
+    pub(super) a: Side,
+    pub(super) b: Side,
+    pub(super) hits: Vec<RayHit>,
+    pub(super) core: CoreScratch,
+    pub(super) meetings: Vec<Meeting>,
+    zone: ZoneScratch,
+    /// Of both sides, metres.
+    pub(super) merge_gaps: [f32; 2],
+    pub(super) touching: Touching,
+    /// Of the current view.
+    pub(super) fold: ViewFold,
+    /// Of the images of the current motion.
+    pub(super) room: Room,
+    pub(super) crossings: Crossings,
+    pub(super) paper: [paper::Scratch; 2],
+    pub(super) patches: PatchScratch,
+    /// Of the first look.
+    pub(super) windows: Vec<Window>,
+    /// Metres.
+    pub(super) window_edge: f32,
+    /// Since it was cleared.
+    pub(super) work: Work,
+}
+
+impl Scratch {
+    /// Fills the culled points of both sides, one in as many as `strides` says. `false` if a cloud has no point in reach.
+    pub(super) fn cull(&mut self, query: &PairQuery, plan: &PairPlan, strides: [usize; 2]) -> bool {
+        let cull = |side: &mut Side, surface: Surface, plan: &SidePlan, stride| {
+            side.near.clear();
+            if let Surface::Cloud(cloud) = surface {
+                let frame = &plan.frame_from_surface;
+                let Side { cull, points, .. } = side;
+                cull::cull(cloud, frame, &plan.region, stride, cull, points);
+                !points.is_empty()
+            } else {
+                side.points.clear();
+                true
+            }
+        };
+        let (a, b) = (&mut self.a, &mut self.b);
+        let [plan_a, plan_b] = &plan.sides;
+        let (is_near_a, is_near_b) = rayon::join(
+            || cull(a, query.a, plan_a, strides[0]),
+            || cull(b, query.b, plan_b, strides[1]),
+        );
+        self.work.culled += self.a.points.len() + self.b.points.len();
+        is_near_a && is_near_b
+    }
+
+    /// Finds the near points of both sides and their normals; `false` where nothing is near.
+    pub(super) fn zone(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
+        let reach = plan.zone_reach;
+        match (query.a, query.b) {
+            (Surface::Cloud(a), Surface::Cloud(b)) => {
+                let zone_side = |points, mean_radius| ZoneSide {
+                    points,
+                    mean_radius,
+                };
+                zone::zone(
+                    [
+                        zone_side(&self.a.points, a.mean_radius()),
+                        zone_side(&self.b.points, b.mean_radius()),
+                    ],
+                    &plan.overlap,
+                    reach,
+                    &mut self.zone,
+                    &mut self.a.near,
+                    &mut self.b.near,
+                );
+                if self.a.near.is_empty() || self.b.near.is_empty() {
+                    return false;
+                }
+                let (side_a, side_b) = (&mut self.a, &mut self.b);
+                rayon::join(
+                    || side_a.sample_normals(a, &Pose3::IDENTITY),
+                    || side_b.sample_normals(b, &query.a_from_b),
+                );
+                true
+            }
+            (Surface::Cloud(cloud), Surface::Exact(surface)) => {
+                let near = &mut self.b.near_normals;
+                let exact = Placed {
+                    surface,
+                    frame_from_surface: &query.a_from_b,
+                };
+                self.a
+                    .near_exact(cloud, &Pose3::IDENTITY, &exact, reach, near)
+            }
+            (Surface::Exact(surface), Surface::Cloud(cloud)) => {
+                let near = &mut self.a.near_normals;
+                let exact = Placed {
+                    surface,
+                    frame_from_surface: &Pose3::IDENTITY,
+                };
+                self.b
+                    .near_exact(cloud, &query.a_from_b, &exact, reach, near)
+            }
+            _ => false, // refused
+        }
+    }
+
+    /// What the surfaces look like where they are near each other; as the parameters say, where the camera is given.
+    pub(super) fn place(&self, query: &PairQuery) -> Place {
+        let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| match surface {
+            Surface::Cloud(cloud) => side.near_radius(cloud),
+            Surface::Exact(_) | Surface::Device(_) => 0.0,
+        });
+        match query.view {
+            View::Fixed(_) => Place::AS_TOLD,
+            View::Aim { .. } => Place::new(&query.params, [&query.a, &query.b], near),
+        }
+    }
+
+    /// What is known about where the second surface lies. For bare clouds, the near points tell as
+    /// well.
+    pub(super) fn approach(&self, query: &PairQuery, plan: &PairPlan) -> Approach {
+        let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| {
+            let is_cloud = matches!(surface, Surface::Cloud(_));
+            (is_cloud && !surface.is_oriented()).then(|| side.mean_of_near())
+        });
+        plan.approach.at_sheet(near)
+    }
+
+    /// What is known about a view besides its images and their folding.
+    pub(super) fn seen<'a>(
+        &self,
+        query: &PairQuery,
+        plan: &PairPlan,
+        camera: &VirtualCamera,
+        axes: &'a [Vec3],
+        view: usize,
+    ) -> Seen<'a> {
+        let depth = |side: &SidePlan| side.middle.map(|middle| camera.view_from_point(middle).z);
+        Seen {
+            axes,
+            view,
+            middles: Middles {
+                a: depth(&plan.sides[0]),
+                b: depth(&plan.sides[1]),
+            },
+            from_behind: seen_from_behind(camera.axis(), &self.zone_normals(query)),
+            fold: None,
+        }
+    }
+
+    pub(super) fn zone_normals(&self, query: &PairQuery) -> [ZoneNormals<'_>; 2] {
+        [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| ZoneNormals {
+            normals: &side.near_normals,
+            oriented: surface.is_oriented(),
+        })
+    }
+
+    /// What both images hold, and how many points they are of.
+    pub(super) fn looked(&self, query: &PairQuery) -> Looked {
+        let mut looked = Looked::default();
+        for (side, surface) in [(&self.a, query.a), (&self.b, query.b)] {
+            if let Surface::Cloud(_) = surface {
+                looked.points += side.kept.len();
+            }
+            looked.pixels += side.image.pixel_count();
+            looked.layers += side.image.layers().len();
+        }
+        looked
+    }
+
+    /// Builds the images of two clouds where `a` is less than `reach` metres behind `b`; `None` if
+    /// that is nowhere.
+    pub(super) fn look_at_clouds(
+        &mut self,
+        a: &CloudView,
+        b: &CloudView,
+        reach: f32,
+    ) -> Option<()> {
+        let support = (self.a.support_radius(a.cloud)).max(self.b.support_radius(b.cloud));
+        let CommonPixels { rect, tiles, near } = self.meet(a, b, reach, support)?;
+        let (side_a, side_b) = (&mut self.a, &mut self.b);
+        let touching = &self.touching;
+        let imaging = Imaging {
+            camera: a.camera,
+            params: a.params,
+            rect,
+            tiles,
+            scale: DepthScale::new(near, a.params),
+        };
+        rayon::join(
+            || side_a.image(a, &imaging, Some(touching)),
+            || side_b.image(b, &imaging, Some(touching)),
+        );
+        let [drawn_a, drawn_b] = [&self.a, &self.b].map(|side| side.kept.len());
+        self.room.take(self.cost([a, b], &rect, [drawn_a, drawn_b]));
+        Some(())
+    }
+
+    /// What the images of two clouds take, of so many drawn points each.
+    fn cost(&self, [a, b]: [&CloudView; 2], rect: &Rect, drawn: [usize; 2]) -> Cost {
+        let fragments =
+            self.a.fragments_in(a, rect, drawn[0]) + self.b.fragments_in(b, rect, drawn[1]);
+        Cost::new(rect, self.a.points.len() + self.b.points.len(), fragments)
+    }
+
+    /// Moves what was culled into the view and finds the tiles in which `a` is less than `reach` metres behind
+    /// `b`, and those within `support` metres around; `None` if there are none.
+    pub(super) fn meet(
+        &mut self,
+        a: &CloudView,
+        b: &CloudView,
+        reach: f32,
+        support: f32,
+    ) -> Option<CommonPixels> {
+        let (camera, params) = (a.camera, a.params);
+        let (side_a, side_b) = (&mut self.a, &mut self.b);
+        let (seen_a, seen_b) = rayon::join(|| side_a.project(a), || side_b.project(b));
+        let (mut seen_a, mut seen_b) = (seen_a?, seen_b?);
+        let mut rect = seen_a.rect.intersection(&seen_b.rect)?;
+        let count = side_a.points.len() + side_b.points.len();
+        self.fold.clear();
+        if camera.size.is_none() && ViewFold::is_wanted(&rect, count) {
+            let support = (side_a.support_radius(a.cloud)).max(side_b.support_radius(b.cloud))
+                / seen_a.pixel_size;
+            let reach = seen_a.reach.max(seen_b.reach).max(support);
+            let points = side_a.columns.across().chain(side_b.columns.across());
+            self.fold.find(reach, seen_a.pixel_size, points);
+            side_a.columns.fold(&self.fold, camera, &mut seen_a);
+            side_b.columns.fold(&self.fold, camera, &mut seen_b);
+            rect = seen_a.rect.intersection(&seen_b.rect)?;
+        }
+        let all = [side_a.points.len(), side_b.points.len()];
+        let cost = self.cost([a, b], &rect, all);
+        if camera.size.is_none() && self.room.refuses(cost) {
+            return None;
+        }
+        let (side_a, side_b) = (&mut self.a, &mut self.b);
+        for (seen, side) in [(&mut seen_a, &*side_a), (&mut seen_b, &*side_b)] {
+            seen.limit_depths(DepthScale::reach(params), || side.columns.median_depth());
+        }
+        let tiles = Tiles::new(&rect, seen_a.reach.max(seen_b.reach));
+        let sort = |side: &mut Side, sign: f32, radius: f32| {
+            side.columns.sort(&tiles, camera);
+            let margin = params.slope_damping * radius;
+            side.columns.reduce(&tiles, sign, margin);
+        };
+        rayon::join(
+            || sort(side_a, 1.0, seen_a.radius),
+            || sort(side_b, -1.0, seen_b.radius),
+        );
+        let support_px = support / seen_a.pixel_size.min(seen_b.pixel_size);
+        let (columns_a, columns_b) = (&side_a.columns, &side_b.columns);
+        let meet = |tile: usize| columns_a.meet(columns_b, tile, reach);
+        let rect = self.touching.mark(&tiles, &rect, support_px, meet)?;
+        let near = seen_a.near.min(seen_b.near);
+        Some(CommonPixels { rect, tiles, near })
+    }
+}
