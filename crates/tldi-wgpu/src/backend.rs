@@ -24,10 +24,15 @@ use tldi::{Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult
 /// What it does not take is compared on the CPU meanwhile, with the same results: pairs with an
 /// exact surface, [uneven clouds](tldi::PointCloud::is_uneven), [`Variant::Paper`](tldi::Variant::Paper), perspective
 /// cameras; pairs of which a pixel has more than 1024 fragments, and pairs that need larger buffers than the device
-/// allows. An uneven cloud and one that only the device holds
-/// are compared by their mean radii: a body smaller than the points are apart may pass where these are coarse. A batch costs one submission and one readback,
-/// whatever the number of pairs, and uploads of clouds with new content. A batch that needs larger buffers than the
-/// device allows is halved until it does not.
+/// allows. An uneven cloud and one that only the device holds are compared by their mean radii: a body smaller than the
+/// points are apart may pass where these are coarse.
+///
+/// A batch costs one submission and one readback, whatever the number of pairs, and uploads of blocks with new content that
+/// come into reach. Where a pair is asked about in [all directions](tldi::CameraPolicy::AllDirections) and shows no crossing,
+/// its further views cost a second submission. A batch that needs larger buffers than the device allows is
+/// halved until it does not.
+///
+/// [`compare`](Backend::compare) waits for the device. [`begin`](Self::begin) does not.
 ///
 /// ```
 /// use tldi::{Backend, PairQuery, Params, PointCloud, Surface, View};

@@ -9,7 +9,8 @@ use wgpu::BufferUsages;
 const BYTES: u64 = 1 << 26;
 const COPIES: u32 = 16;
 
-/// Bytes per second, read plus written, of copies between two buffers of 64 MiB: the best of three.
+/// Bytes per second, read plus written, of copies between two buffers of 64 MiB: the best of three. Waits for
+/// the device, which a browser cannot.
 ///
 /// # Errors
 /// Where the device fails, or has no room for the buffers.

@@ -1,5 +1,5 @@
 //! The GPU backend of [`tldi`]: the TLDIs of all pairs of a step are built, compared and reduced to
-//! contact pixels on the GPU, in one submission and one readback.
+//! contact pixels on the GPU, in one submission and one readback; further views of pairs that need them take a second.
 //!
 //! Stages have the names of the CPU backend's, which is the reference: integers are equal, floats
 //! within what rounding of products and sums makes of them. Clouds stay on the device until their

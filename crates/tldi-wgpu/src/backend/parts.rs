@@ -141,6 +141,7 @@ impl WgpuBackend {
             if part != self.upload.pairs_of {
                 self.upload.select(&run.batch, part.iter().copied());
             }
+            self.times.clear();
             (run.fitting, run.tries, run.first_views) = (None, 0, None);
             let placed = self.place(&run.batch).and_then(|()| self.submit());
             if self.is_submitted(run, placed)? {
