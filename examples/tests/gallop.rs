@@ -101,21 +101,8 @@ fn a_hopping_ball_touches_where_it_is_low() {
     let folder = folder("gallop_ball");
     write_hopping_ball(&folder.join("ball.npy"));
     let options = [
-        "--frames",
-        "ball.npy",
-        "--up",
-        "0,0,1",
-        "--size",
-        "1",
-        "--cycle",
-        "0.8",
-        "--bodies",
-        "0",
-        "--speed",
-        "1",
-        "--steps",
-        "160",
-        "--animate",
+        "--frames", "ball.npy", "--up", "0,0,1", "--size", "1", "--cycle", "0.8", "--bodies", "0",
+        "--speed", "1", "--steps", "160",
     ];
     let report = report(&folder, &options);
     assert_eq!(
@@ -143,7 +130,6 @@ fn a_hopping_ball_touches_where_it_is_low() {
         }
     }
     assert!(certain[0] > 0 && certain[1] > 50, "{certain:?}");
-    assert!(folder.join("out/gallop/motion.png").exists());
 }
 
 #[test]
@@ -191,6 +177,8 @@ fn the_horse_gallops() {
         frames.to_str().unwrap(),
         "--faces",
         faces.to_str().unwrap(),
+        "--steps",
+        "70",
     ];
     let report = report(&folder, &options);
     assert_eq!(
