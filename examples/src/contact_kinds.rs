@@ -10,6 +10,19 @@ use tldi::glamx::Vec3;
 /// Cosine between two pushes on a body from which on it is held between them (120°).
 const OPPOSED: f32 = -0.5;
 
+/// What may help against the depth of a contact; see [`ContactKinds`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Neither gives way.
+    Scripted,
+    /// The body is held from both sides.
+    Squeezed,
+    /// Something moved into the body.
+    Pushed,
+    /// Any other.
+    Resting,
+}
+
 /// A contact that was the deepest of its kind.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WorstContact {
@@ -43,14 +56,14 @@ pub struct ContactKinds {
 impl ContactKinds {
     /// Counts the contacts of a step. `moved_in` says of a contact with what does not give way whether it has moved to
     /// where it touches. A body is out again when no contact of it is deeper than what rapier leaves
-    /// (`allowed_linear_error`).
+    /// (`allowed_linear_error`). Gives the kind of each contact.
     pub fn count(
         &mut self,
         step: usize,
         contacts: &[CloudContact],
         world: &PhysicsWorld,
         moved_in: impl Fn(&CloudContact) -> bool,
-    ) {
+    ) -> Vec<Kind> {
         let gives_way = |collider: ColliderHandle| {
             let parent = world.colliders.get(collider).and_then(Collider::parent);
             let body = parent.and_then(|parent| world.bodies.get(parent));
@@ -74,18 +87,27 @@ impl ContactKinds {
         self.inside.extend(comes.map(|push| push.0));
         let own = |body: ColliderHandle| pushes.iter().filter(move |push| push.0 == body);
         let is_squeezed = |body| own(body).any(|a| own(body).any(|b| a.1.dot(b.1) < OPPOSED));
-        for contact in contacts.iter().filter(|contact| contact.depth > 0.0) {
+        let kind_of = |contact: &CloudContact| {
             let pair = [contact.collider1, contact.collider2];
-            let worst = if !pair.into_iter().any(gives_way) {
-                &mut self.scripted
+            if !pair.into_iter().any(gives_way) {
+                Kind::Scripted
             } else if pair.into_iter().any(is_squeezed) {
-                &mut self.squeezed
+                Kind::Squeezed
             } else if pair.iter().any(|body| self.inside.contains(body)) {
-                &mut self.pushed
+                Kind::Pushed
             } else {
-                &mut self.resting
+                Kind::Resting
+            }
+        };
+        let kinds: Vec<Kind> = contacts.iter().map(kind_of).collect();
+        for (contact, kind) in contacts.iter().zip(&kinds) {
+            let worst = match kind {
+                Kind::Scripted => &mut self.scripted,
+                Kind::Squeezed => &mut self.squeezed,
+                Kind::Pushed => &mut self.pushed,
+                Kind::Resting => &mut self.resting,
             };
-            if worst.is_none_or(|worst| worst.depth < contact.depth) {
+            if contact.depth > worst.map_or(0.0, |worst| worst.depth) {
                 *worst = Some(WorstContact {
                     depth: contact.depth,
                     position: contact.point.to_array(),
@@ -93,6 +115,7 @@ impl ContactKinds {
                 });
             }
         }
+        kinds
     }
 
     /// Writes a line for each kind, for people.

@@ -215,7 +215,7 @@ impl BodyShape {
     }
 
     /// Signed distance in metres (or a bound of it) for a body 1 m wide around the origin.
-    fn distance(self, p: Vec3) -> f32 {
+    pub(crate) fn distance(self, p: Vec3) -> f32 {
         match self {
             Self::Torus => {
                 let from_ring = Vec2::new(Vec2::new(p.x, p.z).length() - 0.35, p.y);

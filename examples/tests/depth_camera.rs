@@ -98,7 +98,7 @@ fn the_generated_ball_pushes_and_equal_seeds_give_equal_reports() {
     let folder = folder("depth_generated");
     let times = [&TIMES[..], &["median_latency_ms", "max_latency_ms"]].concat();
     let frame_times = ["unproject_ms", "update_ms", "step_ms", "latency_ms"];
-    let first = seeded_report(BINARY, &folder, &[], &times, &frame_times);
+    let first = seeded_report(BINARY, &folder, &["--hold", "0"], &times, &frame_times);
     assert_keys(
         &first,
         &[

@@ -44,7 +44,7 @@ fn write_hopping_ball(path: &Path) {
 fn the_creature_kicks_and_equal_seeds_give_equal_reports() {
     let folder = folder("gallop_generated");
     let frame_times = ["deform_ms", "step_ms"];
-    let first = seeded_report(BINARY, &folder, &["--steps", "150"], &TIMES, &frame_times);
+    let first = seeded_report(BINARY, &folder, &["--steps", "120"], &TIMES, &frame_times);
     assert_keys(
         &first,
         &[
@@ -57,11 +57,29 @@ fn the_creature_kicks_and_equal_seeds_give_equal_reports() {
             "max_penetration",
         ],
     );
-    assert_eq!(first["frames"].as_array().unwrap().len(), 150);
+    assert_eq!(first["frames"].as_array().unwrap().len(), 120);
     assert_eq!(first["pairs_missed"], 0);
+    // Hooves, waves and bodies have known shapes. Depths are told within a radius, and hooves that move into bodies no
+    // less deep than their deepest point is, but for that: the way out of a body may be longer.
+    let radius = number(&first["mean_radius"]);
+    for (kind, least) in [("scripted", 15.0), ("squeezed", 1.0), ("resting", 100.0)] {
+        let of_kind = &first["true_depths"][kind];
+        assert!(number(&of_kind["compared"]) >= least, "{kind}: {of_kind}");
+        let worst = &of_kind["worst"];
+        let error = number(&worst["told"]) - number(&worst["truth"]);
+        assert!(error.abs() < radius, "{kind}: {of_kind}");
+        assert!(
+            number(&of_kind["mean_error"]) < 0.3 * radius,
+            "{kind}: {of_kind}"
+        );
+    }
+    let pushed = &first["true_depths"]["pushed"];
+    let error = number(&pushed["worst"]["told"]) - number(&pushed["worst"]["truth"]);
+    assert!(error > -radius, "{pushed}");
+    assert!(number(&first["deepest"]["scripted"]["depth"]) > radius);
     // Feet are down for a good part of every cycle, and off the ground in others.
     let contact_steps = number(&first["contact_steps"]);
-    assert!((30.0..150.0).contains(&contact_steps), "{contact_steps}");
+    assert!((20.0..120.0).contains(&contact_steps), "{contact_steps}");
     let bodies = first["bodies"].as_array().unwrap();
     assert_eq!(bodies.len(), 8);
     assert!(
@@ -83,21 +101,8 @@ fn a_hopping_ball_touches_where_it_is_low() {
     let folder = folder("gallop_ball");
     write_hopping_ball(&folder.join("ball.npy"));
     let options = [
-        "--frames",
-        "ball.npy",
-        "--up",
-        "0,0,1",
-        "--size",
-        "1",
-        "--cycle",
-        "0.8",
-        "--bodies",
-        "0",
-        "--speed",
-        "1",
-        "--steps",
-        "220",
-        "--animate",
+        "--frames", "ball.npy", "--up", "0,0,1", "--size", "1", "--cycle", "0.8", "--bodies", "0",
+        "--speed", "1", "--steps", "160",
     ];
     let report = report(&folder, &options);
     assert_eq!(
@@ -125,7 +130,6 @@ fn a_hopping_ball_touches_where_it_is_low() {
         }
     }
     assert!(certain[0] > 0 && certain[1] > 50, "{certain:?}");
-    assert!(folder.join("out/gallop/motion.png").exists());
 }
 
 #[test]
@@ -173,6 +177,8 @@ fn the_horse_gallops() {
         frames.to_str().unwrap(),
         "--faces",
         faces.to_str().unwrap(),
+        "--steps",
+        "70",
     ];
     let report = report(&folder, &options);
     assert_eq!(

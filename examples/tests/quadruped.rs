@@ -44,16 +44,16 @@ fn assert_stands(ground: Ground, seed: u64) -> StandingReport {
     let report = walk(ground, seed);
     let case = || format!("{ground:?}, seed {seed}: {report:#?}");
     assert_eq!(report.feet, 4, "{}", case());
-    // Legs give way by 2 % under a quarter of the weight, and by twice of that while two are up; the rest is
+    // Legs give way by 2 % under a quarter of the weight, and by twice of that while one is up; the rest is
     // for landing.
     assert!(report.least_height > 0.9, "{}", case());
     assert!(report.last_height > 0.95, "{}", case());
-    // At 0.15 m/s for 4.4 s, without slip, 0.68 m. The rough ground begins 8 cm in front of the front feet.
-    assert!((0.2..1.0).contains(&report.way), "{}", case());
+    // At 0.125 m/s for 5.4 s, without slip, 0.68 m. The rough ground begins 8 cm in front of the front feet.
+    assert!((0.3..0.7).contains(&report.way), "{}", case());
     assert!(report.deepest_radii < 0.5, "{}", case());
-    // Half of the weight is on each foot of a diagonal: two shares. Landing without a look at the ground adds
-    // up to as much again: 2.9 to 3.9 were measured in 27 walks. Three is what a good gait should keep to.
-    assert!(report.max_foot_force < 4.5, "{}", case());
+    // While a foot swings, those beside it on the rim of the trunk's lean carry two shares. Landing without a look
+    // at the ground, and on steps, adds up to another.
+    assert!(report.max_foot_force < 3.0, "{}", case());
     // Half a radius, of up to 2 cm far from the scanner, and 4 mm where a foot stands on the rim of a hole.
     assert!(report.feet_under_ground < 0.014, "{}", case());
     assert_eq!(report.links_under_ground, 0.0, "{}", case());
@@ -75,12 +75,12 @@ fn the_quadruped_walks_over_rubble() {
     assert_stands(Ground::Rubble, 3);
 }
 
-/// All that the documentation reports; its gait was tuned on seeds 1 to 3.
+/// All that the documentation reports; its gait was tuned on seed 1.
 #[test]
-#[ignore = "30 walks take minutes"]
-fn thirty_walks() {
+#[ignore = "39 walks take minutes"]
+fn all_walks() {
     for ground in Ground::ALL {
-        for seed in 1..=10 {
+        for seed in 1..=13 {
             let r = walk(ground, seed);
             eprintln!(
                 "| {ground:?} | {seed} | {:.1} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} |",

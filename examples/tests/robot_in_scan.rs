@@ -81,7 +81,7 @@ fn report(folder: &Path, options: &[&str]) -> Value {
 #[test]
 fn the_built_in_arm_touches_and_equal_seeds_give_equal_reports() {
     let folder = folder("robot_built_in");
-    let first = seeded_report(BINARY, &folder, &["--steps", "500"], &TIMES, &[]);
+    let first = seeded_report(BINARY, &folder, &["--steps", "300"], &TIMES, &[]);
     assert_keys(
         &first,
         &[
@@ -118,6 +118,17 @@ fn the_built_in_arm_touches_and_equal_seeds_give_equal_reports() {
         assert!(number(&link["points"]) > 100.0, "{link}");
     }
     assert_pictures(&folder.join("out/robot_in_scan"), &PICTURES);
+    assert_pictures(&folder.join("out/robot_in_scan"), &["hardest.png"]);
+    // What pushed most is in the step that is named, and only of links that were touched.
+    for link in first["links"].as_array().unwrap() {
+        let hardest = &link["hardest"];
+        assert_eq!(hardest.is_null(), link["contact_steps"] == 0, "{link}");
+        if !hardest.is_null() {
+            assert!((1.0..=300.0).contains(&number(&hardest["step"])), "{link}");
+        }
+    }
+    let by_body = |link: &Value| link["hardest"]["against"] == "rounded box 1";
+    assert!(first["links"].as_array().unwrap().iter().any(by_body));
 }
 
 /// Wheels of 8 cm that roll at 0.25 m/s over ground: 1.5 m in 6 s, less the start. They stand on
@@ -162,7 +173,7 @@ fn a_walker_does_not_explode() {
         "--scan",
         "floor.ply",
         "--steps",
-        "240",
+        "120",
         "--animate",
     ];
     let report = report(&folder, &options);

@@ -274,7 +274,8 @@ impl DepthSimulation {
             let mut former = self.former.iter();
             former.any(|(camera, from_world)| camera.sees_through(place, from_world))
         };
-        (self.deepest).count(self.totals.steps, &contacts, &self.world, moved_in);
+        self.deepest
+            .count(self.totals.steps, &contacts, &self.world, moved_in);
         Ok(report.pairs_in_contact)
     }
 

@@ -25,27 +25,26 @@ impl Ground {
             .map(|half| 1 + (2.0 * half / self.spacing) as usize)
     }
 
+    /// The surface over a place at a time, and its normal.
+    pub fn surface(&self, x: f32, z: f32, time: f32) -> (Vec3, Vec3) {
+        let wave = TAU / self.wavelength;
+        let (sin, cos) = (wave * x - TAU * time / self.period).sin_cos();
+        let (side_sin, side_cos) = (0.7 * wave * z).sin_cos();
+        let height = self.amplitude * sin * side_cos;
+        let slopes = self.amplitude * wave * Vec3::new(cos * side_cos, 0.0, -0.7 * sin * side_sin);
+        (Vec3::new(x, height, z), (Vec3::Y - slopes).normalize())
+    }
+
     /// The points and their normals at a time; always as many, in the same order. They move up and
     /// down only.
     pub fn at(&self, time: f32) -> (Vec<Vec3>, Vec<Vec3>) {
         let [columns, rows] = self.counts();
-        let wave = TAU / self.wavelength;
-        let mut points = Vec::with_capacity(columns * rows);
-        let mut normals = Vec::with_capacity(columns * rows);
-        for j in 0..rows {
-            for i in 0..columns {
-                let x = i as f32 * self.spacing - self.half_size[0];
-                let z = j as f32 * self.spacing - self.half_size[1];
-                let (sin, cos) = (wave * x - TAU * time / self.period).sin_cos();
-                let (side_sin, side_cos) = (0.7 * wave * z).sin_cos();
-                let height = self.amplitude * sin * side_cos;
-                points.push(Vec3::new(x, height, z));
-                let slopes =
-                    self.amplitude * wave * Vec3::new(cos * side_cos, 0.0, -0.7 * sin * side_sin);
-                normals.push((Vec3::Y - slopes).normalize());
-            }
-        }
-        (points, normals)
+        let place = |k: usize| {
+            let x = (k % columns) as f32 * self.spacing - self.half_size[0];
+            let z = (k / columns) as f32 * self.spacing - self.half_size[1];
+            self.surface(x, z, time)
+        };
+        (0..columns * rows).map(place).unzip()
     }
 }
 

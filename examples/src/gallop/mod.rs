@@ -5,9 +5,11 @@ mod ground;
 mod report;
 mod runner;
 mod simulation;
+mod truth;
 
 pub use creature::creature;
 pub use ground::Ground;
 pub use report::{GallopFrame, GallopReport};
 pub use runner::{FacesOutOfRange, Runner};
 pub use simulation::{DT, GallopScene, GallopSimulation, GallopSnapshot};
+pub use truth::{Comparisons, TrueDepth, TrueDepths};

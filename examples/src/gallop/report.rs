@@ -1,5 +1,6 @@
 //! What a run of `gallop` found.
 
+use super::truth::{Comparisons, TrueDepths};
 use crate::contact_kinds::ContactKinds;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
@@ -25,6 +26,8 @@ pub struct GallopReport {
     pub max_penetration: f32,
     /// The deepest contacts after a step, by kind.
     pub deepest: ContactKinds,
+    /// What contacts say beside how deep things truly are, by kind: hooves, waves and bodies have known shapes.
+    pub true_depths: TrueDepths,
     /// Every step.
     pub frames: Vec<GallopFrame>,
     /// Loose bodies.
@@ -93,6 +96,35 @@ impl GallopReport {
             median(|frame| frame.step_ms)
         )?;
         self.deepest.write_lines(out)?;
+        let TrueDepths {
+            scripted,
+            squeezed,
+            pushed,
+            resting,
+        } = self.true_depths;
+        for (name, of_kind) in [
+            ("scripted", scripted),
+            ("squeezed", squeezed),
+            ("pushed", pushed),
+            ("resting", resting),
+        ] {
+            let Comparisons {
+                compared,
+                mean_error,
+                worst: Some(worst),
+            } = of_kind
+            else {
+                continue;
+            };
+            writeln!(
+                out,
+                "{name} depths: {:.2} mm off in the mean of {compared}, at most {:.2} in place of {:.2} mm in step {}",
+                1e3 * mean_error,
+                1e3 * worst.told,
+                1e3 * worst.truth,
+                worst.step
+            )?;
+        }
         self.totals.write_line(out)
     }
 }

@@ -3,7 +3,8 @@
 use super::ground::Ground;
 use super::report::{GallopBody, GallopFrame, GallopReport};
 use super::runner::Runner;
-use crate::contact_kinds::ContactKinds;
+use super::truth::{TrueBody, TrueDepth, TrueDepths, below_ground};
+use crate::contact_kinds::{ContactKinds, Kind};
 use crate::load;
 use crate::scene::BodyShape;
 use crate::step_totals::StepTotals;
@@ -70,11 +71,13 @@ pub struct GallopSimulation {
     totals: StepTotals,
     max_penetration: f32,
     deepest: ContactKinds,
+    true_depths: TrueDepths,
 }
 
 struct Body {
     name: String,
     cloud: PointCloud<'static>,
+    truth: TrueBody,
     handle: RigidBodyHandle,
     collider: ColliderHandle,
     start: Vec3,
@@ -134,6 +137,7 @@ impl GallopSimulation {
             totals: StepTotals::new(DT),
             max_penetration: 0.0,
             deepest: ContactKinds::default(),
+            true_depths: TrueDepths::default(),
         })
     }
 
@@ -155,6 +159,11 @@ impl GallopSimulation {
         let (points, normals) = self.scene.ground.at(time);
         (self.tldi).deform(&mut self.world, self.ground, &points, Some(&normals))?;
         let deformed = start.elapsed();
+        // Contacts are those of the poses before the step.
+        let runner_pose = *self.world.bodies[self.runner.0].position();
+        let body_poses: Vec<Pose3> = (self.bodies.iter())
+            .map(|body| *self.world.bodies[body.handle].position())
+            .collect();
         let report = self.tldi.step(&mut self.world)?;
         let stepped = start.elapsed();
         self.max_penetration = self.max_penetration.max(report.max_penetration);
@@ -165,7 +174,8 @@ impl GallopSimulation {
         // Hooves move into bodies; waves only carry them.
         let runner = self.runner.1;
         let kicks = |c: &CloudContact| [c.collider1, c.collider2].contains(&runner);
-        (self.deepest).count(self.totals.steps, &all, &self.world, kicks);
+        let kinds = (self.deepest).count(self.totals.steps, &all, &self.world, kicks);
+        self.compare_with_truth(time, &runner_pose, &body_poses, &all, &kinds);
         self.totals.add_wall_seconds(stepped.as_secs_f64());
         for body in &mut self.bodies {
             body.kicked |= contacts
@@ -180,6 +190,50 @@ impl GallopSimulation {
             step_ms: 1e3 * (stepped - deformed).as_secs_f64(),
         });
         Ok(())
+    }
+
+    /// Compares contacts with the true depths of all pairs, at a time and poses.
+    fn compare_with_truth(
+        &mut self,
+        time: f32,
+        runner_pose: &Pose3,
+        body_poses: &[Pose3],
+        contacts: &[CloudContact],
+        kinds: &[Kind],
+    ) {
+        let step = self.totals.steps;
+        let (runner, ground) = (self.runner.1, self.ground);
+        let shape = self.world.colliders[runner].shape();
+        let Some(shape) = shape.as_shape::<PointCloudShape>() else {
+            return;
+        };
+        let runner_cloud = shape.cloud();
+        let mut compare = |pair: [ColliderHandle; 2], truth: f32, without: Kind| {
+            let own = contacts.iter().zip(kinds).filter(|(contact, _)| {
+                let colliders = [contact.collider1, contact.collider2];
+                colliders == pair || colliders == [pair[1], pair[0]]
+            });
+            let deepest = own.max_by(|a, b| a.0.depth.total_cmp(&b.0.depth));
+            let (told, kind) = deepest.map_or((0.0, without), |(contact, kind)| {
+                (contact.depth.max(0.0), *kind)
+            });
+            let truth = truth.max(0.0);
+            if told > 0.0 || truth > 0.0 {
+                (self.true_depths).count(kind, TrueDepth { told, truth, step });
+            }
+        };
+        let points = runner_cloud.points().map(|p| *runner_pose * p);
+        let truth = below_ground(&self.scene.ground, time, points);
+        compare([runner, ground], truth, Kind::Scripted);
+        for (body, pose) in self.bodies.iter().zip(body_poses) {
+            let points = body.cloud.points().map(|p| *pose * p);
+            let truth = below_ground(&self.scene.ground, time, points);
+            compare([body.collider, ground], truth, Kind::Resting);
+            let reach = body.cloud.bounds().extents().length();
+            let body_from_runner = pose.inverse() * *runner_pose;
+            let truth = (body.truth).depth_of(runner_cloud, &body_from_runner, reach);
+            compare([body.collider, runner], truth, Kind::Pushed);
+        }
     }
 
     /// Where what runs touches something.
@@ -238,6 +292,7 @@ impl GallopSimulation {
             speed: self.scene.speed,
             max_penetration: self.max_penetration,
             deepest: self.deepest.clone(),
+            true_depths: self.true_depths,
             frames: self.frames.clone(),
             bodies: (self.bodies.iter())
                 .map(|body| {
@@ -284,6 +339,11 @@ fn lay_bodies(
         );
         bodies.push(Body {
             name: format!("{} {}", shape.name(), k + 1),
+            truth: TrueBody {
+                shape,
+                center: sample.bounds().center(),
+                scale: size / sample.bounds().extents().max_element(),
+            },
             cloud,
             handle,
             collider,
