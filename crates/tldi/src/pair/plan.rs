@@ -147,8 +147,8 @@ impl PairPlan {
 
 /// See [`PairPlan::column_reach`].
 ///
-/// It is the distance between the nearest points of both in a tile and around it, at least [`LEAST_TILE`] pixels on all
-/// sides. Surfaces that are inclined by 60° come nearer there, each by as much as it rises over these pixels.
+/// It is the distance between the nearest points of both in a tile and around it, at least [`columns::LEAST_TILE`] pixels on
+/// all sides. Surfaces that are inclined by 60° come nearer there, each by as much as it rises over these pixels.
 pub(crate) fn column_reach(params: &Params) -> f32 {
     let rise = STEEPEST * columns::LEAST_TILE as f32 * params.pixel_size;
     let inclined = 2.0 * (params.prediction - rise);
