@@ -5,22 +5,17 @@
 //! share. `pair` runs them, `side` those of one cloud; `lanes` is what
 //! makes their inner loops SIMD. `impact` compares the images of a motion.
 
-mod cast;
-mod cells;
-mod coarse;
 pub(crate) mod columns;
 pub(crate) mod compare;
-mod core;
 pub(crate) mod cull;
+mod exact;
+mod first_look;
 mod fold;
-mod impact;
 mod lanes;
-mod meeting;
-mod near_exact;
+mod motion;
 pub(crate) mod normals;
 pub(crate) mod normals_sharpen;
 mod pair;
-mod placed;
 pub(crate) mod planes;
 mod rect;
 pub(crate) mod room;
@@ -29,7 +24,6 @@ mod side;
 pub(crate) mod splat;
 mod splat_radius;
 pub(crate) mod sweep;
-mod window;
 pub(crate) mod zone;
 
 use crate::cloud::reach::Ring;

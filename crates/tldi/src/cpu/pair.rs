@@ -1,8 +1,8 @@
 //! The stages of one pair, in order.
 
-use super::coarse::FirstLook;
 use super::compare::{self, Crossings, Seen};
-use super::placed::Placed;
+use super::exact::placed::Placed;
+use super::first_look::settle::FirstLook;
 use super::scratch::Scratch;
 use super::side::{CloudView, ExactView, Scope};
 use crate::pair::plan::{PairPlan, column_reach};

@@ -2,16 +2,16 @@
 
 use super::columns::{Tiles, Touching};
 use super::compare::{Crossings, Middles, Seen};
-use super::core::CoreScratch;
 use super::cull;
+use super::exact::placed::Placed;
+use super::first_look::window::Window;
 use super::fold::ViewFold;
-use super::meeting::Meeting;
-use super::placed::Placed;
+use super::motion::core::CoreScratch;
+use super::motion::meeting::Meeting;
 use super::rect::Rect;
 use super::room::{Cost, Room};
 use super::side::{CloudView, Side};
 use super::splat::{DepthScale, Imaging};
-use super::window::Window;
 use super::zone::{self, ZoneScratch, ZoneSide};
 use crate::cloud::reach::Place;
 use crate::contact::patches::PatchScratch;

@@ -1,14 +1,14 @@
 //! One cloud of a pair: its culled points, their normals and its image.
 
-use super::cast::{self, Rays};
-use super::cells::{CellImaging, Cells};
 use super::columns::{Columns, Tiles, Touching};
-use super::core::BORDER;
 use super::cull::{CullScratch, PointRadii, Survivors};
+use super::exact::cast::{self, Rays};
+use super::exact::placed::{CellDistances, Placed};
+use super::first_look::cells::{CellImaging, Cells};
 use super::fold::{FARTHEST_PIXEL, ViewFold};
+use super::motion::core::BORDER;
 use super::normals::{self, NormalScratch};
 use super::normals_sharpen::sharpen;
-use super::placed::{CellDistances, Placed};
 use super::rect::{Footprint, Rect};
 use super::room::{Cost, Room};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};

@@ -9,22 +9,22 @@ const WINDOW: f32 = 16.0;
 
 /// A cube of a view's frame in which surfaces swap their order.
 #[derive(Clone, Copy)]
-pub(super) struct Window {
-    pub(super) view: usize,
+pub(crate) struct Window {
+    pub(crate) view: usize,
     /// Place along columns, rows and depth, in edges of a window.
-    pub(super) cube: [i32; 3],
+    pub(crate) cube: [i32; 3],
     /// Pairs of neighbouring large pixels between which they do.
-    pub(super) swaps: u32,
+    pub(crate) swaps: u32,
 }
 
 impl Window {
     /// Edge, metres.
-    pub(super) fn edge(query: &PairQuery) -> f32 {
+    pub(crate) fn edge(query: &PairQuery) -> f32 {
         WINDOW * query.params.pixel_size
     }
 
     /// The view of it, with the pixel grid of the look at all of the contact zone: it starts at a whole number of pixels.
-    pub(super) fn camera(&self, query: &PairQuery, axes: &[Vec3]) -> VirtualCamera {
+    pub(crate) fn camera(&self, query: &PairQuery, axes: &[Vec3]) -> VirtualCamera {
         let mut camera = VirtualCamera::along(axes[self.view], query.params.pixel_size);
         let [x, y, _] = self.cube.map(|c| c as f32);
         camera.view_from_frame.translation = -Self::edge(query) * Vec3::new(x, y, 0.0);
@@ -33,7 +33,7 @@ impl Window {
     }
 
     /// The plan of the pair for what `camera` sees of it.
-    pub(super) fn plan(
+    pub(crate) fn plan(
         &self,
         query: &PairQuery,
         plan: &PairPlan,

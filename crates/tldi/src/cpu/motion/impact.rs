@@ -4,14 +4,14 @@
 //! ray enters the other one. The least of these distances is the distance to the impact. The images hold all that the
 //! motion passes, so no surface is too thin, and none too fast.
 
-use super::core::{BORDER, CORE, OUTSIDE, RIM};
-use super::cull::{self, PointRadii, Region};
-use super::meeting::Meeting;
-use super::placed::Placed;
-use super::scratch::Scratch;
-use super::side::{CloudView, ExactView, Scope};
-use super::sweep::is_edge_on;
 use crate::contact::lone_points::is_alone;
+use crate::cpu::cull::{self, PointRadii, Region};
+use crate::cpu::exact::placed::Placed;
+use crate::cpu::motion::core::{BORDER, CORE, OUTSIDE, RIM};
+use crate::cpu::motion::meeting::Meeting;
+use crate::cpu::scratch::Scratch;
+use crate::cpu::side::{CloudView, ExactView, Scope};
+use crate::cpu::sweep::is_edge_on;
 use crate::pair::plan::ring;
 use crate::pair::sampling::stride;
 use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Penetration, Surface, VirtualCamera};
@@ -25,7 +25,7 @@ const FROM_BEHIND: f32 = 0.5;
 
 impl Scratch {
     /// The first meeting.
-    pub(super) fn impact(&mut self, query: &ImpactQuery) -> Option<Impact> {
+    pub(crate) fn impact(&mut self, query: &ImpactQuery) -> Option<Impact> {
         self.impact_coarser(query, 1.0)
     }
 

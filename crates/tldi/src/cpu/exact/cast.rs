@@ -1,7 +1,7 @@
 //! Stage `cast`: the image of an exact surface, one ray a pixel.
 
-use super::fold::ViewFold;
-use super::rect::Rect;
+use crate::cpu::fold::ViewFold;
+use crate::cpu::rect::Rect;
 use crate::{Facing, Layer, RayHit, RaySurface, Tldi, VirtualCamera};
 use glamx::Pose3;
 

@@ -5,11 +5,11 @@
 //! windows are drawn with small pixels, where the large ones show a crossing most plainly. Contacts
 //! that are shallow, or that no window proves, go to the full look with small pixels.
 
-use super::cells::CellImaging;
-use super::compare::{self, Crossings, Seen};
-use super::scratch::{CommonPixels, Scratch};
-use super::side::CloudView;
-use super::window::Window;
+use crate::cpu::compare::{self, Crossings, Seen};
+use crate::cpu::first_look::cells::CellImaging;
+use crate::cpu::first_look::window::Window;
+use crate::cpu::scratch::{CommonPixels, Scratch};
+use crate::cpu::side::CloudView;
 use crate::pair::pixels::largest_pixel;
 use crate::pair::plan::PairPlan;
 use crate::pair::sampling::stride;
@@ -40,7 +40,7 @@ const POINTS_PER_PIXEL: f32 = 4.0;
 const MOST_WINDOWS: usize = 3;
 
 /// What a first look came to.
-pub(super) enum FirstLook {
+pub(crate) enum FirstLook {
     /// Both sides hold nothing of use.
     Nothing,
     /// It settled nothing. Both sides hold culled points, one in as many as said here, and which of them are near.
@@ -103,7 +103,7 @@ fn cloud_views<'a>(
 
 impl Scratch {
     /// Looks at the pair with large pixels. Where that settles it, `result` is filled, and else empty.
-    pub(super) fn settle(
+    pub(crate) fn settle(
         &mut self,
         query: &PairQuery,
         plan: &PairPlan,

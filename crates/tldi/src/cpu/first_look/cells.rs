@@ -6,9 +6,9 @@
 //! no search for neighbours, no normals of points, no splats. Sums are integers: they do not depend
 //! on the order of the points.
 
-use super::columns::Columns;
-use super::lanes::multiversioned;
-use super::rect::Rect;
+use crate::cpu::columns::Columns;
+use crate::cpu::lanes::multiversioned;
+use crate::cpu::rect::Rect;
 use crate::{Facing, Layer, Tldi, VirtualCamera};
 use glamx::Vec3;
 use std::ops::Range;
@@ -37,7 +37,7 @@ const FLAT: f32 = 0.05;
 
 /// The points and cells of an image, kept from call to call.
 #[derive(Default)]
-pub(super) struct Cells {
+pub(crate) struct Cells {
     /// Pixel of each point, one beyond the last where it is beside the image, and what it is there.
     located: Vec<(u32, Point)>,
     /// First point of each pixel; one entry more than pixels.
@@ -139,19 +139,19 @@ impl Plane {
 }
 
 /// How an image of cells is taken.
-pub(super) struct CellImaging<'a> {
-    pub(super) camera: &'a VirtualCamera,
+pub(crate) struct CellImaging<'a> {
+    pub(crate) camera: &'a VirtualCamera,
     /// Edge of a pixel, metres.
-    pub(super) pixel_size: f32,
-    pub(super) rect: Rect,
+    pub(crate) pixel_size: f32,
+    pub(crate) rect: Rect,
     /// Least depth, metres.
-    pub(super) near: f32,
+    pub(crate) near: f32,
 }
 
 impl Cells {
     /// Fills `out` with the layers of the `kept` points of `columns`. `exits` tells of the i-th whether its outward
     /// normal points along the view, where normals tell. Cost: linear in points and pixels.
-    pub(super) fn image(
+    pub(crate) fn image(
         &mut self,
         columns: &Columns,
         kept: &[u32],

@@ -1,8 +1,8 @@
 //! An exact surface where a pair has it, and how far it is from cells and columns.
 
-use super::columns::rect_of;
-use super::fold::SpaceFold;
-use super::rect::Rect;
+use crate::cpu::columns::rect_of;
+use crate::cpu::fold::SpaceFold;
+use crate::cpu::rect::Rect;
 use crate::{RaySurface, VirtualCamera};
 use glamx::{Pose3, Vec3};
 
@@ -13,33 +13,33 @@ const LEAST_FREE: f32 = 0.05;
 /// Steps of a march along a column, after which a surface counts as near. Spheres that grow past a surface leave it in
 /// about ten; a march along a plane that is hardly farther than the reach would take as many as the column is long.
 /// Half as many draw a few columns more in which nothing meets; twice as many cost as much again.
-pub(super) const MOST_STEPS: usize = 64;
+pub(crate) const MOST_STEPS: usize = 64;
 
 /// For each cell, the least distance that a point in it can have, metres. It is not a number until it is asked for. Kept
 /// from call to call.
 #[derive(Default)]
-pub(super) struct CellDistances {
-    pub(super) least: Vec<f32>,
-    pub(super) fold: SpaceFold,
+pub(crate) struct CellDistances {
+    pub(crate) least: Vec<f32>,
+    pub(crate) fold: SpaceFold,
 }
 
 /// An exact surface where a pair has it.
 #[derive(Clone, Copy)]
-pub(super) struct Placed<'a> {
-    pub(super) surface: &'a dyn RaySurface,
-    pub(super) frame_from_surface: &'a Pose3,
+pub(crate) struct Placed<'a> {
+    pub(crate) surface: &'a dyn RaySurface,
+    pub(crate) frame_from_surface: &'a Pose3,
 }
 
 impl Placed<'_> {
     /// Signed distance, and the normal at the nearest point, in the frame of the pair.
-    pub(super) fn project(&self, point: Vec3) -> (f32, Vec3) {
+    pub(crate) fn project(&self, point: Vec3) -> (f32, Vec3) {
         let own = self.frame_from_surface.inverse_transform_point(point);
         let (distance, normal) = self.surface.project(own);
         (distance, self.frame_from_surface.rotation * normal)
     }
 
     /// The pixels that it covers and `border` more on all sides; `None` where its bounds are infinite.
-    pub(super) fn covers(&self, camera: &VirtualCamera, border: i32) -> Option<Rect> {
+    pub(crate) fn covers(&self, camera: &VirtualCamera, border: i32) -> Option<Rect> {
         let view_from_surface = camera.view_from_frame * *self.frame_from_surface;
         let bounds = self.surface.bounds().transformed(&view_from_surface);
         let corners = [bounds.min, bounds.max];
@@ -52,7 +52,7 @@ impl Placed<'_> {
 
     /// Whether it comes within `reach` metres of a column of pixels: of one through `[u, v]`, between two depths.
     /// Marches along it, each time as far as nothing can be near; where that does not end, it may come so near.
-    pub(super) fn meets(
+    pub(crate) fn meets(
         &self,
         camera: &VirtualCamera,
         [u, v]: [f32; 2],

@@ -1,23 +1,23 @@
 //! Where a surface that moves along the view meets another.
 
-use super::sweep::is_edge_on;
+use crate::cpu::sweep::is_edge_on;
 use crate::{Layer, Params};
 use glamx::Vec3;
 
 /// Where the ray of a pixel sees the surfaces meet.
-pub(super) struct Meeting {
-    pub(super) pixel: usize,
+pub(crate) struct Meeting {
+    pub(crate) pixel: usize,
     /// Distance of the moving surface from there, metres.
-    pub(super) distance: f32,
-    pub(super) depth: f32,
+    pub(crate) distance: f32,
+    pub(crate) depth: f32,
     /// Least cosine between the motion and the normals of both.
-    pub(super) facing: f32,
+    pub(crate) facing: f32,
     /// Unit normal towards the moving surface, in the view frame.
-    pub(super) normal: Vec3,
+    pub(crate) normal: Vec3,
 }
 
 impl Meeting {
-    pub(super) fn new(pixel: usize, met: &Layer, leading: &Layer, params: &Params) -> Self {
+    pub(crate) fn new(pixel: usize, met: &Layer, leading: &Layer, params: &Params) -> Self {
         let against = |normal: Vec3| if normal.z > 0.0 { -normal } else { normal };
         let facing = met.normal.z.abs().min(leading.normal.z.abs());
         let depth = front(met, params);

@@ -5,11 +5,11 @@
 //! The camera is aimed by an even selection of the points in cells that may be near. If that finds few near points,
 //! all points are asked: no contact is too small to be found.
 
-use super::fold::is_coarse;
-use super::normals;
-use super::placed::{CellDistances, Placed};
-use super::side::Side;
-use super::zone::ZoneGrid;
+use crate::cpu::exact::placed::{CellDistances, Placed};
+use crate::cpu::fold::is_coarse;
+use crate::cpu::normals;
+use crate::cpu::side::Side;
+use crate::cpu::zone::ZoneGrid;
 use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
 use crate::{Aabb, PointCloud};
 use glamx::{Pose3, Vec3};
@@ -21,7 +21,7 @@ impl Side {
     /// Finds the culled points within `reach` metres of an exact surface or inside it, coarser ones farther away, or
     /// an even selection of them; its normals at the nearest points go to `surface_normals`. `false` where none is
     /// near.
-    pub(super) fn near_exact(
+    pub(crate) fn near_exact(
         &mut self,
         cloud: &PointCloud,
         frame_from_cloud: &Pose3,
@@ -140,7 +140,7 @@ mod tests {
     use super::*;
     use crate::cloud::reach::Ring;
     use crate::cpu::cull::{self, Region};
-    use crate::cpu::placed::MOST_STEPS;
+    use crate::cpu::exact::placed::MOST_STEPS;
     use crate::{RayHit, RaySurface, VirtualCamera};
     use fastrand::Rng;
     use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,29 +1,29 @@
 //! Which pixels of a moving surface are its core, and which are its rim, where rays miss layers now and then.
 
-use super::columns::{Columns, dilate};
-use super::splat_radius::splat_radius;
 use crate::Tldi;
+use crate::cpu::columns::{Columns, dilate};
+use crate::cpu::splat_radius::splat_radius;
 
 /// Width in pixels of the rim that [`ImpactQuery::core_only`](crate::ImpactQuery::core_only) leaves out. Splats stand out by one pixel on either side,
 /// and one more is for roughness. A surface missed in the rim penetrates by at most that pixel, and contacts push it
 /// out again.
-pub(super) const RIM: i32 = 3;
+pub(crate) const RIM: i32 = 3;
 
 /// Width in pixels of the outer rim, which is always left out: a splat of either side stands out by that much. The inner
 /// rim stops a motion only if it would go on, past what it meets there, by more than the whole rim.
 const OUTER_RIM: u8 = 2;
 
 /// Pixels added around an image so that a rim shows there: its width, and one for closing gaps.
-pub(super) const BORDER: i32 = RIM + 1;
+pub(crate) const BORDER: i32 = RIM + 1;
 
 /// In which part of a moving surface a pixel lies.
-pub(super) const OUTSIDE: u8 = 0;
+pub(crate) const OUTSIDE: u8 = 0;
 const INNER_RIM: u8 = 1;
-pub(super) const CORE: u8 = 2;
+pub(crate) const CORE: u8 = 2;
 
 /// Which pixels of a moving surface count, kept from call to call.
 #[derive(Default)]
-pub(super) struct CoreScratch {
+pub(crate) struct CoreScratch {
     covered: Vec<u8>,
     inner: Vec<u8>,
     /// Distance from the edge in pixels, counted up to the width of the rim.
@@ -33,7 +33,7 @@ pub(super) struct CoreScratch {
 
 impl CoreScratch {
     /// Covers the pixels that `image` covers. Beyond the image, its border is continued.
-    pub(super) fn cover_by_image(&mut self, image: &Tldi) {
+    pub(crate) fn cover_by_image(&mut self, image: &Tldi) {
         let [width, height] = image.size.map(|n| n as i32);
         self.covered.clear();
         for j in -BORDER..height + BORDER {
@@ -46,7 +46,7 @@ impl CoreScratch {
     }
 
     /// Covers the pixels in and around `image` within `radius` metres of a point.
-    pub(super) fn cover_by_points(&mut self, image: &Tldi, points: &Columns, radius: f32) {
+    pub(crate) fn cover_by_points(&mut self, image: &Tldi, points: &Columns, radius: f32) {
         let dims = image.size.map(|n| n as i32 + 2 * BORDER);
         let first = image.origin.map(|o| (o - BORDER) as f32);
         let radius_px =
@@ -72,7 +72,7 @@ impl CoreScratch {
     }
 
     /// Marks what is covered as core, rim or outside; the image is `width` pixels wide.
-    pub(super) fn find(&mut self, width: u32) {
+    pub(crate) fn find(&mut self, width: u32) {
         let row = width as usize + 2 * BORDER as usize;
         // Gaps are closed first: a gap of one pixel has no rim.
         let (covered, inner, depth) = (&mut self.covered, &mut self.inner, &mut self.depth);
@@ -105,7 +105,7 @@ impl CoreScratch {
     }
 
     /// [`CORE`], [`INNER_RIM`] or [`OUTSIDE`].
-    pub(super) fn place(&self, pixel: usize, width: u32) -> u8 {
+    pub(crate) fn place(&self, pixel: usize, width: u32) -> u8 {
         let (i, j) = (pixel % width as usize, pixel / width as usize);
         let row = width as usize + 2 * BORDER as usize;
         self.covered[(j + BORDER as usize) * row + i + BORDER as usize]

@@ -1,0 +1,5 @@
+//! The first look at a pair: large pixels, which settle what is deep.
+
+pub(super) mod cells;
+pub(super) mod settle;
+pub(super) mod window;
