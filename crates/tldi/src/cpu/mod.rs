@@ -1,9 +1,10 @@
 //! The CPU backend: the reference that every other backend is compared with.
 //!
-//! One file a stage: `cull`, `zone`, `aim` (`camera_policy.rs`), `columns`, `normals`, `splat` (with `mark` and
-//! `alloc`), `cast`, `sweep`, `compare`; then the reduction to contact patches, which all backends
-//! share. `pair` runs them, `side` those of one cloud; `lanes` is what
-//! makes their inner loops SIMD. `impact` compares the images of a motion.
+//! One file or folder a stage: `cull`, `zone`, `aim` (`camera_policy.rs`), `columns`, `normals`, `splat` (with `mark` and
+//! `alloc`), `exact` (rays through exact surfaces), `sweep`, `compare`; then the reduction to contact patches, which all
+//! backends share. `pair` runs them, `scratch` holds what a pair needs and the steps that all looks share, `side` those of
+//! one cloud. `first_look` settles deep contacts with large pixels, `motion` compares the images of a motion. `lanes` is
+//! what makes inner loops SIMD.
 
 pub(crate) mod columns;
 pub(crate) mod compare;
@@ -14,9 +15,7 @@ mod fold;
 mod lanes;
 mod motion;
 pub(crate) mod normals;
-pub(crate) mod normals_sharpen;
 mod pair;
-pub(crate) mod planes;
 mod rect;
 pub(crate) mod room;
 mod scratch;

@@ -7,8 +7,8 @@ use super::exact::placed::{CellDistances, Placed};
 use super::first_look::cells::{CellImaging, Cells};
 use super::fold::{FARTHEST_PIXEL, ViewFold};
 use super::motion::core::BORDER;
+use super::normals::sharpen::{SharpenScratch, sharpen};
 use super::normals::{self, NormalScratch};
-use super::normals_sharpen::sharpen;
 use super::rect::{Footprint, Rect};
 use super::room::{Cost, Room};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
@@ -37,6 +37,7 @@ pub(super) struct Side {
     /// Indices of the points whose positions decide those normals.
     pub(super) support: Vec<u32>,
     pub(super) normals: NormalScratch,
+    sharpen: SharpenScratch,
     fragments: Fragments,
     cells: Cells,
     pub(super) cell_distances: CellDistances,
@@ -327,7 +328,13 @@ impl Side {
         );
         if view.sharpens {
             let noise = view.cloud.noise();
-            sharpen(radius, noise, &mut self.normals, &mut self.kept_normals);
+            let Self {
+                normals,
+                sharpen: scratch,
+                kept_normals,
+                ..
+            } = self;
+            sharpen(radius, noise, normals, scratch, kept_normals);
         }
     }
 

@@ -1,7 +1,8 @@
 //! The numbers of the stages, for backends on a device.
 
 use crate::BLOCK;
-use crate::cpu::{columns, compare, normals, normals_sharpen, planes, splat, sweep};
+use crate::cpu::normals::{estimate, planes, sharpen};
+use crate::cpu::{columns, compare, splat, sweep};
 use crate::pair::sampling::AIM_SAMPLES;
 use crate::view::{approach, camera_policy};
 
@@ -9,9 +10,9 @@ use crate::view::{approach, camera_policy};
 /// declare for them.
 pub fn stage_constants() -> Vec<(&'static str, f64)> {
     let mut all = vec![("BLOCK", BLOCK as f64), ("AIM_SAMPLES", AIM_SAMPLES as f64)];
-    all.extend(normals::CONSTANTS);
+    all.extend(estimate::CONSTANTS);
     all.extend(planes::CONSTANTS);
-    all.extend(normals_sharpen::CONSTANTS);
+    all.extend(sharpen::CONSTANTS);
     all.extend(splat::CONSTANTS);
     all.extend(sweep::CONSTANTS);
     all.extend(columns::CONSTANTS);

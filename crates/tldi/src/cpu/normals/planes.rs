@@ -1,7 +1,7 @@
 //! Planes of neighbourhoods of points: their normals are solved for side by side.
 
-use super::lanes::multiversioned;
 use crate::cloud::point_normals::least_variance_axis;
+use crate::cpu::lanes::multiversioned;
 use glamx::{DMat3, DVec3, FloatExt, Vec3};
 
 /// Planes that are solved for side by side.
@@ -15,29 +15,29 @@ const LEAST_PLANAR: f32 = 1e-4;
 pub(crate) const CONSTANTS: [(&str, f64); 1] = [("LEAST_PLANAR", LEAST_PLANAR as f64)];
 
 /// Sums over the points around a point, of 1, x, y, z, xx, xy, xz, yy, yz and zz; metres from the point.
-pub(super) type Moments = [f32; 10];
+pub(crate) type Moments = [f32; 10];
 
 /// The plane that best fits the points around a point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plane {
+pub(crate) struct Plane {
     /// Unit; either way.
-    pub(super) normal: Vec3,
+    pub(crate) normal: Vec3,
     /// Of the points about it, square metres; infinite where they are no plane's, but three or on a line.
-    pub(super) variance: f32,
+    pub(crate) variance: f32,
     /// Height of the point above it, metres.
-    pub(super) height: f32,
+    pub(crate) height: f32,
 }
 
 impl Plane {
     /// Any other fits better.
-    pub(super) const UNKNOWN: Self = Self {
+    pub(crate) const UNKNOWN: Self = Self {
         normal: Vec3::ZERO,
         variance: f32::INFINITY,
         height: 0.0,
     };
 
     /// A plane between this and another of the same point, with a normal on the same side.
-    pub(super) fn towards(&self, other: &Self, share: f32) -> Self {
+    pub(crate) fn towards(&self, other: &Self, share: f32) -> Self {
         if share >= 1.0 {
             return *other;
         }
@@ -53,7 +53,7 @@ impl Plane {
 }
 
 /// Neighbourhoods whose planes are solved for together, as structure of arrays.
-pub(super) struct Batch {
+pub(crate) struct Batch {
     /// Where the plane goes.
     place: [u32; BATCH],
     moments: [[f32; BATCH]; 10],
@@ -81,7 +81,7 @@ impl Default for Batch {
 
 impl Batch {
     /// Adds a neighbourhood whose plane is to be the `place`-th.
-    pub(super) fn push(&mut self, place: u32, moments: Moments) {
+    pub(crate) fn push(&mut self, place: u32, moments: Moments) {
         self.place[self.count] = place;
         for (to, from) in self.moments.iter_mut().zip(moments) {
             to[self.count] = from;
@@ -89,12 +89,12 @@ impl Batch {
         self.count += 1;
     }
 
-    pub(super) fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         self.count == BATCH
     }
 
     /// Puts the planes of what was pushed into their places.
-    pub(super) fn solve(&mut self, planes: &mut [Plane]) {
+    pub(crate) fn solve(&mut self, planes: &mut [Plane]) {
         solve_planar(self);
         for k in 0..self.count {
             planes[self.place[k] as usize] = match self.planar[k] {

@@ -6,10 +6,10 @@
 //! second pass takes what the neighbours have taken. Where a surface bends or is noisy, nothing is
 //! flat, and normals stay as they are.
 
-use super::lanes::multiversioned;
-use super::normals::{LANES, MAX_CANDIDATES, NormalScratch, SUPPORT, Sorted};
-use super::planes::Plane;
 use crate::contact::ramp::ramp;
+use crate::cpu::lanes::multiversioned;
+use crate::cpu::normals::estimate::{LANES, MAX_CANDIDATES, NormalScratch, SUPPORT, Sorted};
+use crate::cpu::normals::planes::Plane;
 use glamx::Vec3;
 
 /// Standard deviation of neighbours from their plane, in mean radii, up to which they are on it: a tenth of
@@ -36,7 +36,7 @@ pub(crate) const CONSTANTS: [(&str, f64); 4] = [
 
 /// Memory of the stage, kept from call to call.
 #[derive(Default)]
-pub(super) struct SharpenScratch {
+pub(crate) struct SharpenScratch {
     flat: FlatPlanes,
     /// Sorted points that are not on their planes.
     rough: Vec<u32>,
@@ -95,18 +95,19 @@ impl FlatPlanes {
 /// Sharpens the normals that were just estimated. `radius` is the neighbourhood's, `noise` the standard deviation of the
 /// points that the user gave, both in metres. Cost: less than estimating, and only for points whose neighbours lie on
 /// no plane.
-pub(crate) fn sharpen(radius: f32, noise: f32, scratch: &mut NormalScratch, normals: &mut [Vec3]) {
-    let NormalScratch {
-        sorted,
-        planes,
-        sharpen,
-        ..
-    } = scratch;
+pub(crate) fn sharpen(
+    radius: f32,
+    noise: f32,
+    estimated: &mut NormalScratch,
+    scratch: &mut SharpenScratch,
+    normals: &mut [Vec3],
+) {
+    let NormalScratch { sorted, planes, .. } = estimated;
     let SharpenScratch {
         flat,
         rough,
         adopted,
-    } = sharpen;
+    } = scratch;
     let square = |of_radii: f32| (of_radii / SUPPORT * radius).powi(2);
     let on_plane = square(ON_PLANE) + OF_NOISE * noise * noise;
     let limits = [radius * radius, square(FLAT)];
@@ -185,8 +186,8 @@ fn sums(p: Vec3, side: Vec3, [reach, most]: [f32; 2], flat: &FlatPlanes) -> [f32
 
 #[cfg(test)]
 mod tests {
-    use super::super::normals::estimate;
     use super::*;
+    use crate::cpu::normals::estimate::estimate;
     use glamx::Quat;
     use std::f32::consts::{FRAC_PI_4, TAU};
 
@@ -219,7 +220,8 @@ mod tests {
             targets.zip(normals).collect()
         };
         let estimated = placed(&normals);
-        sharpen(SUPPORT, noise, &mut scratch, &mut normals);
+        let mut own = SharpenScratch::default();
+        sharpen(SUPPORT, noise, &mut scratch, &mut own, &mut normals);
         [estimated, placed(&normals)]
     }
 

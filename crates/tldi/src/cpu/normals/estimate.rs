@@ -5,10 +5,9 @@
 //! with cells as large as that; all points of a cell share the candidates of its 27 cells, whose
 //! moments are summed in lanes.
 
-use super::fold::{SpaceFold, is_coarse};
-use super::lanes::{bounds, multiversioned, truncated};
-use super::normals_sharpen::SharpenScratch;
-use super::planes::{Batch, Moments, Plane};
+use crate::cpu::fold::{SpaceFold, is_coarse};
+use crate::cpu::lanes::{bounds, multiversioned, truncated};
+use crate::cpu::normals::planes::{Batch, Moments, Plane};
 use glamx::Vec3;
 use std::ops::Range;
 
@@ -22,10 +21,10 @@ const CELLS_PER_POINT: usize = 16;
 
 /// Most candidates whose distances are looked at, for all points of a cell: five times what a
 /// surface has. Of more, an even selection represents them.
-pub(super) const MAX_CANDIDATES: usize = 512;
+pub(crate) const MAX_CANDIDATES: usize = 512;
 
 /// Candidates that are summed side by side.
-pub(super) const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Coordinates that are copied at once, needed or not: as many as a row of cells has on a surface, or half of them.
 const RUN: usize = 16;
@@ -43,18 +42,17 @@ pub(crate) struct NormalScratch {
     points: [Vec<f32>; 3],
     cells: Vec<u32>,
     fold: SpaceFold,
-    pub(super) sorted: Sorted,
+    pub(crate) sorted: Sorted,
     candidates: Candidates,
     batch: Batch,
     /// Of each sorted point the plane of its neighbourhood, where it was wanted.
-    pub(super) planes: Vec<Plane>,
-    pub(super) sharpen: SharpenScratch,
+    pub(crate) planes: Vec<Plane>,
 }
 
 /// Points in the order of their cells.
 #[derive(Default)]
-pub(super) struct Sorted {
-    pub(super) entries: Vec<Entry>,
+pub(crate) struct Sorted {
+    pub(crate) entries: Vec<Entry>,
     /// Their coordinates, and [`RUN`] more of no meaning.
     coordinates: [Vec<f32>; 3],
     /// First point of each cell; one entry more than cells.
@@ -80,9 +78,9 @@ impl Default for Candidates {
 
 /// A point in the order of the cells.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Entry {
+pub(crate) struct Entry {
     id: u32,
-    pub(super) cell: u32,
+    pub(crate) cell: u32,
     wanted: bool,
 }
 
@@ -248,12 +246,12 @@ impl NormalScratch {
 
 impl Sorted {
     /// Of the `k`-th point.
-    pub(super) fn position(&self, k: usize) -> Vec3 {
+    pub(crate) fn position(&self, k: usize) -> Vec3 {
         Vec3::from_array(self.coordinates.each_ref().map(|c| c[k]))
     }
 
     /// The points whose normals are wanted.
-    pub(super) fn wanted(&self) -> impl Iterator<Item = u32> {
+    pub(crate) fn wanted(&self) -> impl Iterator<Item = u32> {
         let all = self.entries.iter().zip(0..);
         all.filter(|(entry, _)| entry.wanted).map(|(_, k)| k)
     }
@@ -261,7 +259,7 @@ impl Sorted {
     /// Tells `put` which points are in a cell and its neighbours: all, or of more than
     /// [`MAX_CANDIDATES`] an even selection. Returns how many.
     #[inline(always)]
-    pub(super) fn around(&self, cell: usize, mut put: impl FnMut(usize)) -> usize {
+    pub(crate) fn around(&self, cell: usize, mut put: impl FnMut(usize)) -> usize {
         let rows = self.rows(cell);
         let total: usize = rows.iter().map(|row| row.len()).sum();
         let step = total.div_ceil(MAX_CANDIDATES).max(1);

@@ -1,0 +1,8 @@
+//! Unit normals of the points that are modelled: estimated, then sharpened beside edges.
+
+pub(crate) mod estimate;
+pub(crate) mod planes;
+pub(crate) mod sharpen;
+
+pub use estimate::SUPPORT;
+pub(crate) use estimate::{NormalScratch, estimate};
