@@ -11,9 +11,10 @@ use crate::batch_buffers::BatchBuffers;
 use crate::buffers::most_bytes;
 use crate::counters::Counters;
 use crate::layout::{is_for_device, lives_on_device};
+use crate::measure::stage_bytes::stage_bytes;
+use crate::measure::timer::Timer;
 use crate::resident::Resident;
 use crate::sources::{DepthCamera, Sources};
-use crate::timer::Timer;
 use crate::upload::Upload;
 use crate::{Gpu, GpuError, StageTime, Traffic};
 use submit::Asked;
@@ -190,7 +191,7 @@ impl WgpuBackend {
     /// What the stages of the last batch, or of its last part where it was halved, had to read and
     /// write at least, each element once, bytes.
     pub fn needed_bytes(&self) -> Vec<(&'static str, u64)> {
-        self.last.bytes(&self.upload)
+        stage_bytes(&self.upload, &self.last)
     }
 
     /// How many elements of each kind the last batch needed, or its last part where it was halved.

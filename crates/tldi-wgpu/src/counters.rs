@@ -2,11 +2,9 @@
 
 use crate::GpuError;
 use crate::layout::{
-    CONTACT_WORDS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, MOST_SPLATS, MOST_SURVIVORS,
-    PIXEL_BYTES, PLANE_BYTES, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, TILE_BYTES,
+    CONTACT_WORDS, FRAGMENT_BYTES, LAYER_BYTES, MOST_SPLATS, MOST_SURVIVORS, PIXEL_BYTES,
+    SPLAT_BYTES, SURVIVOR_BYTES, TILE_BYTES,
 };
-use crate::pipelines::is_needed;
-use crate::upload::Upload;
 use bytemuck::{Pod, Zeroable};
 
 /// Bytes of an element of each counter, in its buffer, and what the element is.
@@ -74,47 +72,6 @@ impl Counters {
     pub(crate) fn named(&self) -> [(&'static str, u32); 7] {
         let words: [u32; 7] = bytemuck::cast(*self);
         std::array::from_fn(|k| (ELEMENT_NAMES[k], words[k]))
-    }
-
-    /// What each stage that runs must read and write at least, bytes.
-    pub(crate) fn bytes(&self, upload: &Upload) -> Vec<(&'static str, u64)> {
-        let times = |count: u32, bytes: u64| u64::from(count) * bytes;
-        let survivors = times(self.survivors, SURVIVOR_BYTES);
-        let tiles = times(self.tiles, 4);
-        // Both sides' begins and ends.
-        let pixels = times(self.pixels, 2 * 8);
-        let fragments = times(self.fragments, FRAGMENT_BYTES);
-        let splats = times(self.splats, SPLAT_BYTES);
-        let layers = times(self.layers, LAYER_BYTES);
-        let bare = upload.has_bare_sides();
-        let entries = times(if bare { self.survivors } else { 0 }, ENTRY_BYTES);
-        let normals = times(self.survivors, if bare { PLANE_BYTES } else { 12 });
-        let all = [
-            ("cull", 12 * upload.points() as u64 + survivors),
-            ("zone", 2 * survivors),
-            ("normals_alloc", upload.cell_bytes()),
-            ("normals_sort", survivors + entries),
-            ("sample", survivors),
-            ("aim", 2 * 16 * SAMPLE_SLOTS * upload.pairs.len() as u64),
-            ("columns_bounds", survivors),
-            ("columns_tiles", 0),
-            ("columns_depths", survivors + 2 * tiles),
-            ("columns_touch", 3 * tiles),
-            ("columns_pixels", 0),
-            ("normals", survivors + entries + normals),
-            ("normals_sharpen", survivors + entries + 2 * normals),
-            ("normals_settle", survivors + entries + 2 * normals),
-            ("mark", survivors + normals + splats + pixels),
-            ("alloc", 2 * pixels),
-            ("splat", splats + fragments),
-            ("sweep", fragments + splats + layers + pixels),
-            (
-                "compare",
-                layers + pixels + times(self.contacts, 4 * u64::from(CONTACT_WORDS)),
-            ),
-        ];
-        let runs = |stage: &(&str, u64)| is_needed(stage.0, bare);
-        all.into_iter().filter(runs).collect()
     }
 
     /// Whether buffers of this size are large enough.

@@ -97,3 +97,15 @@ impl From<GpuError> for BackendError {
         Self::Device(error.to_string())
     }
 }
+
+/// `count` words, or elements, as the stages number them.
+///
+/// # Errors
+/// [`GpuError::TooLarge`] where a word cannot.
+pub(crate) fn numbered(buffer: &'static str, count: u64) -> Result<u32, GpuError> {
+    u32::try_from(count).map_err(|_| GpuError::TooLarge {
+        buffer,
+        needed: count.saturating_mul(4),
+        allowed: 4 * u64::from(u32::MAX),
+    })
+}

@@ -1,6 +1,6 @@
 //! What is uploaded with every batch, with the layout of `shared/types.wgsl`.
 
-use crate::GpuError;
+use crate::error::{GpuError, numbered};
 use crate::resident::Place;
 use bytemuck::{Pod, Zeroable};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
@@ -42,18 +42,6 @@ pub(crate) fn stage_constants() -> Vec<(&'static str, f64)> {
     let mut all = plan::stage_constants();
     all.push(("WEIGHT_BITS", f64::from(WEIGHT_BITS)));
     all
-}
-
-/// `count` words, or elements, as the stages number them.
-///
-/// # Errors
-/// [`GpuError::TooLarge`] where a word cannot.
-pub(crate) fn numbered(buffer: &'static str, count: u64) -> Result<u32, GpuError> {
-    u32::try_from(count).map_err(|_| GpuError::TooLarge {
-        buffer,
-        needed: count.saturating_mul(4),
-        allowed: 4 * u64::from(u32::MAX),
-    })
 }
 
 const FIXED_VIEW: u32 = 6;

@@ -8,7 +8,6 @@
 mod answer;
 mod auto;
 mod backend;
-mod bandwidth;
 mod batch_buffers;
 mod buffers;
 mod choice;
@@ -17,6 +16,7 @@ mod crossover;
 mod device;
 mod error;
 mod layout;
+mod measure;
 mod pipelines;
 mod prediction;
 mod readback;
@@ -24,17 +24,15 @@ mod resident;
 mod sources;
 #[cfg(test)]
 mod testing;
-mod timer;
-mod traffic;
 mod upload;
 
 pub use auto::AutoBackend;
 pub use backend::{InFlight, WgpuBackend};
-pub use bandwidth::copy_bandwidth;
 pub use choice::{BACKEND_VARIABLE, BackendChoice};
 pub use device::{AdapterChoice, Gpu};
 pub use error::GpuError;
+pub use measure::bandwidth::copy_bandwidth;
+pub use measure::timer::StageTime;
+pub use measure::traffic::Traffic;
 pub use sources::DepthCamera;
-pub use timer::StageTime;
-pub use traffic::Traffic;
 pub use wgpu;

@@ -2,7 +2,7 @@
 //! content stays the same.
 
 use crate::buffers::{create, most_bytes};
-use crate::layout::numbered;
+use crate::error::numbered;
 use crate::{Gpu, GpuError};
 use std::collections::HashMap;
 use std::ops::Range;

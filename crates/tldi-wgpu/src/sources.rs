@@ -1,7 +1,7 @@
 //! Clouds that are born on the device: in a buffer of the caller's, or from a depth image.
 
 use crate::buffers::Growable;
-use crate::layout::numbered;
+use crate::error::numbered;
 use crate::pipelines::module;
 use crate::resident::{Place, Resident};
 use crate::{Gpu, GpuError};

@@ -4,8 +4,8 @@ use super::WgpuBackend;
 use crate::GpuError;
 use crate::answer::Answer;
 use crate::layout::{BatchData, CONTACT_WORDS, COUNTERS, GROUP, PAIR_WORDS};
+use crate::measure::timer::Timer;
 use crate::pipelines::{Pipeline, is_needed};
-use crate::timer::Timer;
 use std::ops::Range;
 use tldi_shaders::FURTHER_FROM;
 
