@@ -318,7 +318,7 @@ impl RobotSimulation {
         let touched = tally::count(
             &mut self.tally,
             self.totals.steps + 1,
-            &self.world.narrow_phase,
+            &self.world,
             |collider| link_of.get(&collider).copied(),
             name_of,
         );

@@ -1,7 +1,6 @@
 //! Contact forces of each link, step by step.
 
 use super::report::{Hardest, LinkReport};
-use super::simulation::DT;
 use rapier3d::prelude::*;
 use tldi::glamx::Vec3;
 
@@ -37,7 +36,7 @@ impl LinkTally {
 pub(super) fn count(
     tallies: &mut [LinkTally],
     step: usize,
-    narrow_phase: &NarrowPhase,
+    world: &PhysicsWorld,
     link_of: impl Fn(ColliderHandle) -> Option<usize>,
     name_of: impl Fn(ColliderHandle) -> String,
 ) -> Vec<ColliderHandle> {
@@ -49,7 +48,7 @@ pub(super) fn count(
         tally.touches = false;
         tally.force = 0.0;
     }
-    for pair in narrow_phase.contact_pairs() {
+    for pair in world.narrow_phase.contact_pairs() {
         let colliders = [pair.collider1, pair.collider2];
         let links = colliders.map(&link_of);
         if links == [None, None] || pair.total_impulse_magnitude() <= 0.0 {
@@ -73,7 +72,7 @@ pub(super) fn count(
         let Some((_, other)) = strongest else {
             continue;
         };
-        let force = impulse.length() / DT;
+        let force = impulse.length() / world.integration_parameters.dt;
         tally.force = force;
         tally.contact_steps += 1;
         tally.force_sum += f64::from(force);
