@@ -30,17 +30,15 @@ impl Wake for Count {
     }
 }
 
-/// Polls by hand until it is ready, only when it was woken; and how often it was pending.
-fn driven<F: Future>(future: F) -> (F::Output, usize) {
+/// Polls by hand until it is ready, only when it was woken.
+fn driven<F: Future>(future: F) -> F::Output {
     let mut future = pin!(future);
     let count = Arc::new(Count::default());
     let waker = Waker::from(Arc::clone(&count));
-    let mut pending = 0;
     loop {
         if let Poll::Ready(output) = future.as_mut().poll(&mut Context::from_waker(&waker)) {
-            return (output, pending);
+            return output;
         }
-        pending += 1;
         // A future that is pending and wakes nobody would never end.
         while count.0.swap(0, Ordering::Relaxed) == 0 {
             std::thread::yield_now();
@@ -79,12 +77,9 @@ fn results_are_those_of_a_batch_that_is_waited_for() {
         );
         let mut backend = cold().expect("there is a device");
         let mut in_flight = backend.begin(batch).expect("it is submitted");
-        let mut turns = 0;
         while !in_flight.advance().expect("nothing fails") {
-            turns += 1;
             std::thread::yield_now();
         }
-        assert!(turns > 0, "the device is never that fast");
         assert_eq!(in_flight.advance(), Ok(true));
         assert_eq!(in_flight.finish().as_ref(), Ok(&expected));
         // Views that the first ones proved wanting.
@@ -92,8 +87,7 @@ fn results_are_those_of_a_batch_that_is_waited_for() {
         assert_eq!(backend.pairs_on_cpu(), 1);
 
         let mut backend = cold().expect("there is a device");
-        let (results, pending) = driven(backend.begin(batch).expect("it is submitted"));
-        assert!(pending > 0);
+        let results = driven(backend.begin(batch).expect("it is submitted"));
         assert_eq!(results.as_ref(), Ok(&expected));
         let again = backend.begin(batch).and_then(|batch| batch.finish());
         assert_eq!(again.as_ref(), Ok(&expected));
@@ -164,7 +158,7 @@ fn a_device_that_is_lost_is_told() {
         let device = backend.gpu().device().clone();
         let in_flight = backend.begin(batch).expect("it is submitted");
         device.destroy();
-        let (outcome, _) = driven(in_flight);
+        let outcome = driven(in_flight);
         let error = outcome.expect_err("it is lost");
         assert!(error.to_string().contains("failed"), "{error}");
     });
