@@ -256,7 +256,7 @@ fn a_listing_holds_what_users_see() {
             pub(crate) fn inner(&self) {}
         }
         impl Unseen { pub fn nothing() {} }
-        impl Default for Seen { fn default() -> Self { todo!() } }
+        impl Default for Seen { fn default() -> Self { Self { size: 1.0, hidden: 0 } } }
         pub(crate) fn helper() {}
         #[cfg(test)]
         mod tests { pub fn helper() {} }

@@ -40,24 +40,35 @@ fn walk(ground: Ground, seed: u64) -> StandingReport {
     simulation.report().standing.unwrap()
 }
 
-fn assert_stands(ground: Ground, seed: u64) -> StandingReport {
+/// What of a walk is not as it should be.
+fn faults(r: &StandingReport) -> Vec<&'static str> {
+    [
+        (r.feet == 4, "feet"),
+        // Legs give way by 2 % under a quarter of the weight, and by twice of that while one is up; the rest is
+        // for landing.
+        (r.least_height > 0.9 && r.last_height > 0.95, "height"),
+        // At 0.125 m/s for 5.4 s, without slip, 0.68 m. The rough ground begins 8 cm in front of the front feet.
+        ((0.3..0.7).contains(&r.way), "way"),
+        (r.deepest_radii < 0.5, "depth"),
+        // While a foot swings, those beside it on the rim of the trunk's lean carry two shares. Landing without a look
+        // at the ground, and on steps, adds up to another.
+        (r.max_foot_force < 3.0, "force"),
+        // Half a radius, of up to 2 cm far from the scanner, and 4 mm where a foot stands on the rim of a hole.
+        (r.feet_under_ground < 0.014, "feet under the ground"),
+        (r.links_under_ground == 0.0, "links under the ground"),
+    ]
+    .into_iter()
+    .filter_map(|(holds, name)| (!holds).then_some(name))
+    .collect()
+}
+
+fn assert_stands(ground: Ground, seed: u64) {
     let report = walk(ground, seed);
-    let case = || format!("{ground:?}, seed {seed}: {report:#?}");
-    assert_eq!(report.feet, 4, "{}", case());
-    // Legs give way by 2 % under a quarter of the weight, and by twice of that while one is up; the rest is
-    // for landing.
-    assert!(report.least_height > 0.9, "{}", case());
-    assert!(report.last_height > 0.95, "{}", case());
-    // At 0.125 m/s for 5.4 s, without slip, 0.68 m. The rough ground begins 8 cm in front of the front feet.
-    assert!((0.3..0.7).contains(&report.way), "{}", case());
-    assert!(report.deepest_radii < 0.5, "{}", case());
-    // While a foot swings, those beside it on the rim of the trunk's lean carry two shares. Landing without a look
-    // at the ground, and on steps, adds up to another.
-    assert!(report.max_foot_force < 3.0, "{}", case());
-    // Half a radius, of up to 2 cm far from the scanner, and 4 mm where a foot stands on the rim of a hole.
-    assert!(report.feet_under_ground < 0.014, "{}", case());
-    assert_eq!(report.links_under_ground, 0.0, "{}", case());
-    report
+    let faults = faults(&report);
+    assert!(
+        faults.is_empty(),
+        "{ground:?}, seed {seed}: {faults:?}, {report:#?}"
+    );
 }
 
 #[test]
@@ -75,10 +86,12 @@ fn the_quadruped_walks_over_rubble() {
     assert_stands(Ground::Rubble, 3);
 }
 
-/// All that the documentation reports; its gait was tuned on seed 1.
+/// All that the documentation reports; the gait was tuned on seed 1. In one walk a contact is deeper than half a radius, for
+/// a reason that is not known.
 #[test]
-#[ignore = "39 walks take minutes"]
+#[ignore = "39 walks take minutes: four on two cores"]
 fn all_walks() {
+    let mut found = Vec::new();
     for ground in Ground::ALL {
         for seed in 1..=13 {
             let r = walk(ground, seed);
@@ -92,6 +105,9 @@ fn all_walks() {
                 1e3 * r.feet_under_ground,
                 1e3 * r.links_under_ground
             );
+            let faults = faults(&r);
+            found.extend((!faults.is_empty()).then_some((ground, seed, faults)));
         }
     }
+    assert_eq!(found, [(Ground::Rubble, 13, vec!["depth"])]);
 }

@@ -188,7 +188,6 @@ impl TldiPipeline {
     ///     TldiDebugRenderMode::POINTS,
     /// )?;
     /// assert_eq!(lines.0.len(), 3 * 400); // crosses: the cloud has no normals
-    /// # let _ = (scan, ball);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn debug_render_sets(

@@ -132,7 +132,6 @@ pub enum TldiError {
 /// world.insert(body, ColliderBuilder::segment(-Vector::X, Vector::X));
 /// let error = tldi.step(&mut world).unwrap_err();
 /// assert!(matches!(error, TldiError::PassesThrough { reason: Passes::Line, .. }));
-/// # let _ = (scan, ball);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -166,7 +166,6 @@ impl TldiPipeline {
     /// world.step_with_events(&tldi.hooks(&()), &()); // your own hooks and events
     /// let report = tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
     /// assert_eq!((report.pairs_batched, report.pairs_missed), (1, 0));
-    /// # let _ = (scan, ball);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn prepare(
@@ -296,7 +295,6 @@ impl TldiPipeline {
     /// world.step_with_events(&tldi.hooks(&()), &());
     /// let report = tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
     /// assert_eq!(report.pairs_in_contact, 1);
-    /// # let _ = (scan, ball);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn finish(
@@ -370,7 +368,6 @@ impl TldiPipeline {
     /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
     /// let report = tldi.step(&mut world)?;
     /// assert_eq!((report.pairs_batched, report.pairs_in_contact), (1, 1));
-    /// # let _ = (scan, ball);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn step(&mut self, world: &mut PhysicsWorld) -> Result<StepReport, TldiError> {
@@ -402,7 +399,6 @@ impl TldiPipeline {
     /// let events = ChannelEventCollector::new(collisions, forces, tears);
     /// tldi.step_with_events(&mut world, &(), &events)?;
     /// assert!(started.try_recv()?.started());
-    /// # let _ = ball;
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn step_with_events(
@@ -450,7 +446,6 @@ impl TldiPipeline {
     ///     assert!((contact.depth - 0.01).abs() < 0.01, "{} m at {}", contact.depth, contact.point);
     /// }
     /// # assert!(tldi.contacts(&world.narrow_phase, &world.colliders).count() > 0);
-    /// # let _ = (scan, ball);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn contacts<'a>(

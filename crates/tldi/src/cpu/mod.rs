@@ -8,6 +8,7 @@
 
 pub(crate) mod columns;
 pub(crate) mod compare;
+pub(crate) mod crossings;
 pub(crate) mod cull;
 mod exact;
 mod first_look;

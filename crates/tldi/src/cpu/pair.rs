@@ -1,6 +1,7 @@
 //! The stages of one pair, in order.
 
-use super::compare::{self, Crossings, Seen};
+use super::compare::{self, Seen};
+use super::crossings::Crossings;
 use super::exact::placed::Placed;
 use super::first_look::settle::FirstLook;
 use super::scratch::Scratch;

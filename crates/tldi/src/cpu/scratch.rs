@@ -1,7 +1,8 @@
 //! What one pair needs while it is compared, and the steps that all looks at it share.
 
 use super::columns::{Tiles, Touching};
-use super::compare::{Crossings, Middles, Seen};
+use super::compare::{Middles, Seen};
+use super::crossings::Crossings;
 use super::cull;
 use super::exact::placed::Placed;
 use super::first_look::window::Window;

@@ -5,7 +5,7 @@ use crate::cpu::{columns, normals};
 use crate::{Aabb, PairQuery, Params, Surface, View};
 use glamx::{Pose3, Vec3};
 
-pub use crate::cpu::compare::CROSSED;
+pub use crate::cpu::crossings::CROSSED;
 pub use crate::cpu::cull::Region;
 pub use crate::cpu::normals::SUPPORT;
 pub use crate::cpu::splat::DepthScale;

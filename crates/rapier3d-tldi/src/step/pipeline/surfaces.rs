@@ -74,7 +74,6 @@ impl TldiPipeline {
     /// let sunk: Vec<Vector> = points.iter().map(|p| *p - 0.5 * Vector::Y).collect();
     /// tldi.set_collider_points(&mut world.colliders, scan, &sunk, None)?;
     /// assert!((world.colliders[scan].compute_aabb().center().y + 0.5).abs() < 1e-6);
-    /// # let _ = ball;
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn set_collider_points(
@@ -132,7 +131,6 @@ impl TldiPipeline {
     /// let half = PointCloud::builder(points[..200].to_vec()).radius(0.1).build()?;
     /// tldi.set_cloud(&mut world, scan, half)?;
     /// tldi.step(&mut world)?;
-    /// # let _ = ball;
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn set_cloud(
@@ -165,7 +163,6 @@ impl TldiPipeline {
     /// let half = PointCloud::builder(points[..200].to_vec()).radius(0.1).build()?;
     /// tldi.set_collider_cloud(&mut world.colliders, scan, half)?;
     /// assert!(world.colliders[scan].compute_aabb().center().z < 0.5);
-    /// # let _ = ball;
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn set_collider_cloud(
@@ -275,7 +272,6 @@ impl TldiPipeline {
     /// let moved: Vec<Vector> = points.iter().map(|p| *p + 0.01 * Vector::X).collect(); // 0.6 m/s
     /// tldi.deform_collider(&mut world.colliders, scan, &moved, None, 1.0 / 60.0)?;
     /// assert!(world.colliders[scan].active_hooks().contains(ActiveHooks::MODIFY_SOLVER_CONTACTS));
-    /// # let _ = ball;
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn deform_collider(

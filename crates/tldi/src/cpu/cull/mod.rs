@@ -22,7 +22,7 @@ use glamx::{Pose3, Vec3};
 use rayon::prelude::*;
 use region::{Kernel, Moved, classify};
 
-/// Points whose culling is one parallel task.
+/// Blocks of points whose culling is one parallel task.
 const TASK_BLOCKS: usize = 128;
 
 /// Memory of [`cull`], kept from call to call.

@@ -7,6 +7,7 @@
 //! on the order of the points.
 
 use crate::cpu::columns::Columns;
+use crate::cpu::first_look::cell_plane::{Plane, Sums, moved};
 use crate::cpu::lanes::multiversioned;
 use crate::cpu::rect::Rect;
 use crate::{Facing, Layer, Tldi, VirtualCamera};
@@ -20,13 +21,6 @@ const MERGED: f32 = 0.6;
 
 /// Steps of a coordinate in a pixel. The rounding is then far smaller than the error of a cell's plane.
 const STEPS: f32 = 256.0;
-
-/// Least points of a cell and its neighbours: three tell a plane. Fewer stand alone.
-const LEAST_POINTS: f32 = 3.0;
-
-/// Least spread of the points across their main direction, as a share of their squared spread over the pixels. Below it
-/// they lie on a line and tell no plane, only a mean depth.
-const LEAST_SPREAD: f32 = 1e-2;
 
 /// Standard deviation, in pixels, up to which a cell and its neighbours are on a plane. A sphere of a
 /// radius of 25 pixels has 0.02.
@@ -75,67 +69,6 @@ struct Cell {
     middle: i32,
     /// From the middle of the pixel and the mean depth.
     sums: Sums,
-}
-
-/// Sums over points, of 1, x, y, z, xx, xy, xz, yy, yz and zz.
-type Sums = [f32; 10];
-
-/// Sums of points that are moved by [x, y, z].
-#[inline(always)]
-fn moved(sums: &Sums, [x, y, z]: [f32; 3]) -> Sums {
-    let [n, sx, sy, sz, xx, xy, xz, yy, yz, zz] = *sums;
-    [
-        n,
-        sx + n * x,
-        sy + n * y,
-        sz + n * z,
-        xx + x * (2.0 * sx + n * x),
-        xy + x * sy + y * (sx + n * x),
-        xz + x * sz + z * (sx + n * x),
-        yy + y * (2.0 * sy + n * y),
-        yz + y * sz + z * (sy + n * y),
-        zz + z * (2.0 * sz + n * z),
-    ]
-}
-
-/// A plane through a cell, in [`STEPS`].
-#[derive(Clone, Copy)]
-struct Plane {
-    /// Rise of the depth along columns and rows.
-    slope: [f32; 2],
-    /// Depth at the middle of the pixel, from the cell's mean depth.
-    above: f32,
-    /// Mean squared distance of the points of the cell and its neighbours from it; infinite if they
-    /// are too few.
-    variance: f32,
-}
-
-impl Plane {
-    /// The plane of a cell with sums `own`. Its slope fits `all` best: the sums of the cell and its neighbours.
-    fn of(own: &Sums, all: &Sums) -> Self {
-        let [n, x, y, z, xx, xy, xz, yy, yz, zz] = *all;
-        let [x, y, z] = [x, y, z].map(|sum| sum / n);
-        let (xx, xy, yy) = (xx / n - x * x, xy / n - x * y, yy / n - y * y);
-        let (xz, yz, zz) = (xz / n - x * z, yz / n - y * z, zz / n - z * z);
-        let determinant = xx * yy - xy * xy;
-        let slope = match determinant > LEAST_SPREAD * (xx + yy).powi(2) {
-            true => [
-                (xz * yy - yz * xy) / determinant,
-                (yz * xx - xz * xy) / determinant,
-            ],
-            false => [0.0; 2],
-        };
-        // Through its own points: those around it lie beside the plane where the surface bends.
-        let [own_n, own_x, own_y, own_z, ..] = *own;
-        Self {
-            slope,
-            above: (own_z - slope[0] * own_x - slope[1] * own_y) / own_n,
-            variance: match n < LEAST_POINTS {
-                true => f32::INFINITY,
-                false => (zz - slope[0] * xz - slope[1] * yz).max(0.0),
-            },
-        }
-    }
 }
 
 /// How an image of cells is taken.

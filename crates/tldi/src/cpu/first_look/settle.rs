@@ -5,7 +5,8 @@
 //! windows are drawn with small pixels, where the large ones show a crossing most plainly. Contacts
 //! that are shallow, or that no window proves, go to the full look with small pixels.
 
-use crate::cpu::compare::{self, Crossings, Seen};
+use crate::cpu::compare::{self, Seen};
+use crate::cpu::crossings::{Crossings, swap_depth};
 use crate::cpu::first_look::cells::CellImaging;
 use crate::cpu::first_look::window::Window;
 use crate::cpu::scratch::{CommonPixels, Scratch};
@@ -329,7 +330,7 @@ fn find_windows(
                 (j + 1 < height).then_some(k + width),
             ];
             for next in nexts.into_iter().flatten() {
-                if let Some(depth) = compare::swap_depth(at(k), at(next), &others, params) {
+                if let Some(depth) = swap_depth(at(k), at(next), &others, params) {
                     let pixel = [a.origin[0] + i as i32, a.origin[1] + j as i32];
                     let [u, v] = seen.fold.map_or(pixel, |fold| fold.unfolded(pixel));
                     let place = a.camera.view_at(u as f32 + 0.5, v as f32 + 0.5, depth);
