@@ -92,6 +92,7 @@ pub fn default_size(file_size: f32, scan_radius: f32) -> f32 {
 /// that much farther away than those of other points. Half of it would take coarse parts of an uneven scan;
 /// with twice of it, dust in the air would stay as splats as large as a hand.
 const ON_NO_SURFACE: f32 = 8.0;
+
 /// Neighbours that are asked whether a point is among theirs: as many as radii are made of.
 const NEIGHBORS: usize = 7;
 

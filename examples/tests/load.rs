@@ -44,8 +44,8 @@ fn only_normals_with_a_side_count_as_such() {
     }
 }
 
-/// A level grid, a hundred specks of dust over it and one far away: what lies on the surface is known. The specks are at
-/// least three spacings over the grid, and five apart.
+/// A level grid, a hundred specks over it, and dust far away, whose nearest points are other dust: what lies on the surface
+/// is known. The specks are at least three spacings over the grid, and five apart.
 #[test]
 fn dust_and_specks_are_on_no_surface_and_the_surface_is() {
     let grid = (0..3600).map(|k| Vec3::new((k % 60) as f32, (k / 60) as f32, 0.0));
@@ -53,7 +53,7 @@ fn dust_and_specks_are_on_no_surface_and_the_surface_is() {
         let place = Vec3::new((k % 10) as f32, (k / 10) as f32, 0.0);
         6.0 * place + Vec3::new(2.3, 2.4, 3.0 + 0.2 * (k % 7) as f32)
     });
-    let dust = std::iter::once(Vec3::new(30.0, 30.0, 90.0));
+    let dust = (0..9).map(|k| Vec3::new((20 * (k % 3)) as f32, (20 * (k / 3)) as f32, 500.0));
     let points: Vec<Vec3> = grid.chain(specks).chain(dust).collect();
     let cloud = PointCloud::builder(points)
         .knn_radii(7, 0.65)

@@ -246,9 +246,19 @@ mod tests {
             for i in 0..3 {
                 let [a, b, c] = [0, 1, 2].map(|j| others[(i + j) % 3].truncate());
                 let side = |p: Vec2| (b - a).perp_dot(p - a);
-                // A foot that has just left the ground, or is about to touch it, may still be needed.
-                if now[*up].z > -HIP_HEIGHT + 0.2 * LIFT {
-                    assert!(side(c) * side(Vec2::ZERO) > 0.0, "{time}: {up} {others:?}");
+                let inside = side(Vec2::ZERO) * side(c).signum() / a.distance(b);
+                // A foot that has just left the ground, or is about to touch it, may still be needed. Where it is
+                // highest, the trunk must not tip where the ground tilts it by 2° more.
+                let lift = now[*up].z + HIP_HEIGHT;
+                let least = match lift > 0.9 * LIFT {
+                    true => 2.0_f32.to_radians() * HIP_HEIGHT,
+                    false => 0.0,
+                };
+                if lift > 0.2 * LIFT {
+                    assert!(
+                        inside > least,
+                        "{time}: {inside} of {least}, {up} {others:?}"
+                    );
                 }
             }
         }
