@@ -248,10 +248,10 @@ mod tests {
                 let side = |p: Vec2| (b - a).perp_dot(p - a);
                 let inside = side(Vec2::ZERO) * side(c).signum() / a.distance(b);
                 // A foot that has just left the ground, or is about to touch it, may still be needed. Where it is
-                // highest, the trunk must not tip where the ground tilts it by 2° more.
+                // highest, the trunk must not tip where a slab of 2 cm under a foot tilts it by 3°.
                 let lift = now[*up].z + HIP_HEIGHT;
                 let least = match lift > 0.9 * LIFT {
-                    true => 2.0_f32.to_radians() * HIP_HEIGHT,
+                    true => 3.0_f32.to_radians() * HIP_HEIGHT,
                     false => 0.0,
                 };
                 if lift > 0.2 * LIFT {
