@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 use std::time::Instant;
 use tldi::Backend;
 use tldi::glamx::{Pose3, Quat, Vec3};
-use tldi_sources::depth::{DepthCamera, DepthCloud};
+use tldi_sources::depth::{DepthCamera, DepthMemory};
 
 /// Length of a step in seconds, and steps from one frame to the next: 30 frames a second.
 const DT: f32 = 1.0 / 60.0;
@@ -69,8 +69,7 @@ pub struct DepthSimulation {
     up: Vec3,
     surface: ColliderHandle,
     bodies: Vec<Body>,
-    memory: usize,
-    remembered: VecDeque<DepthCloud>,
+    memory: DepthMemory,
     /// What the last frames saw, and from where, the newest last.
     former: VecDeque<(DepthCamera, Pose3)>,
     frames: Vec<FrameReport>,
@@ -146,8 +145,7 @@ impl DepthSimulation {
             up: scene.up,
             surface,
             bodies,
-            memory: scene.memory,
-            remembered: VecDeque::new(),
+            memory: DepthMemory::new(scene.memory),
             former: VecDeque::new(),
             frames: Vec::new(),
             totals: StepTotals::new(DT),
@@ -177,11 +175,7 @@ impl DepthSimulation {
             latency_ms: 0.0,
             contacts: 0,
         };
-        let whole = if self.memory > 0 {
-            self.with_memory(points, &frame.world_from_camera)
-        } else {
-            points
-        };
+        let whole = (self.memory).complete(points, &self.camera, &frame.world_from_camera);
         report.remembered_points = whole.points.len() - report.points;
         let seen = whole.points.clone();
         let cloud = whole.into_builder().build()?.into_owned();
@@ -205,32 +199,6 @@ impl DepthSimulation {
         self.former
             .push_back((self.camera.clone(), camera_from_world));
         Ok(())
-    }
-
-    /// The frame and what earlier ones saw where it does not: hidden or out of view. What it sees
-    /// through is gone.
-    fn with_memory(&mut self, frame: DepthCloud, world_from_camera: &Pose3) -> DepthCloud {
-        let camera_from_world = world_from_camera.inverse();
-        let mut whole = frame.clone();
-        for old in &mut self.remembered {
-            let keeps: Vec<bool> = (old.points.iter())
-                .map(|p| {
-                    !self.camera.sees_through(*p, &camera_from_world)
-                        && !self.camera.sees(*p, &camera_from_world)
-                })
-                .collect();
-            old.points = kept(&old.points, &keeps);
-            old.radii = kept(&old.radii, &keeps);
-            old.normals = kept(&old.normals, &keeps);
-            whole.points.extend_from_slice(&old.points);
-            whole.radii.extend_from_slice(&old.radii);
-            whole.normals.extend_from_slice(&old.normals);
-        }
-        self.remembered.push_back(frame);
-        if self.remembered.len() > self.memory {
-            self.remembered.pop_front();
-        }
-        whole
     }
 
     /// Notes where the bodies are relative to the surface below them, which drifts with the poses of the
@@ -375,12 +343,4 @@ fn height_below(surface: &[Vec3], body: Vec3, radius: f32, up: Vec3) -> Option<f
     let middle = heights.len() / 2;
     let median = *(heights.select_nth_unstable_by(middle, f32::total_cmp).1);
     Some(body.dot(up) + median)
-}
-
-fn kept<T: Copy>(values: &[T], keeps: &[bool]) -> Vec<T> {
-    let pairs = values.iter().zip(keeps);
-    pairs
-        .filter(|(_, keep)| **keep)
-        .map(|(value, _)| *value)
-        .collect()
 }

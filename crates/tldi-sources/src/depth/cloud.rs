@@ -28,6 +28,22 @@ impl DepthCloud {
         (self.empty, self.flying) = (0, 0);
     }
 
+    /// Keeps the points that `keeps` says.
+    pub(super) fn retain(&mut self, keeps: impl Fn(Vec3) -> bool) {
+        let mut kept = 0;
+        for k in 0..self.points.len() {
+            if keeps(self.points[k]) {
+                self.points[kept] = self.points[k];
+                self.radii[kept] = self.radii[k];
+                self.normals[kept] = self.normals[k];
+                kept += 1;
+            }
+        }
+        self.points.truncate(kept);
+        self.radii.truncate(kept);
+        self.normals.truncate(kept);
+    }
+
     /// Hands the points to a builder.
     pub fn into_builder(self) -> CloudBuilder<'static> {
         PointCloud::builder(self.points)

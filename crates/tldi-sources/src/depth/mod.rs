@@ -2,6 +2,7 @@
 
 mod camera;
 mod cloud;
+mod memory;
 mod organized;
 mod ray_window;
 mod sensor;
@@ -10,6 +11,7 @@ mod tile;
 
 pub use camera::DepthCamera;
 pub use cloud::DepthCloud;
+pub use memory::DepthMemory;
 pub use organized::OrganizedCloud;
 pub use sensor::{Intrinsics, SensorModel};
 pub use sequence::{DepthError, DepthFrame, DepthSequence};
