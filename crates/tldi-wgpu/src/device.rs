@@ -53,11 +53,10 @@ impl Gpu {
     ///
     /// # Errors
     /// [`GpuError::NoAdapter`] where there is none of the kind asked for, [`GpuError::NoDevice`]
-    /// where its driver refuses.
+    /// where its driver refuses, [`GpuError::CannotWait`] in a browser.
     pub fn open(choice: AdapterChoice) -> Result<Self, GpuError> {
         if cfg!(target_arch = "wasm32") {
-            let reason = "a browser cannot wait for it: open it with `Gpu::open_async`".to_owned();
-            return Err(GpuError::NoAdapter { reason });
+            return Err(GpuError::CannotWait);
         }
         pollster::block_on(Self::open_async(choice))
     }
@@ -73,6 +72,11 @@ impl Gpu {
     /// # Errors
     /// Those of [`open`](Self::open).
     pub async fn open_async(choice: AdapterChoice) -> Result<Self, GpuError> {
+        // Where a page has no WebGPU, `wgpu` panics.
+        if cfg!(target_arch = "wasm32") && !wgpu::util::is_browser_webgpu_supported().await {
+            let reason = "there is no WebGPU here".to_owned();
+            return Err(GpuError::NoAdapter { reason });
+        }
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         // Not GL: its drivers miscompiled loops without an error.
         descriptor.backends = wgpu::Backends::VULKAN
@@ -221,7 +225,11 @@ impl Gpu {
     ///
     /// # Errors
     /// [`GpuError::TimedOut`] where that takes too long; the device is not used any more.
+    /// [`GpuError::CannotWait`] in a browser.
     pub(crate) fn wait(&self) -> Result<(), GpuError> {
+        if cfg!(target_arch = "wasm32") {
+            return Err(GpuError::CannotWait);
+        }
         let outcome = self.device.poll(wgpu::PollType::Wait {
             submission_index: None,
             timeout: Some(self.patience),

@@ -15,6 +15,12 @@ pub enum GpuError {
         /// What the system says.
         reason: String,
     },
+    /// A browser lets nobody wait.
+    #[error(
+        "a browser cannot wait for the GPU: open it with `Gpu::open_async`, and compare with `WgpuBackend::begin` and \
+         `.await`"
+    )]
+    CannotWait,
     /// The adapter's driver gives no device.
     #[error("the GPU `{adapter}` cannot be used: {reason}")]
     NoDevice {

@@ -19,8 +19,8 @@ use rapier3d::geometry::{ColliderBuilder, ColliderHandle, ColliderSet, NarrowPha
 use rapier3d::math::Vector;
 use rapier3d::pipeline::{EventHandler, PhysicsHooks, PhysicsWorld};
 use std::sync::Arc;
-use std::time::Instant;
 use tldi::{Backend, PairQuery, PointCloud};
+use web_time::Instant;
 
 /// Finds the contacts of point clouds for one physics world.
 ///
