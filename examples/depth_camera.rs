@@ -62,7 +62,7 @@ struct Args {
     #[arg(long, value_name = "DIR", default_value = "out/depth_camera")]
     out: PathBuf,
     /// Also write motion.png, an animated PNG
-    #[arg(long)]
+    #[arg(long, conflicts_with = "no_pictures")]
     animate: bool,
     #[command(flatten)]
     recording: RecordingOption,
@@ -150,7 +150,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let recording = args.recording.start("depth_camera", up)?;
     let snapshots = simulate(&mut simulation, &source, recording, args)?;
     let report = simulation.report(missing);
-    draw(&simulation, up, &snapshots, args)?;
+    if !args.common.no_pictures {
+        draw(&simulation, up, &snapshots, args)?;
+    }
     if let Some(path) = &args.common.json {
         output::write_json(path, &report)?;
     }

@@ -41,7 +41,7 @@ struct Args {
     #[arg(long, value_name = "DIR", default_value = "out/drop")]
     out: PathBuf,
     /// Writes motion.png, too: the fall at half speed, an animated PNG
-    #[arg(long)]
+    #[arg(long, conflicts_with = "no_pictures")]
     animate: bool,
     #[command(flatten)]
     common: Common,
@@ -94,7 +94,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let mut simulation = DropSimulation::new(scan, up, bodies, &spots, seed, backend)?;
     let run = simulate(&mut simulation, args)?;
     let report = simulation.report();
-    draw(&simulation, &report, up, &run, &args.out)?;
+    if !args.common.no_pictures {
+        draw(&simulation, &report, up, &run, &args.out)?;
+    }
     if let Some(path) = &args.common.json {
         output::write_json(path, &report)?;
     }

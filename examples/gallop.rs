@@ -59,7 +59,7 @@ struct Args {
     #[arg(long, value_name = "DIR", default_value = "out/gallop")]
     out: PathBuf,
     /// Also write motion.png, an animated PNG
-    #[arg(long)]
+    #[arg(long, conflicts_with = "no_pictures")]
     animate: bool,
     #[command(flatten)]
     recording: RecordingOption,
@@ -139,7 +139,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
         .unwrap_or_else(|| simulation.steps_of_run().min(MOST_STEPS));
     let recording = args.recording.start("gallop", Vec3::Y)?;
     let snapshots = simulate(&mut simulation, steps, args.animate, recording)?;
-    draw(&simulation, &snapshots, args)?;
+    if !args.common.no_pictures {
+        draw(&simulation, &snapshots, args)?;
+    }
     let report = simulation.report();
     if let Some(path) = &args.common.json {
         output::write_json(path, &report)?;

@@ -88,7 +88,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     }
     bar.finish_and_clear();
     let report = simulation.report();
-    draw(args, &simulation, &report)?;
+    if !args.common.no_pictures {
+        draw(args, &simulation, &report)?;
+    }
     if let Some(path) = &args.common.json {
         output::write_json(path, &report)?;
     }

@@ -62,7 +62,7 @@ struct Args {
     #[arg(long, value_name = "DIR", default_value = "out/robot_in_scan")]
     out: PathBuf,
     /// Also write motion.png, an animated PNG
-    #[arg(long)]
+    #[arg(long, conflicts_with = "no_pictures")]
     animate: bool,
     #[command(flatten)]
     recording: RecordingOption,
@@ -144,7 +144,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     }
     let (snapshots, hardest) = simulate(&mut simulation, args.steps, recording)?;
     let report = simulation.report();
-    draw(&simulation, up, &snapshots, &hardest, args)?;
+    if !args.common.no_pictures {
+        draw(&simulation, up, &snapshots, &hardest, args)?;
+    }
     if let Some(path) = &args.common.json {
         output::write_json(path, &report)?;
     }

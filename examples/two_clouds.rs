@@ -41,7 +41,7 @@ struct Args {
     #[arg(long, value_name = "DIR", default_value = "out/two_clouds")]
     out: PathBuf,
     /// Also write motion.png, an animated PNG of B on its way along the velocity
-    #[arg(long)]
+    #[arg(long, conflicts_with = "no_pictures")]
     animate: bool,
     #[command(flatten)]
     common: Common,
@@ -75,7 +75,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let query = load_query(args)?;
     let mut backend = args.common.backend.open()?;
     let answer = query.ask(&mut *backend)?;
-    draw(&query, &answer, &args.out)?;
+    if !args.common.no_pictures {
+        draw(&query, &answer, &args.out)?;
+    }
     if args.animate {
         animate(args, &query)?;
     }

@@ -19,6 +19,9 @@ pub struct Common {
     /// Seed of everything random: equal seeds give equal results
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Draw nothing: pictures take longer than most simulations
+    #[arg(long)]
+    pub no_pictures: bool,
 }
 
 /// The up direction of a scan: given, or to be found in the scan.

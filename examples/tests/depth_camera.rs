@@ -152,7 +152,8 @@ fn what_is_wrong_is_said() {
     assert_refused(BINARY, &folder, &cases);
     // A frame that is missing is named, and passed over.
     fs::remove_file(folder.join("frames/001.png")).unwrap();
-    let report = report(
+    let report = common::report_with_pictures(
+        BINARY,
         &folder,
         &[
             "--frames",

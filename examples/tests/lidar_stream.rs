@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{assert_refused, folder, number, report, run};
+use common::{assert_refused, folder, number, report, report_with_pictures, run};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -21,7 +21,7 @@ fn assert_on_ground(report: &Value, slack: f64) {
 #[test]
 fn bodies_rest_on_a_generated_street() {
     let folder = folder("lidar_generated");
-    let report = report(
+    let report = report_with_pictures(
         BINARY,
         &folder,
         &["--count", "15", "--seed", "4", "--bodies", "3"],

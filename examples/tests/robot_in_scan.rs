@@ -159,6 +159,7 @@ fn a_car_drives() {
     assert!((way - 0.5).abs() < 0.15, "{a:?} {b:?}");
     // The chassis' origin is at the axles.
     assert!((b[2] - 0.08).abs() < 0.01, "{b:?}");
+    assert!(!folder.join("out").exists(), "it was told to draw nothing");
 }
 
 /// Links that overlap at their joints, at rest and stepping, without inertials: it stays on its feet.
@@ -176,7 +177,7 @@ fn a_walker_does_not_explode() {
         "120",
         "--animate",
     ];
-    let report = report(&folder, &options);
+    let report = common::report_with_pictures(BINARY, &folder, &options);
     assert_eq!(report["base_fixed"], false);
     assert_eq!(report["driven_joints"], 8);
     let base = [0, 1, 2].map(|k| number(&report["base"][k]));

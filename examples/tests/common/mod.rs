@@ -58,8 +58,13 @@ pub(crate) fn run(binary: &str, folder: &Path, options: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Runs a binary in `folder` and gives its report; it must succeed.
+/// Runs a binary in `folder` without its pictures and gives its report; it must succeed.
 pub(crate) fn report(binary: &str, folder: &Path, options: &[&str]) -> Value {
+    report_with_pictures(binary, folder, &[options, &["--no-pictures"]].concat())
+}
+
+/// Runs a binary in `folder` and gives its report; it must succeed.
+pub(crate) fn report_with_pictures(binary: &str, folder: &Path, options: &[&str]) -> Value {
     let output = run(
         binary,
         folder,
@@ -69,8 +74,8 @@ pub(crate) fn report(binary: &str, folder: &Path, options: &[&str]) -> Value {
     json(folder.join("report.json"))
 }
 
-/// Runs a binary twice with one seed and once with another: but for times, the first two reports must
-/// be equal, and the third must not. Gives the first. `times` are the keys of the report that differ
+/// Runs a binary twice with one seed, first with its pictures, and once with another: but for times, the first two
+/// reports must be equal, and the third must not. Gives the first. `times` are the keys of the report that differ
 /// from run to run, `frame_times` those of each of its `frames`, where it has any.
 pub(crate) fn seeded_report(
     binary: &str,
@@ -79,7 +84,8 @@ pub(crate) fn seeded_report(
     times: &[&str],
     frame_times: &[&str],
 ) -> Value {
-    let run = |seed: &str| {
+    type Run = fn(&str, &Path, &[&str]) -> Value;
+    let run = |report: Run, seed: &str| {
         let mut report = report(binary, folder, &[options, &["--seed", seed]].concat());
         without_times(&mut report, times);
         let frames = report.get_mut("frames").and_then(Value::as_array_mut);
@@ -88,9 +94,9 @@ pub(crate) fn seeded_report(
         }
         report
     };
-    let first = run("1");
-    assert_eq!(run("1"), first);
-    assert_ne!(run("2"), first);
+    let first = run(report_with_pictures, "1");
+    assert_eq!(run(report, "1"), first);
+    assert_ne!(run(report, "2"), first);
     first
 }
 
