@@ -39,5 +39,5 @@ pub use view::camera_policy::CameraPolicy;
 pub use view::tldi::{Facing, Layer, Tldi};
 
 /// A view axis is kept from frame to frame while the normals of the contact zone agree with it
-/// within this angle, in radians (10°).
+/// within this angle, in radians (10°). Half or twice: no change in any suite.
 pub const AXIS_HYSTERESIS: f32 = 0.1745;

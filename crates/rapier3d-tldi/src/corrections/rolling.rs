@@ -16,7 +16,7 @@ use rapier3d::math::{AngVector, Vector};
 use tldi::ContactPatch;
 
 /// Largest turn that is predicted, in radians. Surfaces that turn farther in half a step have other
-/// radii of curvature there.
+/// radii of curvature there. Half or twice: no change in any suite.
 const FARTHEST_TURN: f32 = 0.1;
 
 /// Moves the round contacts of a batch that has its results to the middle of a step of `dt` seconds.

@@ -53,7 +53,7 @@ struct SampledMotion {
 }
 
 /// Most steps from one sampling to the next that say how fast a surface moves: a camera's 15 frames a
-/// second in 120 steps. What comes later is another surface.
+/// second in 120 steps. What comes later is another surface. Half or twice: no row of any suite changes.
 const LONGEST_INTERVAL: u32 = 8;
 
 impl SampledMotion {
@@ -63,7 +63,8 @@ impl SampledMotion {
     }
 }
 
-/// Share of rapier's fastest correction up to which that is left to do it: its contacts rub.
+/// Share of rapier's fastest correction up to which that is left to do it: its contacts rub. Half or twice: no change
+/// in any suite.
 const LEFT_TO_CORRECTION: f32 = 0.5;
 
 impl SurfaceMotions {

@@ -19,7 +19,8 @@ use rapier3d::math::Pose;
 use rapier3d::parry::shape::Shape;
 use tldi::Penetration;
 
-/// Least cosine between the side that is remembered and the normal of a contact that pushes there.
+/// Least cosine between the side that is remembered and the normal of a contact that pushes there. Half or twice the
+/// angle: no row of any suite changes.
 const SAME_SIDE: f32 = 0.5;
 
 /// A pair that rapier sweeps: what moves, and its target.

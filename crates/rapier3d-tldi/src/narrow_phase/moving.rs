@@ -7,7 +7,8 @@ use rapier3d::parry::shape::Shape;
 use tldi::{Impact, Params};
 
 /// Distance in pixels up to which surfaces count as touching. It is twice the scatter of measured
-/// gaps (0.1), because contacts are kept until a pair has moved by that much.
+/// gaps (0.1), because contacts are kept until a pair has moved by that much. Half or twice: no
+/// change in any suite.
 pub(super) const TOUCHING: f32 = 0.2;
 
 /// A pair of parts, the smaller one second: it is taken to move.

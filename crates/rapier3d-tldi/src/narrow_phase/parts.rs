@@ -9,7 +9,7 @@ use tldi::plan::{largest_pixel, least_pixel};
 use tldi::{PairQuery, Params, PointCloud, Surface, Variant, View};
 
 /// Contacts are searched up to this many standard deviations of given noise. So the fit at a light
-/// contact has points around it on all sides.
+/// contact has points around it on all sides. Half or twice: no row of any suite changes.
 const FITTED: f32 = 3.0;
 
 /// The cloud of a shape that is one.

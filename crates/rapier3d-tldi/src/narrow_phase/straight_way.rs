@@ -9,10 +9,11 @@ use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::shape::Shape;
 use tldi::Params;
 
-/// Longest part of a way in pixels: what the images resolve in depth.
+/// Longest part of a way in pixels: what the images resolve in depth. Half or twice: no row of any suite changes.
 const MAX_PIXELS: f64 = 131_072.0;
 
-/// By how much bounding spheres are enlarged, in themselves: rounding, and the contact zone around them.
+/// By how much bounding spheres are enlarged, in themselves: rounding, and the contact zone around them. Half or
+/// twice: no change in any suite.
 const ENLARGED: f64 = 2.0;
 
 /// What of a straight motion can bring a moving shape to another.

@@ -144,7 +144,7 @@ fn pair_id(colliders: [ColliderHandle; 2]) -> PairId {
 type PartsId = (PairId, [u32; 2]);
 
 /// Steps without contact for which the last axis is remembered. A body that hops, or whose contact noise hides, is still
-/// on the side where it was. After more steps it may be elsewhere.
+/// on the side where it was. After more steps it may be elsewhere. Half or twice: no row of any suite changes.
 const MOST_LOST: u32 = 6;
 
 /// Main view axis of the last contact of two parts.

@@ -16,7 +16,8 @@ const BROAD_PHASE_SLACK: f32 = 2.0 * 0.04;
 
 /// How far contacts are searched when bodies approach fast, in mean radii of the coarser cloud.
 /// Without it, a surface that is new in every step could stay beyond rapier's prediction distance,
-/// while sweeps stop the body in front of it again and again.
+/// while sweeps stop the body in front of it again and again. Half: no change in any suite; twice:
+/// the shadow of a hole fails with each of 6 seeds instead of none.
 const AHEAD: f32 = 1.0;
 
 /// Two colliders whose widened bounds overlap. At least one holds a cloud.

@@ -13,7 +13,8 @@ use glamx::{Mat4, Vec4};
 const MOST_NEIGHBORS: usize = 48;
 
 /// What neighbours must tell of the slope and of the curvature before they are believed, in squares
-/// of pixels: a row or a corner of them leaves the rest of the paraboloid open.
+/// of pixels: a row or a corner of them leaves the rest of the paraboloid open. Half or twice of either:
+/// no change in any suite.
 const LEAST_SLOPE_WEIGHT: f32 = 0.5;
 const LEAST_BEND_WEIGHT: f32 = 2.0;
 

@@ -3,14 +3,17 @@
 use crate::{ContactPixel, PairResult, Params};
 use std::ops::Range;
 
-/// Neighbouring pixels are linked if their points on either surface are within this many pixels.
+/// Neighbouring pixels are linked if their points on either surface are within this many pixels. Half: 13
+/// of 636 stability rows fail instead of 3, and normals are 29 % worse; twice: no change in any suite.
 const SAME_SURFACE_PX: f32 = 3.0;
 
 /// Linked neighbours, of eight, that confirm a penetration of a layer's thickness (the merge gap).
 /// Fewer confirm proportionally less. At the rim of a body, a ray runs along its side, whose depth
 /// is uncertain, or misses a layer and seems to run inside up to the next one. Such pixels are
 /// alone or follow the rim in rows of one or two. Surfaces that really are so deep in each other
-/// overlap over more pixels.
+/// overlap over more pixels. 3: 6 of 300 overlaps are falsely deep instead of 4, no change in any other
+/// suite; 10, more than a pixel has: 161 of 1,080 contacts are missed, and 11 of 159 stability rows fail
+/// instead of none.
 const CONFIRMING: u32 = 5;
 
 /// From a pixel to its neighbours that come after it, row by row: columns and rows.

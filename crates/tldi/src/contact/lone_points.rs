@@ -16,24 +16,26 @@ use glamx::{Pose3, Vec3};
 const NEIGHBORS: usize = 4;
 
 /// Times the distance of a neighbour's fourth neighbour beyond which that of a point makes it stand
-/// alone. At the corner of a grid it is twice as far.
+/// alone. At the corner of a grid it is twice as far. Half or twice: no change in any suite.
 const ALONE: f32 = 2.5;
 
-/// Points closer to each other than this share of the mean radius are the same point.
+/// Points closer to each other than this share of the mean radius are the same point. Half or twice: no row of any
+/// suite changes.
 const SAME_POINT: f32 = 1e-3;
 
-/// Contact pixels of one component that are looked at.
+/// Contact pixels of one component that are looked at. Half or twice: no row of any suite changes.
 const SAMPLES: usize = 9;
 
 /// How far neighbours are looked for, in mean radii of the cloud. What has none within that is not
-/// known to stand alone.
+/// known to stand alone. Half or twice: no row of any suite changes.
 const REACH: f32 = 32.0;
 
 /// Edge of a cell of [`Surroundings`] in mean radii: of points with the paper's radii (0.65 of the
-/// distance to the seventh neighbour), it reaches beyond the fourth.
+/// distance to the seventh neighbour), it reaches beyond the fourth. Half or twice: no row of any suite changes.
 const CELL: f32 = 2.0;
 
-/// Cells from a place to its point and on to a neighbour of that, around which points must be known.
+/// Cells from a place to its point and on to a neighbour of that, around which points must be known. Half or twice:
+/// no row of any suite changes.
 const RIM: f32 = 2.0;
 
 /// The points nearest to a place: squares of their distances in metres, and where they are.

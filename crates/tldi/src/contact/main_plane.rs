@@ -2,20 +2,21 @@
 
 use glamx::{Mat3, Vec2, Vec3};
 
-/// Fewest heights that determine a plane.
+/// Fewest heights that determine a plane. Half or twice: no change in any suite.
 const LEAST_HEIGHTS: usize = 12;
 
 /// Of more heights every second, third and so on is enough: they tell a plane to a twentieth of their
-/// deviation.
+/// deviation. Half or twice: no change in any suite.
 const MOST_HEIGHTS: usize = 384;
 
 /// Rounds of the fit, and the factor by which the deviation that counts shrinks in each: 20 in all,
-/// from all heights to `near`.
+/// from all heights to `near`. Half or twice the rounds, or the root or the square of the factor: no
+/// change in any suite.
 const ROUNDS: i32 = 6;
 const NARROWER: f32 = 0.6;
 
 /// Least information about a plane in the heights that count, as a share of that in as many heights
-/// of unit variance. Heights in a row leave a slope undetermined.
+/// of unit variance. Heights in a row leave a slope undetermined. Half or twice: no change in any suite.
 const LEAST_KNOWN: f32 = 1e-3;
 
 /// A plane over places: its height at the origin, and its slopes.

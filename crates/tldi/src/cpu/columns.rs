@@ -15,7 +15,8 @@ use crate::{Projection, VirtualCamera};
 use glamx::{Mat3, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
 
-/// Least edge of a tile in pixels: smaller ones cost more than they leave out.
+/// Least edge of a tile in pixels: smaller ones cost more than they leave out. Half: 18 % fewer points and
+/// 9 % less time (`bvh_vs_tldi`), no row the worse; twice: 27 % more points.
 pub(crate) const LEAST_TILE: i32 = 2;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).

@@ -182,7 +182,9 @@ fn contact_pixels([a, b]: [Column; 2], at: &PixelView, params: &Params, result: 
 
 /// |n·v| from which the depth along the view tells the distance of surfaces that are deep in each
 /// other (60°), and likewise the least cosine between the normals of such surfaces. A wall that a
-/// body stands beside has points in the body's columns, but does not face its bottom.
+/// body stands beside has points in the body's columns, but does not face its bottom. Half the angle:
+/// normals are 14 times and depths 2.8 times as wrong, and two balls at 80 % fail with every seed,
+/// but no overlap of 300 is falsely deep instead of 4; twice: depths of deep edges twice as wrong.
 const FACING: f32 = 0.5;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).

@@ -13,19 +13,21 @@ use super::splat_radius::{LEAST_RADIUS_PX, splat_radius};
 use crate::{Params, Projection, VirtualCamera};
 use glamx::Vec3;
 
-/// |n·v| below which a surface is seen edge-on (78°). There, its tangent plane says nothing about depth.
+/// |n·v| below which a surface is seen edge-on (78°). There, its tangent plane says nothing about depth. Half: no
+/// change in any suite; twice: normals five times as wrong, and 11 of 636 stability rows fail instead of 3.
 pub(crate) const EDGE_ON: f32 = 0.2;
 
 /// |n·v| below which a splat is steep (37°). Its depth varies so much within a pixel that fragments within one thickness
-/// of each other count as one layer.
+/// of each other count as one layer. Half or twice the angle: no change in any suite.
 const STEEP: f32 = 0.8;
 
 /// Depth steps in a surface's thickness. Depths are summed as integers, so that the order of the points does not change
-/// a sum.
+/// a sum. Half or twice: no change in any suite.
 pub(super) const DEPTH_STEPS: u32 = 4096;
 
 /// The share of a cloud's noise by which the merge gap grows. With noise of r̄ the gap is then as wide as a surface is
-/// thick. Narrower gaps tear noisy sheets apart (`accuracy --variant told`).
+/// thick. Narrower gaps tear noisy sheets apart (`accuracy --variant told`). Half: 5 of 930 cases with noise of 0.25
+/// to 1 are wrong instead of 3; twice: 3.
 const NOISE_MERGED: f32 = 0.8;
 
 /// Steps of a normal's component in the integer sums.
@@ -35,7 +37,7 @@ pub(crate) const NORMAL_STEPS: f32 = 16384.0;
 const MAX_WEIGHT: f32 = 255.0;
 
 /// Rows of a band. With a thousand columns and eight fragments a pixel, a band takes a megabyte, as much as a core's
-/// second cache holds.
+/// second cache holds. Half or twice: no row of any suite changes.
 const BAND_ROWS: u32 = 16;
 
 /// Bits of a fragment's key that hold the depth. The bits above them hold the class.

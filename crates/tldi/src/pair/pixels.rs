@@ -5,7 +5,8 @@ use glamx::Vec3;
 
 /// Least number of pixels across the smaller body, in its second longest extent. With fewer, a
 /// penetration looks like the noise of single rays. There are fewer only if the body's own points
-/// are no finer.
+/// are no finer. Half: 14 % fewer points, but depths of boxes on ramps, exact now, are 0.02 mean radii off; twice:
+/// twice as many points and 1.6 times the time (`bvh_vs_tldi`).
 const LEAST_PIXELS: f32 = 8.0;
 
 /// Edge in metres of the largest pixels that resolve a body of these extents, metres, whose points have this mean

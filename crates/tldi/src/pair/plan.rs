@@ -17,11 +17,13 @@ pub use crate::view::approach::{Approach, Body};
 pub use crate::view::camera_policy::MAX_VIEWS;
 
 /// Tangent of the largest angle (60°) between a normal and the view at which a contact at the prediction distance is
-/// found: beyond it, depths along the view are no distances. There, the surfaces are twice as far apart along the view.
+/// found: beyond it, depths along the view are no distances. There, the surfaces are twice as far apart along the
+/// view. Half or twice: no row of any suite changes.
 const STEEPEST: f32 = 1.732_050_8;
 
 /// Depth in pixels to which a body is searched that has sunk below all of a surface. Points that
-/// are culled in vain cost little, but two large clouds have many deeper points.
+/// are culled in vain cost little, but two large clouds have many deeper points. Half: 13 % fewer culled points;
+/// twice: 22 % more; else no change in any suite.
 const SUNK: f32 = 16.0;
 
 /// What a pair's stages `cull`, `zone` and `aim` need beside the points.

@@ -44,26 +44,29 @@ pub enum CameraPolicy {
 pub const MAX_VIEWS: usize = 3;
 
 /// A normal within this of the axis is well seen: cos 50°. Depth errors of splats grow as the
-/// tangent beyond.
+/// tangent beyond. Half the angle: no change in any suite; twice: a ball in a groove fails with each of 6
+/// seeds instead of none.
 const WELL_SEEN: f32 = 0.643;
 
 /// The other side must face a further axis within 60° ...
 const SUPPORTED: f32 = 0.5;
 
-/// ... with at least this share of its near points. Fewer is noise at the rim of the zone.
+/// ... with at least this share of its near points. Fewer is noise at the rim of the zone. Half or twice,
+/// and half or twice the angle: no change in any suite.
 const LEAST_SHARE: f32 = 0.05;
 
 /// Mean of n·v, over the normals that face an axis, below which their signs say nothing about the
 /// side. (A ring around a deep contact has normals all around the axis.) It is also the least
-/// cosine between an axis and the last one.
+/// cosine between an axis and the last one. Half or twice: no change in any suite.
 const CONCLUSIVE: f32 = 0.3;
 
 /// Weight of the direction to `b`, if `b` plainly lies or comes from there, beside the normals of a
 /// surface. It matters if bodies are deep in each other or their sides are flush, because normals
-/// then point all around. It turns the axis of a flat contact by 8° at most.
+/// then point all around. It turns the axis of a flat contact by 8° at most. Half: 19 of 636 stability
+/// rows fail instead of 3, although normals are 23 % better; twice: normals 18 % worse.
 const HINT_WEIGHT: f32 = 0.5;
 
-/// Weight of the last axis beside the normals of a surface.
+/// Weight of the last axis beside the normals of a surface. Half or twice: no change in any suite.
 const MEMORY_WEIGHT: f32 = 0.5;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).

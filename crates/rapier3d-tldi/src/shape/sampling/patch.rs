@@ -9,13 +9,15 @@ use rapier3d::parry::shape::{Shape, TypedShape};
 use tldi::RaySurface;
 
 /// Vector areas of a mesh without gaps sum up to nothing. Up to this part of its area counts as nothing:
-/// small holes do not open it.
+/// small holes do not open it. Half or twice: no row of `overlaps` changes.
 const OPEN: f64 = 0.01;
 
 /// How far the box about a curved solid is from it, in parts of its size: far enough to tell directions.
+/// Half or twice: 3 of 300 overlaps are falsely deep instead of 4.
 const BOX_MARGIN: f32 = 1e-3;
 
-/// How far inside of a curved solid normals are taken, in parts of its size: ten steps of `f32`.
+/// How far inside of a curved solid normals are taken, in parts of its size: ten steps of `f32`. Half or
+/// twice: no row of `overlaps` changes.
 const INSIDE: f32 = 1e-6;
 
 /// Distance to another part of a compound, in parts of its size, that counts as none.

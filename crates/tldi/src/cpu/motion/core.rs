@@ -6,11 +6,12 @@ use crate::cpu::splat_radius::splat_radius;
 
 /// Width in pixels of the rim that [`ImpactQuery::core_only`](crate::ImpactQuery::core_only) leaves out. Splats stand out by one pixel on either side,
 /// and one more is for roughness. A surface missed in the rim penetrates by at most that pixel, and contacts push it
-/// out again.
+/// out again. 2: 1 of 900 drops passes through instead of none; 6: no change in any suite.
 pub(crate) const RIM: i32 = 3;
 
 /// Width in pixels of the outer rim, which is always left out: a splat of either side stands out by that much. The inner
-/// rim stops a motion only if it would go on, past what it meets there, by more than the whole rim.
+/// rim stops a motion only if it would go on, past what it meets there, by more than the whole rim. 1: the slide over
+/// a noisy plane at 10 m/s fails with every seed; 4: no change in any suite.
 const OUTER_RIM: u8 = 2;
 
 /// Pixels added around an image so that a rim shows there: its width, and one for closing gaps.

@@ -17,10 +17,12 @@ use crate::pair::sampling::stride;
 use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Penetration, Surface, VirtualCamera};
 use glamx::{Pose3, Vec3};
 
-/// Normals are averaged over the pixels whose distance is within this many pixels of the least.
+/// Normals are averaged over the pixels whose distance is within this many pixels of the least. Half or twice: no row
+/// of any suite changes.
 const NORMAL_BAND: f32 = 0.5;
 
-/// Least cosine between the normal of a penetration and the normal of the surface that it leaves from behind.
+/// Least cosine between the normal of a penetration and the normal of the surface that it leaves from behind. Half or
+/// twice the angle: no change in any suite.
 const FROM_BEHIND: f32 = 0.5;
 
 impl Scratch {

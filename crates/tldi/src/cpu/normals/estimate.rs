@@ -12,7 +12,8 @@ use glamx::Vec3;
 use std::ops::Range;
 
 /// Radius of the neighbourhood whose covariance gives the normal, in mean radii of the points.
-/// With 0.65 × the 7th neighbour's distance it holds about 25 neighbours on a surface.
+/// With 0.65 × the 7th neighbour's distance it holds about 25 neighbours on a surface. Half: depths of deep edges
+/// twice as wrong; twice: depths 29 % worse, and 19 % more points pass a cull.
 pub const SUPPORT: f32 = 3.0;
 
 /// Most cells per point: on a surface of 4 million points there are as many. Sparser ones get

@@ -8,7 +8,8 @@ use glamx::{DMat3, DVec3, FloatExt, Vec3};
 const BATCH: usize = 64;
 
 /// Share of the squared variance that the two larger axes of a neighbourhood must have for a
-/// normal in single precision: below it the points are on a line or coincide.
+/// normal in single precision: below it the points are on a line or coincide. Half or twice: no row of
+/// any suite changes.
 const LEAST_PLANAR: f32 = 1e-4;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).

@@ -13,17 +13,19 @@ use crate::cpu::normals::planes::Plane;
 use glamx::Vec3;
 
 /// Standard deviation of neighbours from their plane, in mean radii, up to which they are on it: a tenth of
-/// a pixel, which contacts may err by.
+/// a pixel, which contacts may err by. Half or twice: no change in any suite.
 const ON_PLANE: f32 = 0.1;
 
 /// Largest ratio of a measured variance to the noise's own that noise alone explains. Over 20 points, a variance scatters
-/// by a third.
+/// by a third. Half or twice: no row of any suite changes.
 const OF_NOISE: f32 = 2.0;
 
-/// Variance at which neighbours are plainly not on a plane, in units of that up to which they are.
+/// Variance at which neighbours are plainly not on a plane, in units of that up to which they are. Half or twice: no
+/// change in any suite.
 const OFF_PLANE: f32 = 4.0;
 
-/// Deviation from a plane, in mean radii, at which it is not flat, or a point is not on it.
+/// Deviation from a plane, in mean radii, at which it is not flat, or a point is not on it. Half or twice: no change
+/// in any suite.
 const FLAT: f32 = 0.05;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
