@@ -9,7 +9,7 @@ use std::ops::Range;
 use tldi::{BLOCK, PointCloud, Radii};
 use wgpu::BufferUsages;
 
-/// Batches after which a cloud that is not used gives its place to others.
+/// Batches after which a cloud that is not used gives its place to others. Half or twice: no test fails.
 const KEPT_BATCHES: u64 = 2;
 
 /// A pool of equal elements on the device, in which ranges are taken and given back.

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Once, OnceLock};
 use tldi::{CloudError, NonFinite, PointCloud, Radii};
 
-/// Neighbours for normals that are not given or that scaling made wrong.
+/// Neighbours for normals that are not given or that scaling made wrong. Half or twice: no test of shapes fails.
 const PCA_NEIGHBORS: usize = 12;
 
 /// Source of [`PointCloudShape::revision`].

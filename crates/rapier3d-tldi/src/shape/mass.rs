@@ -41,11 +41,13 @@ pub enum MassModel {
 
 /// A surface counts as closed if the vectors of its areas (area times outward normal), which
 /// cancel on a closed surface, add up to less than this part of the area. A sphere without a cap
-/// of 26° (5 % of its area) is still closed, and a cube without 29 % of one side.
+/// of 26° (5 % of its area) is still closed, and a cube without 29 % of one side. Half or twice: no test of masses
+/// fails.
 const OPEN: f64 = 0.05;
 
 /// A plate of thickness t has a volume of t / 2 for each m² of its two sides. If that is less than
-/// this many mean radii, the cloud is a sheet, and only its noise has two sides.
+/// this many mean radii, the cloud is a sheet, and only its noise has two sides. Half or twice: no test of masses
+/// fails.
 const FLAT: f64 = 0.1;
 
 /// Mass properties of `cloud` at a density of 1 kg/m³, in the cloud's own frame.

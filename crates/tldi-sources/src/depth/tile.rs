@@ -18,20 +18,24 @@ pub(super) const REACH: usize = WINDOW.len() / 2 * WIDEST;
 pub(super) const SLOPE_ERROR: f32 = 0.05;
 /// Fewest pixels of a window, its middle included, that tell a plane: twice its unknowns.
 pub(super) const FEWEST: f32 = 6.0;
-/// Least variance of those pixels across their main direction, in squares of the spacing: fewer are a row.
+/// Least variance of those pixels across their main direction, in squares of the spacing: fewer are a row. Half: no
+/// test of depth frames fails; twice: that of images of any size does.
 pub(super) const LEAST_WIDTH: f32 = 0.1;
 /// Three standard errors of the slope of a first plane, of half of the window's pixels, over a spacing,
 /// as a part of what a single pixel may differ by.
 pub(super) const ERROR_STEP: f32 = 0.2;
-/// Standard deviations of the difference of two pixels that a surface may show.
+/// Standard deviations of the difference of two pixels that a surface may show. Half: the test of a noisy plane
+/// fails; twice: no test of depth frames does.
 pub(super) const DEVIATIONS: f32 = 3.0 * std::f32::consts::SQRT_2;
 /// Steepest surface, as the tangent of the angle between it and the image plane, that is not taken
-/// for a jump in depth (80°).
+/// for a jump in depth (80°). Half: the test of normals of a sweep fails; twice: none does.
 pub(super) const STEEPEST: f32 = 5.67;
 /// The same over the pixels of a window (70°): so few surfaces are steeper that pixels beyond are rather
-/// those of another one. The second fit follows what is steeper.
+/// those of another one. The second fit follows what is steeper. Half: the test of normals of a sweep fails; twice:
+/// that of jumps as well.
 pub(super) const STEEPEST_IN_WINDOW: f32 = 2.75;
-/// Radius that covers a square grid, in its spacing, with a little overlap.
+/// Radius that covers a square grid, in its spacing, with a little overlap. Half or twice: tests of planes and of
+/// sweeps fail.
 pub(super) const COVER: f32 = 0.75;
 
 /// √(x² + y²), without the care for overflow that makes `f32::hypot` slow.

@@ -8,11 +8,11 @@ use crate::counters::Counters;
 use crate::readback::Readback;
 use tldi::{PairQuery, PairResult};
 
-/// Contacts that are read back in any case: 12 kB, which take no longer than none.
+/// Contacts that are read back in any case: 12 kB, which take no longer than none. Half or twice: no test fails.
 pub(super) const LEAST_EXPECTED: u32 = 256;
 
 /// Share of the last batch's contacts, or images, that are expected beyond them: from step to step there are a few
-/// more or fewer, and others cost a submission.
+/// more or fewer, and others cost a submission. Half or twice: no test fails.
 const SPARE: u32 = 8;
 
 /// What is known of a part when it has come back.

@@ -25,6 +25,7 @@ const SMALL: usize = 1 << 16;
 const COARSE: f32 = 4.0;
 
 /// Least edge of a quantum in pixels: what casts look at beside a surface, and two for the rounding of a border.
+/// Half or twice: no test of queries fails.
 const LEAST_QUANTUM: i32 = 8;
 
 /// Largest coordinate of a pixel of an image: an `i32` holds twice as many, and their differences.

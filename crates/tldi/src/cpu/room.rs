@@ -23,7 +23,8 @@ const FRAGMENTS: f32 = 4.0;
 /// Fragments that each point pays for: pixels of a sixth of a radius. Half or twice: no row of any suite changes.
 const FRAGMENTS_PER_POINT: f32 = 128.0;
 
-/// Pixels that take the time of a ray through an exact surface.
+/// Pixels that take the time of a ray through an exact surface. Half or twice: the test of what one image gets
+/// fails.
 const RAY: f32 = 8.0;
 
 /// Pixels that an image takes at the least, and gets even where no room is left: culling its points takes that long,

@@ -7,15 +7,17 @@ use rapier3d::parry::partitioning::{Bvh, BvhNode};
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-/// Samples within this many radii say whether the surface is smooth around one of them.
+/// Samples within this many radii say whether the surface is smooth around one of them. Half or twice: tests of
+/// distances fail.
 const NEIGHBORHOOD: f32 = 2.0;
 
 /// A sample whose neighbours lie within this many radii of its plane has a disc. A surface with a
-/// radius of curvature of 4 point radii is just so smooth.
+/// radius of curvature of 4 point radii is just so smooth. Half: no test of queries fails; twice: tests of
+/// distances do.
 const LEAST_SMOOTH: f32 = 0.5;
 
 /// Square of the sine between planes that are taken to be parallel: their discs are then nearest at
-/// a centre.
+/// a centre. Half or twice: no test of queries fails.
 const PARALLEL: f32 = 1e-6;
 
 /// A sample and the surface that it stands for.

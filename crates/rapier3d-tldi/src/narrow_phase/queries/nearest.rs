@@ -12,13 +12,16 @@ use rapier3d::parry::partitioning::BvhNode;
 use rapier3d::parry::query::PointQuery;
 use tldi::RaySurface;
 
-/// Steps of a descent over a disc towards an exact surface. A plane takes one.
+/// Steps of a descent over a disc towards an exact surface. A plane takes one. Half or twice: no test of queries
+/// fails.
 const DESCENT_STEPS: usize = 4;
 
-/// Sine of the angle between a disc and a surface below which they are taken to be parallel.
+/// Sine of the angle between a disc and a surface below which they are taken to be parallel. Half or twice: no test
+/// of queries fails.
 const FLAT: f32 = 1e-3;
 
-/// Share of its radius by which a disc may seem to miss a surface without inside that it meets, by rounding.
+/// Share of its radius by which a disc may seem to miss a surface without inside that it meets, by rounding. Half
+/// or twice: no test of queries fails.
 const ROUNDING: f32 = 1e-3;
 
 /// Points in which two surfaces are nearest to each other, in the frame of the target.

@@ -9,7 +9,8 @@ use rapier3d::parry::query::PointQuery;
 use rapier3d::parry::shape::{HeightField, TriMesh, TriMeshFlags, Triangle};
 use tldi::RayHit;
 
-/// Part of a mesh's size by which boxes are grown against rounding in `f32`.
+/// Part of a mesh's size by which boxes are grown against rounding in `f32`. Half or twice: no test of shapes or
+/// queries fails.
 const ROUNDING: f64 = 1e-6;
 
 pub(super) fn cross_triangle(shape: &Triangle, line: &Line, hits: &mut Vec<RayHit>) {
@@ -160,7 +161,8 @@ pub(super) fn cross_height_field(field: &HeightField, line: &Line, hits: &mut Ve
     }
 }
 
-/// Part of a cell by which ranges of cells are grown against rounding in `f32`.
+/// Part of a cell by which ranges of cells are grown against rounding in `f32`. Half or twice: no test of shapes or
+/// queries fails.
 const CELL_MARGIN: f64 = 1e-3;
 
 /// The cells between two grid coordinates, in either order.

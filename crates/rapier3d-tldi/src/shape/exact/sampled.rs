@@ -7,10 +7,10 @@ use rapier3d::parry::query::Ray;
 use rapier3d::parry::shape::{FeatureId, Shape};
 use tldi::RayHit;
 
-/// Part of the shape's size that a cast restarts behind a hit.
+/// Part of the shape's size that a cast restarts behind a hit. Half or twice: no test of shapes or queries fails.
 const STEP: f32 = 1e-5;
 
-/// Most crossings of one ray that are looked for.
+/// Most crossings of one ray that are looked for. Half or twice: no test of shapes or queries fails.
 const MAX_CROSSINGS: usize = 4096;
 
 pub(super) fn crossings(shape: &dyn Shape, line: &Line, hits: &mut Vec<RayHit>) {

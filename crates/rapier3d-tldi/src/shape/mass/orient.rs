@@ -3,7 +3,7 @@
 use super::surfel::Surfel;
 use rapier3d::glamx::DVec3;
 
-/// Neighbours that a normal is compared with.
+/// Neighbours that a normal is compared with. Half or twice: no test of masses fails.
 const LINKS: usize = 8;
 
 /// Turns the normals outward: neighbours are made to agree, surest pairs first (Hoppe et al. 1992,

@@ -20,7 +20,8 @@ const BOX_MARGIN: f32 = 1e-3;
 /// twice: no row of `overlaps` changes.
 const INSIDE: f32 = 1e-6;
 
-/// Distance to another part of a compound, in parts of its size, that counts as none.
+/// Distance to another part of a compound, in parts of its size, that counts as none. Half: no test fails; twice:
+/// that of samples, which must be even and close the surface.
 const TOUCHING: f32 = 1e-5;
 
 /// A piece of a surface: the image of a triangle under a map that lengthens nothing.

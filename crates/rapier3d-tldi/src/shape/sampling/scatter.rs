@@ -10,7 +10,8 @@ use std::collections::HashMap;
 /// instead of 4, with other samples.
 const LEAST_DISTANCE: f32 = 0.8;
 
-/// Pieces this small, in spacings, are left out where they are hidden in part.
+/// Pieces this small, in spacings, are left out where they are hidden in part. Half or twice: the test of samples
+/// fails, which must be even and close the surface.
 const FINEST: f32 = 0.1;
 
 /// Width of the cells that hold the points, in spacings: all that is within a spacing is in eight of them. Half: 2

@@ -14,7 +14,7 @@ use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
 use crate::{Aabb, PointCloud};
 use glamx::{Pose3, Vec3};
 
-/// Fewest near points of a selection that stand for all.
+/// Fewest near points of a selection that stand for all. Half: no test of queries or contacts fails.
 const ENOUGH: usize = 32;
 
 impl Side {
