@@ -16,6 +16,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use tldi_memory::{Counting, held};
+use tldi_wgpu::{AdapterChoice, AutoBackend, BackendChoice, Gpu, WgpuBackend};
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting::new();
@@ -33,6 +34,9 @@ struct Args {
     /// Write one row for each tenth of the run to this file as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Begin on a GPU, or a driver that imitates one, and lose it: the CPU must go on
+    #[arg(long)]
+    lose_device: bool,
 }
 
 /// Steps of a cycle, at whose end all bodies are gone.
@@ -43,6 +47,9 @@ const EVERY: usize = 10;
 
 /// Steps for which a body stays.
 const STAYS: usize = 80;
+
+/// Step of the first cycle in which a device is lost: bodies are on the floor by then.
+const LOST: usize = 60;
 
 /// Points of a frame of the stream: a floor with a point every 5 cm.
 const EDGE: usize = 60;
@@ -84,12 +91,19 @@ struct Soak {
     bodies: Vec<(RigidBodyHandle, ColliderHandle)>,
     shapes: Vec<SharedShape>,
     seed: u64,
+    /// The device that compares, until it is lost.
+    gpu: Option<Gpu>,
 }
 
 impl Soak {
-    fn new(seed: u64) -> anyhow::Result<Self> {
+    fn new(seed: u64, lose_device: bool) -> anyhow::Result<Self> {
         let mut world = PhysicsWorld::default();
-        let tldi = TldiPipeline::new(TldiConfig::default())?;
+        let gpu = (lose_device.then(|| Gpu::open(AdapterChoice::Any))).transpose()?;
+        let backend = match &gpu {
+            Some(gpu) => Box::new(AutoBackend::with_gpu(WgpuBackend::new(gpu.clone())?, 0)),
+            None => BackendChoice::Auto.open()?,
+        };
+        let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
         tldi.attach(&mut world);
         let recipe = CloudRecipe {
             radii: RadiusRule::Global(SPACING),
@@ -113,7 +127,14 @@ impl Soak {
             bodies: Vec::new(),
             shapes,
             seed,
+            gpu,
         })
+    }
+
+    /// Whether there was a device to lose.
+    fn lose_device(&mut self) -> bool {
+        let gpu = self.gpu.take();
+        gpu.inspect(|gpu| gpu.device().destroy()).is_some()
     }
 
     /// The same in every cycle.
@@ -154,7 +175,15 @@ impl Soak {
                 let (body, _) = self.bodies.remove(0);
                 self.world.remove_body(body);
             }
+            let is_lost = step == LOST && self.lose_device();
             let report = self.tldi.step(&mut self.world)?;
+            let (on_gpu, is_told) = (&*report.backend == "gpu", report.fallback.is_some());
+            ensure!(
+                on_gpu == self.gpu.is_some() && (!is_lost || is_told),
+                "step {step}: on {}, {:?}",
+                report.backend,
+                report.fallback
+            );
             pairs += report.pairs_batched;
             pixels += report.contact_pixels;
         }
@@ -179,7 +208,7 @@ fn main() -> anyhow::Result<()> {
         2 * WARM * CYCLE,
         WARM * CYCLE
     );
-    let mut soak = Soak::new(args.seed)?;
+    let mut soak = Soak::new(args.seed, args.lose_device)?;
     let progress = ProgressBar::new(cycles as u64).with_message("cycles");
     let mut settling = Part::default();
     for _ in 0..WARM {
