@@ -101,7 +101,7 @@ impl Soak {
         let gpu = (lose_device.then(|| Gpu::open(AdapterChoice::Any))).transpose()?;
         let backend = match &gpu {
             Some(gpu) => Box::new(AutoBackend::with_gpu(WgpuBackend::new(gpu.clone())?, 0)),
-            None => BackendChoice::Auto.open()?,
+            None => BackendChoice::Cpu.open()?,
         };
         let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
         tldi.attach(&mut world);
