@@ -34,7 +34,7 @@ struct Args {
     /// Write one row for each tenth of the run to this file as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Begin on a GPU, or a driver that imitates one, and lose it: the CPU must go on
+    /// Begin on a GPU, or a driver that imitates one, and lose it after its first contacts: the CPU must go on
     #[arg(long)]
     lose_device: bool,
 }
@@ -47,9 +47,6 @@ const EVERY: usize = 10;
 
 /// Steps for which a body stays.
 const STAYS: usize = 80;
-
-/// Step of the first cycle in which a device is lost: bodies are on the floor by then.
-const LOST: usize = 60;
 
 /// Points of a frame of the stream: a floor with a point every 5 cm.
 const EDGE: usize = 60;
@@ -175,7 +172,8 @@ impl Soak {
                 let (body, _) = self.bodies.remove(0);
                 self.world.remove_body(body);
             }
-            let is_lost = step == LOST && self.lose_device();
+            // Bodies lie on the floor.
+            let is_lost = pixels > 0 && self.lose_device();
             let report = self.tldi.step(&mut self.world)?;
             let (on_gpu, is_told) = (&*report.backend == "gpu", report.fallback.is_some());
             ensure!(
