@@ -172,7 +172,7 @@ impl Soak {
                 let (body, _) = self.bodies.remove(0);
                 self.world.remove_body(body);
             }
-            // Bodies lie on the floor.
+            // The device has found contacts.
             let is_lost = pixels > 0 && self.lose_device();
             let report = self.tldi.step(&mut self.world)?;
             let (on_gpu, is_told) = (&*report.backend == "gpu", report.fallback.is_some());
