@@ -116,7 +116,7 @@ fn columns_tiles(@builtin(local_invocation_index) lane: u32) {
                     rect_last = min(rect_last, size - 1);
                 }
                 views[view].depth_zero = min(a.near, b.near);
-                edge = max(i32(ceil(max(a.reach, b.reach))), LEAST_TILE);
+                edge = i32(ceil(max(a.reach, b.reach)));
             }
             if all(rect_first <= rect_last) {
                 let size = rect_last - rect_first + 1;

@@ -26,7 +26,6 @@ override DEPTH_BITS: u32;
 override MAX_DEPTH: f32;
 override DEPTH_STEPS: u32;
 override STEEP: f32;
-override LEAST_TILE: i32;
 override FACING: f32;
 override BESIDE: f32;
 override SWAPPED: u32;

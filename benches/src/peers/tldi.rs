@@ -80,6 +80,7 @@ impl TldiPeer {
             backend,
             threads: rayon::ThreadPoolBuilder::new()
                 .num_threads(threads)
+                .start_handler(move |worker| pin(worker, threads))
                 .build()?,
             method,
             noise: 0.0,
@@ -96,6 +97,15 @@ impl TldiPeer {
     /// What was found in the last frame.
     pub fn result(&self) -> Option<&PairResult> {
         self.results.first()
+    }
+}
+
+/// Keeps one of several workers on a core of its own. Some kernels, those of virtual machines above all, pack threads of
+/// short work on one core, and two of them then take as long as one.
+fn pin(worker: usize, workers: usize) {
+    let cores = core_affinity::get_core_ids().unwrap_or_default();
+    if workers > 1 && workers <= cores.len() {
+        core_affinity::set_for_current(cores[worker]);
     }
 }
 
@@ -142,9 +152,8 @@ impl Peer for TldiPeer {
                     builder.build().expect("the points of a bench are finite")
                 })
             });
-            for (side, cloud) in clouds.iter_mut().enumerate() {
-                fill(cloud, frame, side);
-            }
+            let [a, b] = clouds;
+            rayon::join(|| fill(a, frame, 0), || fill(b, frame, 1));
             let built = start.seconds();
             let [a, b] = &*clouds;
             let query = PairQuery {

@@ -1,7 +1,7 @@
 //! What is known about a pair before any of its points is read. All backends start from here.
 
 use crate::cloud::reach::{Ring, farthest};
-use crate::cpu::{columns, normals};
+use crate::cpu::normals;
 use crate::{Aabb, PairQuery, Params, Surface, View};
 use glamx::{Pose3, Vec3};
 
@@ -149,10 +149,10 @@ impl PairPlan {
 
 /// See [`PairPlan::column_reach`].
 ///
-/// It is the distance between the nearest points of both in a tile and around it, at least [`columns::LEAST_TILE`] pixels on
-/// all sides. Surfaces that are inclined by 60° come nearer there, each by as much as it rises over these pixels.
+/// It is the distance between the nearest points of both in a tile and around it, at least a pixel on all sides. Surfaces
+/// that are inclined by 60° come nearer there, each by as much as it rises over this pixel.
 pub(crate) fn column_reach(params: &Params) -> f32 {
-    let rise = STEEPEST * columns::LEAST_TILE as f32 * params.pixel_size;
+    let rise = STEEPEST * params.pixel_size;
     let inclined = 2.0 * (params.prediction - rise);
     params.thickness.max(params.prediction).max(inclined)
 }

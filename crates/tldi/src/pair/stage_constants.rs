@@ -2,7 +2,7 @@
 
 use crate::BLOCK;
 use crate::cpu::normals::{estimate, planes, sharpen};
-use crate::cpu::{columns, compare, crossings, splat, sweep};
+use crate::cpu::{compare, crossings, splat, sweep};
 use crate::pair::sampling::AIM_SAMPLES;
 use crate::view::{approach, camera_policy};
 
@@ -15,7 +15,6 @@ pub fn stage_constants() -> Vec<(&'static str, f64)> {
     all.extend(sharpen::CONSTANTS);
     all.extend(splat::CONSTANTS);
     all.extend(sweep::CONSTANTS);
-    all.extend(columns::CONSTANTS);
     all.extend(compare::CONSTANTS);
     all.extend(crossings::CONSTANTS);
     all.extend(camera_policy::CONSTANTS);
