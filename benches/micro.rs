@@ -12,6 +12,7 @@ use tldi::{
     VirtualCamera, build,
 };
 use tldi_benches::placements::{Placement, Source};
+use tldi_benches::threads::workers;
 use tldi_benches::{SHEET_EDGE, bumpy_sheet};
 use tldi_tests::HalfSpace;
 
@@ -116,6 +117,36 @@ fn comparisons(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// Sixteen pairs at once, on one worker and on one a core.
+fn batches(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("batch of 16 pairs");
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let (mut backend, mut results) = (CpuBackend::new(), Vec::<PairResult>::new());
+    for placement in Placement::ALL {
+        let source = Source::Generated(POINTS[0]);
+        let radius = radius_of(&source, placement);
+        let clouds: Vec<[PointCloud; 2]> = (0..16)
+            .map(|seed| source.bodies(placement, radius, seed))
+            .map(|bodies| bodies.map(|points| cloud_of(&points, radius)))
+            .collect();
+        let queries: Vec<PairQuery> = (clouds.iter())
+            .map(|[a, b]| query(Surface::Cloud(a), b, Pose3::IDENTITY, radius))
+            .collect();
+        for count in [1, cores] {
+            let workers = workers(count).expect("threads can be started");
+            group.bench_function(BenchmarkId::new(placement.name(), count), |bench| {
+                workers.install(|| {
+                    bench.iter(|| {
+                        let outcome = backend.compare(&queries, &mut results);
+                        outcome.expect("the pairs are supported");
+                    });
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
 /// Straight casts of a cloud onto another.
 fn casts(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("cast");
@@ -181,6 +212,6 @@ criterion_group! {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(500))
         .measurement_time(Duration::from_secs(2));
-    targets = clouds, images, comparisons, casts, pushes
+    targets = clouds, images, comparisons, batches, casts, pushes
 }
 criterion_main!(stages);

@@ -13,6 +13,7 @@ pub mod placements;
 pub mod protocol;
 pub mod stopwatch;
 pub mod stored;
+pub mod threads;
 pub mod times;
 
 use std::collections::HashMap;

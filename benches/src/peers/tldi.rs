@@ -2,6 +2,7 @@
 
 use super::{Deepest, Found, Frame, Peer};
 use crate::stopwatch::Stopwatch;
+use crate::threads::workers;
 use ::tldi::glamx::{Pose3, Vec3};
 use ::tldi::{
     Backend, CameraPolicy, PairQuery, PairResult, Params, PointCloud, Radii, Surface, View,
@@ -78,10 +79,7 @@ impl TldiPeer {
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
         Ok(Self {
             backend,
-            threads: rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .start_handler(move |worker| pin(worker, threads))
-                .build()?,
+            threads: workers(threads)?,
             method,
             noise: 0.0,
             clouds: None,
@@ -97,15 +95,6 @@ impl TldiPeer {
     /// What was found in the last frame.
     pub fn result(&self) -> Option<&PairResult> {
         self.results.first()
-    }
-}
-
-/// Keeps one of several workers on a core of its own. Some kernels, those of virtual machines above all, pack threads of
-/// short work on one core, and two of them then take as long as one.
-fn pin(worker: usize, workers: usize) {
-    let cores = core_affinity::get_core_ids().unwrap_or_default();
-    if workers > 1 && workers <= cores.len() {
-        core_affinity::set_for_current(cores[worker]);
     }
 }
 

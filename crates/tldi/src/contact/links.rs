@@ -27,8 +27,8 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(crate) struct Links {
     /// Indices of the contact pixels, the lower one first.
     pub(crate) pairs: Vec<(u32, u32)>,
-    /// Links of each contact pixel; then its new index, or [`NONE`]; then, at each root, whether the
-    /// surfaces are apart anywhere in its component.
+    /// Links of each contact pixel, or whether the surfaces are apart anywhere in the component of a root; then the new
+    /// index of each, or [`NONE`].
     counts: Vec<u32>,
     /// Where the neighbours of each contact pixel start in `neighbors`, and their end.
     starts: Vec<u32>,
@@ -84,11 +84,13 @@ impl Links {
         }
     }
 
-    /// Cuts the penetrations of `result` to what neighbours confirm: contact pixels deeper than a
-    /// layer are removed, with their links, others still touch. Those that are left decide on
-    /// `collides` and `gap`: where an inside is known (`tells_inside`) all that are deep, elsewhere
-    /// those that continue others at which the surfaces are apart. What is deep all over may be the space
-    /// between two limbs. `roots` is overwritten.
+    /// Leaves the penetrations of `result` that are proven; from these, `collides` and `gap` follow. `roots` is
+    /// overwritten.
+    ///
+    /// Contact pixels deeper than a layer need neighbours that confirm them, and go with their links if they have too
+    /// few; others still touch. If nothing tells the inside (`tells_inside`), what is deep may be the space between two
+    /// limbs, too. Then deep pixels count if they continue others at which the surfaces are apart. Where there are none
+    /// of these, all count if the surfaces were seen to cross (`result.collides`).
     pub(crate) fn confirm(
         &mut self,
         result: &mut PairResult,
@@ -104,7 +106,6 @@ impl Links {
             self.counts[k as usize] += 1;
             self.counts[l as usize] += 1;
         }
-        let mut kept = 0;
         for (count, contact) in self.counts.iter_mut().zip(&mut result.contacts) {
             if *count < CONFIRMING {
                 if is_deep(contact) {
@@ -114,31 +115,26 @@ impl Links {
                 let confirmed = *count as f32 / CONFIRMING as f32 * params.thickness;
                 contact.gap = contact.gap.max(-confirmed);
             }
-            *count = kept;
-            kept += 1;
-            result.gap = Some(result.gap.map_or(contact.gap, |g| g.min(contact.gap)));
         }
-        let new_index = &self.counts;
-        let mut index = new_index.iter();
-        result
-            .contacts
-            .retain(|_| index.next().is_some_and(|&k| k != NONE));
-        self.pairs.retain_mut(|(k, l)| {
-            (*k, *l) = (new_index[*k as usize], new_index[*l as usize]);
-            *k != NONE && *l != NONE
-        });
+        self.keep_counted(&mut result.contacts);
+        if !tells_inside && result.contacts.iter().any(is_deep) {
+            let is_any_proven = self.count_out(&result.contacts, is_deep, roots);
+            if is_any_proven || !result.collides {
+                self.keep_counted(&mut result.contacts);
+            }
+        }
         self.index(&result.contacts);
+        let gaps = result.contacts.iter().map(|contact| contact.gap);
+        result.gap = gaps.chain(result.gap).reduce(f32::min);
         // Solids that overlap by more than a layer's thickness intersect, even if their surfaces cross
         // where no view sees them well.
-        if !result.collides && result.contacts.iter().any(is_deep) {
-            let contacts = &result.contacts;
-            result.collides = tells_inside || self.deep_leads_out(contacts, is_deep, roots);
-        }
+        result.collides |= result.contacts.iter().any(is_deep);
     }
 
-    /// Whether some contact pixels that are deep continue others at which the surfaces are apart: from
-    /// within an overlap the gap passes through zero, the space between limbs ends where they meet.
-    fn deep_leads_out(
+    /// Sets `counts` to [`NONE`] for the contact pixels that are deep and do not continue others at which the surfaces
+    /// are apart: from within an overlap the gap passes through zero, the space between limbs ends where they meet.
+    /// Returns whether any that are deep do.
+    fn count_out(
         &mut self,
         contacts: &[ContactPixel],
         is_deep: impl Fn(&ContactPixel) -> bool,
@@ -148,11 +144,32 @@ impl Links {
         let leads_out = &mut self.counts;
         leads_out.clear();
         leads_out.resize(contacts.len(), 0);
-        let of_component = || contacts.iter().zip(roots.iter().map(|&root| root as usize));
-        for (_, root) in of_component().filter(|(contact, _)| contact.gap > 0.0) {
-            leads_out[root] = 1;
+        for (contact, &root) in contacts.iter().zip(&*roots) {
+            leads_out[root as usize] |= u32::from(contact.gap > 0.0);
         }
-        of_component().any(|(contact, root)| is_deep(contact) && leads_out[root] == 1)
+        let mut is_any_proven = false;
+        // The root of a component comes first, and is read by all others of it.
+        for (k, contact) in contacts.iter().enumerate().rev() {
+            let is_out = self.counts[roots[k] as usize] == 1;
+            is_any_proven |= is_out && is_deep(contact);
+            self.counts[k] = if is_out || !is_deep(contact) { 1 } else { NONE };
+        }
+        is_any_proven
+    }
+
+    /// Keeps the contact pixels that have no [`NONE`] in `counts`, and the links between them.
+    fn keep_counted(&mut self, contacts: &mut Vec<ContactPixel>) {
+        let kept = self.counts.iter_mut().filter(|count| **count != NONE);
+        for (index, count) in (0..).zip(kept) {
+            *count = index;
+        }
+        let new_index = &self.counts;
+        let mut index = new_index.iter();
+        contacts.retain(|_| index.next().is_some_and(|&k| k != NONE));
+        self.pairs.retain_mut(|(k, l)| {
+            (*k, *l) = (new_index[*k as usize], new_index[*l as usize]);
+            *k != NONE && *l != NONE
+        });
     }
 
     /// Contact pixels linked with `k`.
@@ -282,10 +299,24 @@ mod tests {
     }
 
     fn confirmed(contacts: Vec<ContactPixel>, tells_inside: bool) -> PairResult {
-        let mut result = PairResult {
+        let result = PairResult {
             contacts,
             ..PairResult::default()
         };
+        confirm(result, tells_inside)
+    }
+
+    /// Of bare surfaces that were seen to cross.
+    fn crossing(contacts: Vec<ContactPixel>) -> PairResult {
+        let result = PairResult {
+            contacts,
+            collides: true,
+            ..PairResult::default()
+        };
+        confirm(result, false)
+    }
+
+    fn confirm(mut result: PairResult, tells_inside: bool) -> PairResult {
         let params = Params::for_radius(PIXEL);
         let mut links = Links::default();
         links.find(&result.contacts, &params);
@@ -339,8 +370,23 @@ mod tests {
         ] {
             let result = confirmed(contacts.clone(), tells_inside);
             assert_eq!(result.collides, collides);
-            assert!(result.gap < Some(-4.0 * PIXEL));
+            // One truth: what does not collide is no deeper than a layer.
+            let is_deep = result.gap.is_some_and(|gap| gap < -4.0 * PIXEL);
+            assert_eq!(is_deep, collides);
         }
+        // A box that is sunk in a sheet: its bottom is deep all over, and its sides are seen to cross.
+        let sunk = crossing(apart.clone());
+        assert_eq!((sunk.contacts.len(), sunk.collides), (60, true));
+        // The space between limbs beside limbs that meet.
+        let mut beside = sloping(6.0);
+        beside.extend(apart.iter().map(|contact| ContactPixel {
+            pixel: [contact.pixel[0] + 20, contact.pixel[1]],
+            ..*contact
+        }));
+        beside.sort_by_key(|contact| (contact.pixel[1], contact.pixel[0]));
+        let result = crossing(beside);
+        assert!(result.contacts.iter().all(|contact| contact.pixel[0] < 20));
+        assert!(result.collides && result.gap.is_some_and(|gap| gap < -4.0 * PIXEL));
     }
 
     #[test]

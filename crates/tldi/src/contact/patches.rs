@@ -104,8 +104,10 @@ impl PatchScratch {
         allow_for_noise(result, fitted.reduce(f32::min), query);
     }
 
-    /// [`reduce`](Self::reduce) of the contact pixels of a first look, in which nothing stands alone.
+    /// [`reduce`](Self::reduce) of the contact pixels of a first look, in which nothing stands alone. The surfaces are
+    /// taken to cross: the caller has to prove it.
     pub(crate) fn reduce_coarse(&mut self, result: &mut PairResult, query: &PairQuery) {
+        result.collides = true;
         self.link(result, &query.params);
         let tells_inside = query.a.is_oriented() || query.b.is_oriented();
         self.reduce_linked(result, &query.params, tells_inside);

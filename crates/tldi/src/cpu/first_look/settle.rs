@@ -132,7 +132,6 @@ impl Scratch {
             }
             if depth >= DEEP * pixel {
                 if self.is_proven(query, plan, &result.axes, &mut came_to) {
-                    result.collides = true;
                     result.coarser = Some(pixel / query.params.pixel_size);
                     return FirstLook::Settled;
                 }
