@@ -3,6 +3,9 @@
 //!
 //! This crate knows nothing of physics engines, GPUs or file formats; `rapier3d-tldi` connects it
 //! to rapier.
+//!
+//! With the feature `tracing`, the stages of the CPU backend are spans of the level "trace". Any
+//! subscriber of the crate `tracing` can then show where the time of a step goes.
 
 mod aabb;
 mod cloud;
@@ -10,6 +13,7 @@ mod contact;
 mod cpu;
 mod pair;
 pub mod paper;
+mod stage;
 mod view;
 
 pub use aabb::Aabb;

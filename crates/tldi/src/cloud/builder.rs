@@ -7,6 +7,7 @@ use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_cloud::{Spare, next_content_id};
 use crate::cloud::point_normals::{fill_from_nearest, normalize, turn_towards};
 use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
+use crate::stage::stage;
 use crate::{CloudError, CloudRecipe, NonFinite, PointCloud, Positions, Radii, RadiusRule};
 use glamx::Vec3;
 use std::borrow::Cow;
@@ -209,6 +210,7 @@ impl<'a> CloudBuilder<'a> {
 
     /// Validates and builds. See [`CloudError`] for what can be wrong.
     pub fn build(self) -> Result<PointCloud<'a>, CloudError> {
+        let _stage = stage!("points");
         self.recipe.check()?;
         let count = self.check_lengths()?;
         let (mut coordinates, mut blocks, dropped) = self.positions.gather();

@@ -6,6 +6,7 @@ use crate::cloud::morton::permuted;
 use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_normals::{fill_from_nearest, normalize};
 use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
+use crate::stage::stage;
 use crate::{Aabb, CloudError, CloudRecipe, Radii, RadiusRule};
 use glamx::Vec3;
 use std::borrow::Cow;
@@ -278,6 +279,7 @@ impl<'a> PointCloud<'a> {
         normals: Option<&[Vec3]>,
         moved: bool,
     ) -> Result<(), CloudError> {
+        let _stage = stage!("points");
         check_count(points.len())?;
         if let Some(normals) = normals {
             check_length("normals", normals.len(), points.len())?;

@@ -11,6 +11,7 @@ use crate::contact::part_shape::{Pixels, Shape, ShapeScratch};
 use crate::contact::smooth::{Smooth, smooth};
 use crate::contact::way_out::WayOut;
 use crate::cpu::sweep::SAME_FACE;
+use crate::stage::stage;
 use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params};
 use arrayvec::ArrayVec;
 use glamx::Vec3;
@@ -75,6 +76,7 @@ impl PatchScratch {
     /// and gap, as the stage `compare` finds them. Cost: linear in their number, except for sorting
     /// the groups, and the pixels if needed.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
+        let _stage = stage!("patches");
         self.link(result, params);
         self.reduce_linked(result, params, true);
     }
@@ -94,6 +96,7 @@ impl PatchScratch {
         query: &PairQuery,
         culled: [Option<Culled>; 2],
     ) {
+        let _stage = stage!("patches");
         self.link(result, &query.params);
         if self.lone_points.drop(result, &self.links, query, culled) {
             self.links.find(&result.contacts, &query.params);
@@ -107,6 +110,7 @@ impl PatchScratch {
     /// [`reduce`](Self::reduce) of the contact pixels of a first look, in which nothing stands alone. The surfaces are
     /// taken to cross: the caller has to prove it.
     pub(crate) fn reduce_coarse(&mut self, result: &mut PairResult, query: &PairQuery) {
+        let _stage = stage!("patches");
         result.collides = true;
         self.link(result, &query.params);
         let tells_inside = query.a.is_oriented() || query.b.is_oriented();

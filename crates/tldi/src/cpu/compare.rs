@@ -6,6 +6,7 @@
 use super::crossings::{Crossings, best_seen};
 use super::fold::ViewFold;
 use super::sweep::{is_edge_on, share_of};
+use crate::stage::stage;
 use crate::view::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera};
 use arrayvec::ArrayVec;
@@ -57,6 +58,7 @@ pub(crate) fn compare(
     crossings: &mut Crossings,
     result: &mut PairResult,
 ) {
+    let _stage = stage!("compare");
     debug_assert_eq!((a.origin, a.size), (b.origin, b.size));
     let [width, height] = a.size;
     let frame_from_view = a.camera.view_from_frame.inverse();

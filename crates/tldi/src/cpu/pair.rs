@@ -8,7 +8,7 @@ use super::scratch::Scratch;
 use super::side::{CloudView, ExactView, Scope};
 use crate::pair::plan::{PairPlan, column_reach};
 use crate::pair::sampling::stride;
-use crate::view::camera_policy::{MAX_VIEWS, aim, further_axes};
+use crate::view::camera_policy::{MAX_VIEWS, further_axes};
 use crate::{
     CameraPolicy, Looked, PairQuery, PairResult, Surface, Variant, View, VirtualCamera, paper,
 };
@@ -66,9 +66,7 @@ impl Scratch {
                 self.look(query, &plan, &camera, &[camera.axis()], 0, result);
             }
             View::Aim { policy, .. } => {
-                let approach = self.approach(query, &plan);
-                let normals = self.zone_normals(query);
-                aim(policy, normals, &approach, &mut result.axes);
+                self.aim(query, &plan, policy, &mut result.axes);
                 if query.params.variant() == Variant::Paper {
                     let camera = VirtualCamera::along(result.axes[0], query.params.pixel_size);
                     self.compare_paper(query, &camera, result);

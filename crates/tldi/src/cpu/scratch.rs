@@ -17,8 +17,9 @@ use super::zone::{self, ZoneScratch, ZoneSide};
 use crate::cloud::reach::Place;
 use crate::contact::patches::PatchScratch;
 use crate::pair::plan::{Approach, PairPlan, SidePlan};
-use crate::view::camera_policy::{ZoneNormals, seen_from_behind};
-use crate::{Looked, PairQuery, RayHit, Surface, View, VirtualCamera, Work, paper};
+use crate::stage::stage;
+use crate::view::camera_policy::{self, ZoneNormals, seen_from_behind};
+use crate::{CameraPolicy, Looked, PairQuery, RayHit, Surface, View, VirtualCamera, Work, paper};
 use glamx::{Pose3, Vec3};
 /// Where two clouds meet in a view.
 pub(super) struct CommonPixels {
@@ -144,9 +145,22 @@ impl Scratch {
         }
     }
 
+    /// Fills `axes` with the view axes of the near points and their normals.
+    pub(super) fn aim(
+        &self,
+        query: &PairQuery,
+        plan: &PairPlan,
+        policy: CameraPolicy,
+        axes: &mut Vec<Vec3>,
+    ) {
+        let _stage = stage!("aim");
+        let approach = self.approach(query, plan);
+        camera_policy::aim(policy, self.zone_normals(query), &approach, axes);
+    }
+
     /// What is known about where the second surface lies. For bare clouds, the near points tell as
     /// well.
-    pub(super) fn approach(&self, query: &PairQuery, plan: &PairPlan) -> Approach {
+    fn approach(&self, query: &PairQuery, plan: &PairPlan) -> Approach {
         let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| {
             let is_cloud = matches!(surface, Surface::Cloud(_));
             (is_cloud && !surface.is_oriented()).then(|| side.mean_of_near())
@@ -176,7 +190,7 @@ impl Scratch {
         }
     }
 
-    pub(super) fn zone_normals(&self, query: &PairQuery) -> [ZoneNormals<'_>; 2] {
+    fn zone_normals(&self, query: &PairQuery) -> [ZoneNormals<'_>; 2] {
         [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| ZoneNormals {
             normals: &side.near_normals,
             oriented: surface.is_oriented(),
@@ -240,6 +254,7 @@ impl Scratch {
         reach: f32,
         support: f32,
     ) -> Option<CommonPixels> {
+        let _stage = stage!("columns");
         let (camera, params) = (a.camera, a.params);
         let (side_a, side_b) = (&mut self.a, &mut self.b);
         let (seen_a, seen_b) = rayon::join(|| side_a.project(a), || side_b.project(b));

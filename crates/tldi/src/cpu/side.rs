@@ -16,6 +16,7 @@ use super::sweep;
 use crate::contact::lone_points::Culled;
 use crate::pair::plan::SidePlan;
 use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
+use crate::stage::stage;
 use crate::{Params, PointCloud, RayHit, Tldi, VirtualCamera};
 use glamx::{DVec3, Mat3, Pose3, Vec3};
 
@@ -97,6 +98,7 @@ impl CloudView<'_> {
 impl Side {
     /// Fills `near_normals` from an even selection of the near points.
     pub(super) fn sample_normals(&mut self, cloud: &PointCloud, frame_from_cloud: &Pose3) {
+        let _stage = stage!("aim");
         let step = self.near.len().div_ceil(AIM_SAMPLES) as u32;
         if let Some(given) = cloud.normals() {
             let rotation = Mat3::from_quat(frame_from_cloud.rotation);
@@ -178,7 +180,10 @@ impl Side {
             tiles: Tiles::new(&self.around(view, seen, Some(rect)).rect, seen.reach),
             scale: DepthScale::new(seen.near, view.params),
         };
-        self.columns.sort(&imaging.tiles, view.camera);
+        {
+            let _stage = stage!("columns");
+            self.columns.sort(&imaging.tiles, view.camera);
+        }
         self.image(view, &imaging, None);
     }
 
@@ -194,20 +199,20 @@ impl Side {
         }
     }
 
-    /// The image of the projected points, in the columns in which they are within `reach` metres of
-    /// an exact surface and the surface covers them. Returns its pixels; `None` where it is
-    /// nowhere.
+    /// What an image is of in the columns in which the projected points are within `reach` metres of an
+    /// exact surface and the surface covers them; `None` where they are nowhere.
     #[expect(clippy::too_many_arguments, reason = "a stage's parts of one look")]
-    fn image_near(
+    fn meet_exact<'a>(
         &mut self,
-        view: &CloudView,
+        view: &CloudView<'a>,
         seen: &Footprint,
         covered: Option<Rect>,
         exact: &Placed,
         reach: f32,
         touching: &mut Touching,
         fold: &ViewFold,
-    ) -> Option<Rect> {
+    ) -> Option<Imaging<'a>> {
+        let _stage = stage!("columns");
         let seen = &self.around(view, seen, covered);
         let tiles = Tiles::new(&seen.rect, seen.reach);
         self.columns.sort(&tiles, view.camera);
@@ -220,16 +225,13 @@ impl Side {
             exact.meets(view.camera, fold.place(tiles.middle(tile)), depths, reach)
         };
         let rect = touching.mark(&tiles, &seen.rect, support_px, meets)?;
-        let rect = rect.intersection(&covered.unwrap_or(rect))?;
-        let imaging = Imaging {
+        Some(Imaging {
             camera: view.camera,
             params: view.params,
-            rect,
+            rect: rect.intersection(&covered.unwrap_or(rect))?,
             tiles,
             scale: DepthScale::new(seen.near, view.params),
-        };
-        self.image(view, &imaging, Some(touching));
-        Some(rect)
+        })
     }
 
     /// The image of the points that were sorted into tiles: all in view, or those in the tiles of
@@ -279,6 +281,7 @@ impl Side {
         imaging: &CellImaging,
         touching: &Touching,
     ) {
+        let _stage = stage!("cells");
         self.columns.modelled(touching, &mut self.kept);
         let along = imaging.camera.view_from_frame.rotation * view.frame_from_cloud.rotation;
         let along = along.inverse() * Vec3::Z;
@@ -295,6 +298,7 @@ impl Side {
 
     /// Fills `kept` and `kept_normals`.
     fn keep(&mut self, view: &CloudView, imaging: &Imaging, touching: Option<&Touching>) {
+        let _stage = stage!("normals");
         let rotation = view.camera.view_from_frame.rotation;
         if let Some(given) = view.cloud.normals() {
             match touching {
@@ -349,19 +353,17 @@ impl Side {
         Cost::new(rect, self.points.len(), fragments).with_rays(rays)
     }
 
-    /// Image of this cloud, and of an exact surface into `image` over the same pixels; `None`
-    /// where nothing is in view, or there is no room for it.
-    #[expect(clippy::too_many_arguments, reason = "a stage's parts of one look")]
-    pub(super) fn look_with(
+    /// Moves the culled points into the view. Returns what they cover, the part of it that an image of them and of an
+    /// exact surface has, and what the surface covers, if that is known; `None` where nothing is in view, or there
+    /// is no room for the image.
+    fn project_with(
         &mut self,
         view: &CloudView,
         look: &ExactView,
-        touching: &mut Touching,
         fold: &mut ViewFold,
         room: &mut Room,
-        hits: &mut Vec<RayHit>,
-        image: &mut Tldi,
-    ) -> Option<()> {
+    ) -> Option<(Footprint, Rect, Option<Rect>)> {
+        let _stage = stage!("columns");
         let mut seen = self.project(view)?;
         let border = match look.scope {
             Scope::Everywhere => BORDER,
@@ -388,11 +390,32 @@ impl Side {
         if follows && room.refuses(self.cost_with(view, look, &rect, self.points.len())) {
             return None;
         }
-        let reach = DepthScale::reach(view.params);
-        seen.limit_depths(reach, || self.columns.median_depth());
+        seen.limit_depths(DepthScale::reach(view.params), || {
+            self.columns.median_depth()
+        });
+        Some((seen, rect, covered))
+    }
+
+    /// Image of this cloud, and of an exact surface into `image` over the same pixels; `None`
+    /// where nothing is in view, or there is no room for it.
+    #[expect(clippy::too_many_arguments, reason = "a stage's parts of one look")]
+    pub(super) fn look_with(
+        &mut self,
+        view: &CloudView,
+        look: &ExactView,
+        touching: &mut Touching,
+        fold: &mut ViewFold,
+        room: &mut Room,
+        hits: &mut Vec<RayHit>,
+        image: &mut Tldi,
+    ) -> Option<()> {
+        let (mut seen, rect, covered) = self.project_with(view, look, fold, room)?;
         seen.rect = match look.scope {
             Scope::Near(reach) => {
-                self.image_near(view, &seen, covered, &look.exact, reach, touching, fold)?
+                let imaging =
+                    self.meet_exact(view, &seen, covered, &look.exact, reach, touching, fold)?;
+                self.image(view, &imaging, Some(touching));
+                imaging.rect
             }
             Scope::Cloud | Scope::Everywhere => {
                 self.whole_image(view, &seen, rect);
@@ -413,7 +436,9 @@ impl Side {
             ..seen
         };
         // Where they start decides to what their hits are rounded.
-        along.limit_depths(reach, || self.columns.median_depth());
+        along.limit_depths(DepthScale::reach(view.params), || {
+            self.columns.median_depth()
+        });
         let rays = Rays {
             camera: view.camera,
             rect: seen.rect,

@@ -10,6 +10,7 @@ use super::cull::PointRadii;
 use super::lanes::{multiversioned, truncated};
 use super::rect::Rect;
 use super::splat_radius::{LEAST_RADIUS_PX, splat_radius};
+use crate::stage::stage;
 use crate::{Params, Projection, VirtualCamera};
 use glamx::Vec3;
 
@@ -193,6 +194,7 @@ pub(crate) struct Fragments {
 impl Fragments {
     /// Makes the splats of an image, in the order of their tiles; returns the number of bands.
     pub(crate) fn begin(&mut self, points: &SplatPoints, imaging: &Imaging) -> u32 {
+        let _stage = stage!("splat");
         self.tiles.clear();
         self.tiles.resize(imaging.tiles.count() + 1, 0);
         for &i in points.kept {
@@ -210,6 +212,7 @@ impl Fragments {
 
     /// `mark`, `alloc`, `splat` over the rows of one band.
     pub(crate) fn splat_band(&mut self, band: u32, points: &SplatPoints, imaging: &Imaging) {
+        let _stage = stage!("splat");
         let Rect { origin, size } = imaging.rect;
         let top = band * BAND_ROWS;
         let rows = Rect {

@@ -9,6 +9,7 @@
 use super::splat::{
     DEPTH_STEPS, DepthScale, EDGE_ON, Fragment, Fragments, Imaging, NORMAL_STEPS, Splat,
 };
+use crate::stage::stage;
 use crate::{Facing, Layer, Tldi};
 use glamx::Vec3;
 
@@ -47,6 +48,7 @@ pub(crate) fn sweep(
     imaging: &Imaging,
     out: &mut Tldi,
 ) {
+    let _stage = stage!("layers");
     let scale = &imaging.scale;
     let steep_steps = merge_steps.max(DEPTH_STEPS);
     let same_layer = |f: &Fragment, g: &Fragment| {

@@ -12,6 +12,7 @@ use super::fold::{SpaceFold, is_coarse};
 use super::lanes::{multiversioned, truncated};
 use crate::Aabb;
 use crate::cloud::reach::{Class, classes};
+use crate::stage::stage;
 use glamx::Vec3;
 
 /// Most cells of the grid. 4 Mi bits are 512 KiB, which stays in a core's cache; twice as many do not. Larger overlaps
@@ -184,6 +185,7 @@ pub(crate) fn zone(
     near_a: &mut Vec<u32>,
     near_b: &mut Vec<u32>,
 ) {
+    let _stage = stage!("zone");
     let mut folded = std::mem::take(&mut scratch.folded);
     let (mut sides, mut bounds) = ([a, b], *bounds);
     let farthest = sides.iter().map(|side| side.farthest());

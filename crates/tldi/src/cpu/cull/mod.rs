@@ -17,6 +17,7 @@ pub(crate) use survivors::{PointRadii, Survivors};
 
 use crate::cloud::reach::Uneven;
 use crate::pair::sampling::first_taken;
+use crate::stage::stage;
 use crate::{BLOCK, PointCloud};
 use glamx::{Pose3, Vec3};
 use rayon::prelude::*;
@@ -43,6 +44,7 @@ pub(crate) fn cull(
     scratch: &mut CullScratch,
     out: &mut Survivors,
 ) {
+    let _stage = stage!("cull");
     out.clear();
     out.stride = stride;
     if region.of_radius(cloud.max_radius()).overlap.is_empty() {

@@ -2,6 +2,7 @@
 
 use crate::cpu::fold::ViewFold;
 use crate::cpu::rect::Rect;
+use crate::stage::stage;
 use crate::{Facing, Layer, RayHit, RaySurface, Tldi, VirtualCamera};
 use glamx::Pose3;
 
@@ -36,6 +37,7 @@ pub(crate) fn cast(
         far,
         cover,
     } = *rays;
+    let _stage = stage!("cast");
     out.begin(camera, rect.origin, rect.size);
     let closed = surface.is_closed();
     let direction = frame_from_surface.rotation.inverse() * camera.axis();

@@ -11,6 +11,7 @@ use crate::cpu::normals;
 use crate::cpu::side::Side;
 use crate::cpu::zone::ZoneGrid;
 use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
+use crate::stage::stage;
 use crate::{Aabb, PointCloud};
 use glamx::{Pose3, Vec3};
 
@@ -29,6 +30,7 @@ impl Side {
         reach: f32,
         surface_normals: &mut Vec<Vec3>,
     ) -> bool {
+        let _stage = stage!("zone");
         self.near.clear();
         let support = self.support_radius(cloud);
         self.in_near_cells(exact, reach, support);
@@ -43,6 +45,7 @@ impl Side {
         if cloud.normals().is_some() {
             self.sample_normals(cloud, frame_from_cloud);
         } else {
+            let _stage = stage!("aim");
             // Neighbours are not among the samples.
             let support = self.support_radius(cloud);
             let of_support = &self.support;

@@ -14,7 +14,8 @@ use crate::cpu::side::CloudView;
 use crate::pair::pixels::largest_pixel;
 use crate::pair::plan::PairPlan;
 use crate::pair::sampling::stride;
-use crate::view::camera_policy::{MAX_VIEWS, aim};
+use crate::stage::stage;
+use crate::view::camera_policy::MAX_VIEWS;
 use crate::{BLOCK, PairQuery, PairResult, Params, Surface, Tldi, Variant, View, VirtualCamera};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
@@ -167,9 +168,7 @@ impl Scratch {
             return 0.0;
         }
         *came_to = FirstLook::Culled(strides);
-        let approach = self.approach(query, plan);
-        let normals = self.zone_normals(query);
-        aim(policy, normals, &approach, &mut result.axes);
+        self.aim(query, plan, policy, &mut result.axes);
         let axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
         let mut deepest = 0.0f32;
         for view in 0..axes.len() {
@@ -187,6 +186,7 @@ impl Scratch {
         axes: &[Vec3],
         came_to: &mut FirstLook,
     ) -> bool {
+        let _stage = stage!("windows");
         let holds_all = self.a.points.are_all() && self.b.points.are_all();
         if !holds_all {
             *came_to = FirstLook::Nothing;
@@ -318,6 +318,7 @@ fn find_windows(
     edge: f32,
     windows: &mut Vec<Window>,
 ) {
+    let _stage = stage!("windows");
     let others = seen.others(&a.camera);
     let [width, height] = a.size;
     let at = |k: u32| [a, b].map(|image| image.layers_of(k as usize));

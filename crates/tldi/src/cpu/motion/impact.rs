@@ -14,6 +14,7 @@ use crate::cpu::side::{CloudView, ExactView, Scope};
 use crate::cpu::sweep::is_edge_on;
 use crate::pair::plan::ring;
 use crate::pair::sampling::stride;
+use crate::stage::stage;
 use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Penetration, Surface, VirtualCamera};
 use glamx::{Pose3, Vec3};
 
@@ -28,6 +29,7 @@ const FROM_BEHIND: f32 = 0.5;
 impl Scratch {
     /// The first meeting.
     pub(crate) fn impact(&mut self, query: &ImpactQuery) -> Option<Impact> {
+        let _stage = stage!("impact");
         self.impact_coarser(query, 1.0)
     }
 
