@@ -17,8 +17,9 @@ use tldi_benches::floor::Coordinates;
 use tldi_benches::model::Model;
 use tldi_benches::peers::{Found, Frame, Method, Peer, TldiPeer, all_peers};
 use tldi_benches::placements::{Placement, Source, bounds};
+use tldi_benches::stages::{StageTimes, medians_ms};
 use tldi_benches::stopwatch::Stopwatch;
-use tldi_benches::stored::{FrameRow, LookedRow, Provenance, WorkRow};
+use tldi_benches::stored::{FrameRow, LookedRow, Provenance, StageRow, WorkRow};
 use tldi_benches::times::Times;
 use tldi_wgpu::BackendChoice;
 
@@ -136,6 +137,7 @@ fn measure(
 ) -> anyhow::Result<Vec<FrameRow>> {
     let radius = source.radius(placement)?;
     let mut found: Vec<Vec<Found>> = vec![Vec::new(); methods.len()];
+    let mut stages: Vec<Vec<StageTimes>> = vec![Vec::new(); methods.len()];
     let mut peaks = vec![0.0f64; methods.len()];
     let mut floors = Vec::new();
     let mut counts = [0; 2];
@@ -167,13 +169,18 @@ fn measure(
                 found[k].push(one);
             }
         }
+        // After what is timed, with the points in the cache again, as the first method found them.
+        floor(&frame);
+        for ((method, _), stages) in methods.iter_mut().zip(&mut stages) {
+            stages.extend(method.stages(&frame).filter(|_| number > 0));
+        }
         progress.inc(1);
     }
     progress.finish_and_clear();
     let floor_seconds = Times::of(floors).median;
-    let rows = methods.iter().zip(found).zip(peaks);
+    let rows = methods.iter().zip(found).zip(peaks).zip(stages);
     Ok(rows
-        .map(|(((method, threads), all), peak_mib)| {
+        .map(|((((method, threads), all), peak_mib), stages)| {
             let spread = |part: fn(&Found) -> f64| Times::of(all.iter().map(|f| 1e3 * part(f)));
             let total = spread(|found| found.build_seconds + found.query_seconds);
             let last = all.last().copied().unwrap_or_default();
@@ -196,9 +203,18 @@ fn measure(
                 peak_mib,
                 floor_ratio: 1e-3 * total.median / floor_seconds,
                 work: last.work.map(WorkRow::from),
+                stages: (!stages.is_empty()).then(|| stage_rows(&stages)),
             }
         })
         .collect())
+}
+
+fn stage_rows(runs: &[StageTimes]) -> Vec<StageRow> {
+    let row = |(name, ms): (&str, f64)| StageRow {
+        name: name.to_owned(),
+        ms,
+    };
+    medians_ms(runs).into_iter().map(row).collect()
 }
 
 /// Seconds of one pass over both clouds: moved, and counted where they may touch. The second pass of
@@ -261,6 +277,12 @@ fn print(rows: &[FrameRow]) {
     if let Some((row, work)) = rows.iter().find_map(|row| Some((row, row.work?))) {
         print_work(row, &work);
     }
+    if let Some((row, stages)) = rows
+        .iter()
+        .find_map(|row| Some((row, row.stages.as_ref()?)))
+    {
+        print_stages(row, stages);
+    }
 }
 
 /// The same at any number of threads.
@@ -277,6 +299,14 @@ fn print_work(row: &FrameRow, work: &WorkRow) {
         sum(|look| look.layers),
         grouped(work.culled)
     );
+}
+
+fn print_stages(row: &FrameRow, stages: &[StageRow]) {
+    let words = stages
+        .iter()
+        .map(|stage| format!("{} {:.3}", stage.name, stage.ms));
+    let words: Vec<String> = words.collect();
+    println!("{}, stages: {} ms", row.method, words.join(", "));
 }
 
 /// With a comma between thousands.

@@ -11,6 +11,7 @@ pub mod model;
 pub mod peers;
 pub mod placements;
 pub mod protocol;
+pub mod stages;
 pub mod stopwatch;
 pub mod stored;
 pub mod threads;

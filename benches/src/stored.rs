@@ -2,7 +2,7 @@
 
 mod rows;
 
-pub use rows::{AccuracyRow, ContactRow, DistanceTally, FrameRow, LookedRow, WorkRow};
+pub use rows::{AccuracyRow, ContactRow, DistanceTally, FrameRow, LookedRow, StageRow, WorkRow};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

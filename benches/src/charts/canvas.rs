@@ -110,6 +110,7 @@ where
             Line::None => return Ok(()),
             Line::Thin => 2,
             Line::Thick => 4,
+            Line::Bar => 26,
             Line::Dashed => {
                 for ends in points.windows(2) {
                     self.dashes([ends[0], ends[1]], 6, 4, look.color)?;

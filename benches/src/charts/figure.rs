@@ -75,6 +75,8 @@ pub(super) enum Line {
     Thin,
     Thick,
     Dashed,
+    /// So wide that words fit in: the label of its first point.
+    Bar,
 }
 
 #[derive(Clone, Debug)]

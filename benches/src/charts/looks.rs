@@ -32,6 +32,23 @@ const METHODS: [(&str, Color, Mark); 12] = [
     ("paper", BLACK, Mark::Disc),
 ];
 
+/// Stages in the order in which they run, and how they look: colours that the colour-blind can tell apart (Tol's muted
+/// ones), light and dark ones beside each other.
+const STAGES: [(&str, Color); 12] = [
+    ("points", [51, 34, 136]),
+    ("cull", [136, 204, 238]),
+    ("zone", [68, 170, 153]),
+    ("aim", [17, 119, 51]),
+    ("columns", [153, 153, 51]),
+    ("cells", [221, 204, 119]),
+    ("windows", [153, 79, 0]),
+    ("normals", [238, 153, 170]),
+    ("splat", [136, 34, 85]),
+    ("layers", [170, 68, 153]),
+    ("compare", [102, 153, 204]),
+    ("patches", [85, 85, 85]),
+];
+
 /// Of ours.
 pub(super) const OURS: Look = Look {
     color: RED,
@@ -70,6 +87,12 @@ pub(super) fn title(method: &str) -> String {
             None => method.to_owned(),
         },
     }
+}
+
+/// The place of a stage among those that are known, and its colour. Others, and what is of no stage, come last.
+pub(super) fn stage(name: &str) -> (usize, Color) {
+    let known = STAGES.iter().position(|(stage, _)| *stage == name);
+    known.map_or((STAGES.len(), [221; 3]), |k| (k, STAGES[k].1))
 }
 
 /// Of the `index`-th model of a chart.

@@ -13,6 +13,7 @@ mod looks;
 mod origin;
 mod paint;
 mod speed_accuracy;
+mod stages;
 mod sweeps;
 mod ticks;
 mod work;
@@ -103,6 +104,10 @@ pub fn draw_all(results: &Path, out: &Path) -> Result<Drawn, ChartError> {
     let mut frames = frames::figures(&all.frames);
     match work::figures(&all.frames) {
         Ok(work) => frames.extend(work),
+        Err(missing) => drawn.skipped.push(missing),
+    }
+    match stages::figures(&all.frames) {
+        Ok(stages) => frames.extend(stages),
         Err(missing) => drawn.skipped.push(missing),
     }
     let figures = [

@@ -2,7 +2,7 @@
 
 use super::canvas::{At, Canvas, FONT, Outcome, Words};
 use super::error::ChartError;
-use super::figure::{Axis, Color, Curve, Figure, Panel, ZERO_SHARE};
+use super::figure::{Axis, Color, Curve, Figure, Line, Panel, ZERO_SHARE};
 use super::ticks::ticks;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
@@ -186,23 +186,47 @@ where
     }
     // Above all marks.
     for curve in &panel.curves {
-        for point in &curve.points {
-            let Some(words) = &point.label else {
-                continue;
-            };
-            let (x, y) = plot.at(point.x, point.y);
-            // On the outer side, where fewer curves are, if there is room.
-            let room = 9 + 8 * words.chars().count() as i32;
-            let is_left = 2 * x < plot.low.0 + plot.high.0 && x - room > plot.low.0;
-            let (side, offset) = match is_left || x + room > plot.high.0 {
-                true => (HPos::Right, -9),
-                false => (HPos::Left, 9),
-            };
-            let look = Words::new(13, curve.look.color, side, VPos::Bottom);
-            canvas.text(words, look, (x + offset, y - 3))?;
-        }
+        paint_words(curve, plot, canvas)?;
     }
     Ok(())
+}
+
+fn paint_words<B: DrawingBackend>(curve: &Curve, plot: &Plot, canvas: &Canvas<B>) -> Outcome
+where
+    B::ErrorType: 'static,
+{
+    if let (Line::Bar, [start, .., end]) = (curve.look.line, &curve.points[..]) {
+        let at = plot.at(0.5 * (start.x + end.x), 0.5 * (start.y + end.y));
+        let look = Words::new(
+            13,
+            readable_on(curve.look.color),
+            HPos::Center,
+            VPos::Center,
+        );
+        return canvas.text(start.label.as_deref().unwrap_or_default(), look, at);
+    }
+    for point in &curve.points {
+        let Some(words) = &point.label else {
+            continue;
+        };
+        let (x, y) = plot.at(point.x, point.y);
+        // On the outer side, where fewer curves are, if there is room.
+        let room = 9 + 8 * words.chars().count() as i32;
+        let is_left = 2 * x < plot.low.0 + plot.high.0 && x - room > plot.low.0;
+        let (side, offset) = match is_left || x + room > plot.high.0 {
+            true => (HPos::Right, -9),
+            false => (HPos::Left, 9),
+        };
+        let look = Words::new(13, curve.look.color, side, VPos::Bottom);
+        canvas.text(words, look, (x + offset, y - 3))?;
+    }
+    Ok(())
+}
+
+/// Dark on light colours, white on dark ones.
+fn readable_on([r, g, b]: Color) -> Color {
+    let light = 0.3 * f64::from(r) + 0.6 * f64::from(g) + 0.1 * f64::from(b);
+    if light > 140.0 { DARK } else { [255; 3] }
 }
 
 fn paint_axes<B: DrawingBackend>(panel: &Panel, plot: &Plot, canvas: &Canvas<B>) -> Outcome

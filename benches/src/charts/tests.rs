@@ -91,6 +91,7 @@ fn frame(method: &str, placement: &str, points: usize, total_ms: f64) -> FrameRo
         peak_mib: 1.0,
         floor_ratio: 9.0,
         work: None,
+        stages: None,
     }
 }
 
@@ -151,7 +152,11 @@ fn stored_results_become_charts() {
     stored::write(&results.join("frames.json"), provenance("ccc3333"), rows).expect("written");
     let out = results.join("charts");
     let Drawn { files, skipped } = draw_all(&results, &out).expect("they can be drawn");
-    assert!(matches!(&skipped[..], [why] if why.contains("bvh_vs_tldi")));
+    let [work, stages] = &skipped[..] else {
+        panic!("{skipped:?}");
+    };
+    assert!(work.starts_with("work") && stages.starts_with("stages"));
+    assert!(skipped.iter().all(|why| why.contains("bvh_vs_tldi")));
     let expected = [
         "speed_accuracy",
         "false_answers",
@@ -365,6 +370,73 @@ fn work_becomes_curves() {
     let [deeper, deep] = [1, 2].map(|k| panel.y.place(words[k].1));
     assert!(deeper - deep > 0.03, "{deeper} {deep}");
     assert!(work::figures(&[uncounted]).is_err_and(|why| why.contains("bvh_vs_tldi")));
+}
+
+/// Parts of a bar add up to all of the frame, in the order of the stages, whatever the order of the rows; words are
+/// where there is room. Of several runs that over most numbers of points is drawn.
+#[test]
+fn stages_become_bars() {
+    let row = |placement: &str, points: usize, stages: &[(&str, f64)]| FrameRow {
+        stages: Some(
+            (stages.iter())
+                .map(|(name, ms)| stored::StageRow {
+                    name: (*name).to_owned(),
+                    ms: *ms,
+                })
+                .collect(),
+        ),
+        ..frame("tldi (cpu)", placement, points, 2.25)
+    };
+    let run = |rows| Stored {
+        kind: FrameRow::KIND.to_owned(),
+        provenance: provenance("aaa1111"),
+        rows,
+    };
+    let deep = [("normals", 0.9), ("cull", 0.3), ("rest", 0.3)];
+    let one = run(vec![row("deep", 9_000, &deep)]);
+    let two = run(vec![
+        row("apart", 1_000, &[("rest", 0.5)]),
+        row("deep", 1_000, &deep),
+        row("deep", 2_000, &[("patches", 0.02), ("compare", 0.98)]),
+        row("idle", 2_000, &[("rest", 0.0)]),
+        frame("bit grid", "deep", 1_000, 2.0),
+    ]);
+    let untold = run(vec![frame("tldi (cpu)", "deep", 1_000, 2.0)]);
+    let figure = stages::figures(&[untold.clone(), one, two]).expect("two runs told stages");
+    let figure = figure.expect("there are runs");
+    assert_eq!(figure.name, "stages");
+    let legend: Vec<&str> = figure.legend.iter().map(|e| &*e.label).collect();
+    assert_eq!(legend, ["cull", "normals", "compare", "patches", "rest"]);
+    let [first, second] = &figure.panels[..] else {
+        panic!("a panel a number of points");
+    };
+    type Bar = (Vec<(f64, f64)>, Option<String>);
+    let bars = |panel: &figure::Panel| -> Vec<Bar> {
+        let of = |curve: &figure::Curve| {
+            let ends = curve
+                .points
+                .iter()
+                .map(|p| ((1e3 * p.x).round() / 1e3, p.y));
+            (ends.collect(), curve.points[0].label.clone())
+        };
+        panel.curves.iter().map(of).collect()
+    };
+    let words = |words: &str| Some(words.to_owned());
+    assert_eq!(
+        bars(first),
+        [
+            (vec![(0.0, 2.0), (100.0, 2.0)], words("rest 100 %")),
+            (vec![(0.0, 2.24)], words("apart: 2.25 ms")),
+            (vec![(0.0, 1.0), (20.0, 1.0)], words("cull 20 %")),
+            (vec![(20.0, 1.0), (80.0, 1.0)], words("normals 60 %")),
+            (vec![(80.0, 1.0), (100.0, 1.0)], words("rest 20 %")),
+            (vec![(0.0, 1.24)], words("deep: 2.25 ms")),
+        ]
+    );
+    let short: Vec<_> = bars(second).into_iter().map(|(_, words)| words).collect();
+    assert_eq!(short, [words("compare 98 %"), None, words("deep: 2.25 ms")]);
+    assert!(stages::figures(&[untold]).is_err_and(|why| why.contains("bvh_vs_tldi")));
+    assert!(stages::figures(&[]).is_ok_and(|none| none.is_none()));
 }
 
 #[test]

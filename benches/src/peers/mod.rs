@@ -27,6 +27,7 @@ pub use tldi::{Method, TldiPeer};
 pub use tri_mesh::TriMeshPeer;
 pub use voxels::VoxelsRebuild;
 
+use crate::stages::StageTimes;
 use crate::stopwatch::Stopwatch;
 use ::tldi::glamx::Vec3;
 use ::tldi::{Backend, Work};
@@ -132,6 +133,12 @@ pub trait Peer {
 
     /// One frame, which the method does not [refuse](Self::refuses).
     fn compare(&mut self, frame: &Frame) -> Found;
+
+    /// The stages of such a frame, which is compared once more, of methods that tell them. Telling them takes time, so
+    /// that this is no frame to be timed.
+    fn stages(&mut self, _frame: &Frame) -> Option<StageTimes> {
+        None
+    }
 }
 
 /// All peers, each as it is and in its best form: after a cull to the overlap of the bounds, where

@@ -224,3 +224,41 @@ fn frames_are_refused_with_a_reason() {
         ]
     );
 }
+
+/// A frame's stages are told by the CPU backend on one thread: those that ran. What is found is the same, to the bit.
+#[test]
+fn stages_are_told_and_change_nothing() {
+    use crate::placements::{Placement, Source};
+    let source = Source::Generated(4000);
+    let method = Method::Default { pixel_scale: 1.0 };
+    let peer = |threads| TldiPeer::new(Box::new(CpuBackend::new()), method, threads);
+    let mut ours = peer(1).expect("a thread can be started");
+    for (placement, expected) in [
+        (Placement::NearMiss, "points rest"),
+        (
+            Placement::Slight,
+            "points cull zone aim columns normals splat layers compare patches rest",
+        ),
+        (
+            Placement::Coincident,
+            "points cull zone aim columns cells compare windows patches normals splat layers rest",
+        ),
+    ] {
+        let radius = source.radius(placement).expect("points are finite");
+        let [a, b] = source.bodies(placement, radius, 1);
+        let frame = Frame::new(&a, &b, radius);
+        ours.compare(&frame);
+        let without = ours.result().cloned();
+        let stages = ours.stages(&frame).expect("they are told");
+        assert!(without.is_some() && without.as_ref() == ours.result());
+        let names: Vec<&str> = stages.iter().map(|(name, _)| *name).collect();
+        assert_eq!(names.join(" "), expected, "{}", placement.name());
+        // Not those of the frame before.
+        assert_eq!(
+            ours.stages(&frame).expect("they are told").len(),
+            names.len()
+        );
+        let mut on_two = peer(2).expect("threads can be started");
+        assert!(on_two.stages(&frame).is_none());
+    }
+}

@@ -1,6 +1,7 @@
 //! Ours, and the paper's, as a peer: clouds get new points, then are compared.
 
 use super::{Deepest, Found, Frame, Peer};
+use crate::stages::{StageTimes, staged};
 use crate::stopwatch::Stopwatch;
 use crate::threads::workers;
 use ::tldi::glamx::{Pose3, Vec3};
@@ -62,8 +63,13 @@ impl Method {
 
 /// A backend, with clouds whose memory is reused.
 pub struct TldiPeer {
-    backend: Box<dyn Backend>,
     threads: rayon::ThreadPool,
+    comparison: Comparison,
+}
+
+/// What compares on the threads of a pool.
+struct Comparison {
+    backend: Box<dyn Backend>,
     method: Method,
     noise: f32,
     clouds: Option<[PointCloud<'static>; 2]>,
@@ -78,23 +84,26 @@ impl TldiPeer {
         threads: usize,
     ) -> Result<Self, rayon::ThreadPoolBuildError> {
         Ok(Self {
-            backend,
             threads: workers(threads)?,
-            method,
-            noise: 0.0,
-            clouds: None,
-            results: Vec::new(),
+            comparison: Comparison {
+                backend,
+                method,
+                noise: 0.0,
+                clouds: None,
+                results: Vec::new(),
+            },
         })
     }
 
     /// Told that all points have noise of this standard deviation, metres.
-    pub fn with_noise(self, noise: f32) -> Self {
-        Self { noise, ..self }
+    pub fn with_noise(mut self, noise: f32) -> Self {
+        self.comparison.noise = noise;
+        self
     }
 
     /// What was found in the last frame.
     pub fn result(&self) -> Option<&PairResult> {
-        self.results.first()
+        self.comparison.results.first()
     }
 }
 
@@ -111,60 +120,79 @@ fn fill(cloud: &mut PointCloud<'static>, frame: &Frame, side: usize) {
     outcome.expect("the points and radii of a bench are finite");
 }
 
-impl Peer for TldiPeer {
-    fn name(&self) -> String {
-        match self.method {
-            Method::Default { .. } => format!("tldi ({})", self.backend.name()),
-            Method::Paper { .. } => format!("paper ({})", self.backend.name()),
-        }
-    }
-
-    fn backend(&self) -> Option<&dyn Backend> {
-        Some(&*self.backend)
-    }
-
+impl Comparison {
+    /// A frame, on the threads of the current pool.
     fn compare(&mut self, frame: &Frame) -> Found {
         let Self {
             backend,
-            threads,
             method,
             noise,
             clouds,
             results,
         } = self;
-        threads.install(|| {
-            let start = Stopwatch::of_threads(threads.current_num_threads());
-            let clouds = clouds.get_or_insert_with(|| {
-                [frame.a, frame.b].map(|points| {
-                    let builder = PointCloud::builder(points.to_vec()).radius(frame.radius);
-                    let builder = builder.noise(*noise);
-                    builder.build().expect("the points of a bench are finite")
-                })
-            });
-            let [a, b] = clouds;
-            rayon::join(|| fill(a, frame, 0), || fill(b, frame, 1));
-            let built = start.seconds();
-            let [a, b] = &*clouds;
-            let query = PairQuery {
-                a: Surface::Cloud(a),
-                b: Surface::Cloud(b),
-                a_from_b: Pose3::IDENTITY,
-                view: method.view(frame.motion),
-                params: method.params(a.mean_radius()),
-            };
-            backend
-                .compare(&[query], results)
-                .expect("two clouds are supported");
-            Found {
-                build_seconds: built,
-                query_seconds: start.seconds() - built,
-                collides: results[0].collides,
-                contacts: results[0].contacts.len(),
-                deepest: deepest_contact(&results[0])
-                    .map(|(normal, depth)| Deepest { normal, depth }),
-                // Other backends do not count.
-                work: (backend.name() == "cpu").then_some(results[0].work),
-            }
-        })
+        let start = Stopwatch::of_threads(rayon::current_num_threads());
+        let clouds = clouds.get_or_insert_with(|| {
+            [frame.a, frame.b].map(|points| {
+                let builder = PointCloud::builder(points.to_vec()).radius(frame.radius);
+                let builder = builder.noise(*noise);
+                builder.build().expect("the points of a bench are finite")
+            })
+        });
+        let [a, b] = clouds;
+        rayon::join(|| fill(a, frame, 0), || fill(b, frame, 1));
+        let built = start.seconds();
+        let [a, b] = &*clouds;
+        let query = PairQuery {
+            a: Surface::Cloud(a),
+            b: Surface::Cloud(b),
+            a_from_b: Pose3::IDENTITY,
+            view: method.view(frame.motion),
+            params: method.params(a.mean_radius()),
+        };
+        backend
+            .compare(&[query], results)
+            .expect("two clouds are supported");
+        Found {
+            build_seconds: built,
+            query_seconds: start.seconds() - built,
+            collides: results[0].collides,
+            contacts: results[0].contacts.len(),
+            deepest: deepest_contact(&results[0]).map(|(normal, depth)| Deepest { normal, depth }),
+            // Other backends do not count.
+            work: (backend.name() == "cpu").then_some(results[0].work),
+        }
+    }
+}
+
+impl Peer for TldiPeer {
+    fn name(&self) -> String {
+        let Comparison {
+            backend, method, ..
+        } = &self.comparison;
+        match method {
+            Method::Default { .. } => format!("tldi ({})", backend.name()),
+            Method::Paper { .. } => format!("paper ({})", backend.name()),
+        }
+    }
+
+    fn backend(&self) -> Option<&dyn Backend> {
+        Some(&*self.comparison.backend)
+    }
+
+    fn compare(&mut self, frame: &Frame) -> Found {
+        let comparison = &mut self.comparison;
+        self.threads.install(|| comparison.compare(frame))
+    }
+
+    /// Of the CPU backend on one thread: the stages of several run at once.
+    fn stages(&mut self, frame: &Frame) -> Option<StageTimes> {
+        let comparison = &mut self.comparison;
+        if comparison.backend.name() != "cpu" || self.threads.current_num_threads() > 1 {
+            return None;
+        }
+        let (_, times) = self
+            .threads
+            .install(|| staged(|| comparison.compare(frame)));
+        Some(times)
     }
 }

@@ -139,6 +139,18 @@ pub struct FrameRow {
     /// How much was modelled in the last frame, of methods that tell it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub work: Option<WorkRow>,
+    /// Median time of each stage by the clock, in frames of their own with the same points, of methods that tell them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stages: Option<Vec<StageRow>>,
+}
+
+/// How long a stage takes, without the stages within it.
+#[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
+pub struct StageRow {
+    /// As the method names it; `rest`: what is outside of all stages.
+    pub name: String,
+    /// Milliseconds.
+    pub ms: f64,
 }
 
 /// How much of two clouds one comparison modelled, as [`Work`] has it.
@@ -218,6 +230,13 @@ impl Measured for FrameRow {
         }
         if self.floor_ratio.is_nan() || self.floor_ratio <= 0.0 {
             return Some(format!("floor_ratio {} is not positive", self.floor_ratio));
+        }
+        let is_time = |stage: &&StageRow| stage.ms.is_finite() && stage.ms >= 0.0;
+        if let Some(stage) = self.stages.iter().flatten().find(|stage| !is_time(stage)) {
+            return Some(format!(
+                "stage {} of {} ms is no time",
+                stage.name, stage.ms
+            ));
         }
         None
     }

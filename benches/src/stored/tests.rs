@@ -153,19 +153,33 @@ fn bad_results_are_refused_by_name_with_a_way_out() {
     assert!(matches!(refusal(&good).0, StoredError::Kind { .. }));
 }
 
-/// Rows of before work was counted and quartiles were told are read, and those without are written like them.
+/// Rows of before work was counted, and quartiles and stages were told, are read, and those without are written like them.
 #[test]
-fn work_and_quartiles_are_optional() {
+fn work_quartiles_and_stages_are_optional() {
     let old = r#"{"model": "ball", "points": 10, "points_b": 20, "placement": "deep", "method": "grid",
         "threads": 1, "build_ms": 1.0, "query_ms": 1.0, "total_ms": 2.0, "least_ms": 1.5, "most_ms": 3.0,
         "frames": 3, "collides": true, "contacts": 4, "peak_mib": 0.5, "floor_ratio": 9.0}"#;
     let row: FrameRow = serde_json::from_str(old).expect("it is a row");
     assert_eq!((row.work, row.quartiles_ms), (None, None));
+    assert_eq!(row.stages, None);
     let written = serde_json::to_string(&row).expect("it can be written");
     assert!(
-        !written.contains("work") && !written.contains("quartiles"),
+        ["work", "quartiles", "stages"]
+            .iter()
+            .all(|part| !written.contains(part)),
         "{written}"
     );
+    let staged = |ms| FrameRow {
+        stages: Some(vec![StageRow {
+            name: "cull".to_owned(),
+            ms,
+        }]),
+        ..row.clone()
+    };
+    assert_eq!(staged(0.0).fault(), None);
+    for ms in [-0.1, f64::NAN, f64::INFINITY] {
+        assert!(staged(ms).fault().is_some_and(|why| why.contains("cull")));
+    }
     let spread = |lower, upper| FrameRow {
         quartiles_ms: Some([lower, upper]),
         ..row.clone()
@@ -186,7 +200,7 @@ fn work_and_quartiles_are_optional() {
     };
     let counted = FrameRow {
         work: Some(work),
-        ..row
+        ..staged(0.25)
     };
     let written = serde_json::to_string(&counted).expect("it can be written");
     let read: FrameRow = serde_json::from_str(&written).expect("it is a row");
