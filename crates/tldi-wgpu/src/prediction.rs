@@ -44,7 +44,8 @@ pub(crate) fn predicted(query: &PairQuery, plan: &PairPlan, blocks: [usize; 2]) 
     let image = area / (params.pixel_size * params.pixel_size);
     // Two views, each with whole workgroups.
     let pixels = (2.0 * image).min(PIXELS * survivors) + (MAX_VIEWS * GROUP) as f32;
-    let tiles = 0.25 * pixels + (MAX_VIEWS * GROUP) as f32;
+    // A tile has at least a pixel, and around them is a rim.
+    let tiles = pixels + (MAX_VIEWS * GROUP) as f32;
     // Beyond the words, the largest.
     Counters {
         survivors: survivors as u32,

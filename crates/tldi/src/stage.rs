@@ -1,8 +1,8 @@
 //! Stages of the CPU backend as spans, so that a subscriber of `tracing` can see where the time of a step goes.
 //!
-//! `points` (a cloud takes points), `cull`, `zone`, `aim`, `columns`, `normals`, `splat`, `layers` (the stage `sweep`),
-//! `cast`, `compare`, `patches`; `cells` and `windows` of the first look; `impact`. A stage may run within another: the
-//! proof by windows splats, too. A span is of the thread that opens it.
+//! `points` (a cloud takes points), `cull`, `zone`, `aim`, `columns`, `normals`, `splat`, `sweep`, `cast`, `compare`,
+//! `patches`; `cells` and `windows` of the first look; `impact`. A stage may run within another: the proof by windows
+//! splats, too. A span is of the thread that opens it.
 
 /// Opens the span of a stage, which ends with the scope of what this returns. Does nothing without the feature
 /// `tracing`.

@@ -48,7 +48,7 @@ pub(crate) fn sweep(
     imaging: &Imaging,
     out: &mut Tldi,
 ) {
-    let _stage = stage!("layers");
+    let _stage = stage!("sweep");
     let scale = &imaging.scale;
     let steep_steps = merge_steps.max(DEPTH_STEPS);
     let same_layer = |f: &Fragment, g: &Fragment| {
