@@ -61,7 +61,7 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "rest",
         "bunny, new samples",
-        "Six of forty seeds: new samples bring new gaps in every frame, which push although nothing moved.",
+        "Five of forty seeds: new samples bring new gaps in every frame, which push although nothing moved.",
     )
     .no_worse_than("rms_speed_m_s", 0.015),
     known(
