@@ -237,11 +237,11 @@ fn stages_are_told_and_change_nothing() {
         (Placement::NearMiss, "points rest"),
         (
             Placement::Slight,
-            "points cull zone aim columns normals splat layers compare patches rest",
+            "points cull zone aim columns normals splat sweep compare patches rest",
         ),
         (
             Placement::Coincident,
-            "points cull zone aim columns cells compare windows patches normals splat layers rest",
+            "points cull zone aim columns cells compare windows patches normals splat sweep rest",
         ),
     ] {
         let radius = source.radius(placement).expect("points are finite");
