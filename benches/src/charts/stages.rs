@@ -9,10 +9,12 @@ use std::cmp::Reverse;
 
 type Run = Stored<FrameRow>;
 
-/// Upper edge of a bar above its middle, in distances of bars.
+/// Upper edge of a bar above its middle, in distances of bars. Half: words lie on the bar; twice:
+/// they seem to belong to the bar above.
 const BAR_TOP: f64 = 0.24;
 
-/// Room for a letter in a bar, as a share of the frame, %.
+/// Room for a letter in a bar, as a share of the frame, %: 8 of a panel's pixels. Half: words reach into the next stage;
+/// twice: most stages have no words.
 const LETTER: f64 = 1.4;
 
 /// A chart of the run over most numbers of points of those that tell stages; why there is none.

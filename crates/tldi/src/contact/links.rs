@@ -118,7 +118,7 @@ impl Links {
         }
         self.keep_counted(&mut result.contacts);
         if !tells_inside && result.contacts.iter().any(is_deep) {
-            let is_any_proven = self.count_out(&result.contacts, is_deep, roots);
+            let is_any_proven = self.mark_unproven(&result.contacts, is_deep, roots);
             if is_any_proven || !result.collides {
                 self.keep_counted(&mut result.contacts);
             }
@@ -134,7 +134,7 @@ impl Links {
     /// Sets `counts` to [`NONE`] for the contact pixels that are deep and do not continue others at which the surfaces
     /// are apart: from within an overlap the gap passes through zero, the space between limbs ends where they meet.
     /// Returns whether any that are deep do.
-    fn count_out(
+    fn mark_unproven(
         &mut self,
         contacts: &[ContactPixel],
         is_deep: impl Fn(&ContactPixel) -> bool,
