@@ -5,7 +5,7 @@ use super::crossings::Crossings;
 use super::exact::placed::Placed;
 use super::first_look::settle::FirstLook;
 use super::scratch::Scratch;
-use super::side::{CloudView, ExactView, Scope};
+use super::side::{CloudView, ExactView, Scope, Side};
 use crate::pair::plan::{PairPlan, column_reach};
 use crate::pair::sampling::stride;
 use crate::view::camera_policy::{MAX_VIEWS, further_axes};
@@ -23,6 +23,8 @@ impl Scratch {
         has_first_look: bool,
         result: &mut PairResult,
     ) {
+        self.a.release();
+        self.b.release();
         if query.params.variant() == Variant::Paper
             && let View::Fixed(camera) = query.view
         {
@@ -47,7 +49,8 @@ impl Scratch {
             FirstLook::Nothing => false,
         };
         self.room.put_back(left);
-        let is_near = is_found || self.cull(query, &plan, strides) && self.zone(query, &plan);
+        let is_near =
+            is_found || self.cull(query, &plan, strides, Side::cull) && self.zone(query, &plan);
         if !is_near {
             return;
         }

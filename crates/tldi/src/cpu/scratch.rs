@@ -3,7 +3,6 @@
 use super::columns::{Tiles, Touching};
 use super::compare::{Middles, Seen};
 use super::crossings::Crossings;
-use super::cull;
 use super::exact::placed::Placed;
 use super::first_look::window::Window;
 use super::fold::ViewFold;
@@ -19,7 +18,9 @@ use crate::contact::patches::PatchScratch;
 use crate::pair::plan::{Approach, PairPlan, SidePlan};
 use crate::stage::stage;
 use crate::view::camera_policy::{self, ZoneNormals, seen_from_behind};
-use crate::{CameraPolicy, Looked, PairQuery, RayHit, Surface, View, VirtualCamera, Work, paper};
+use crate::{
+    CameraPolicy, Looked, PairQuery, PointCloud, RayHit, Surface, View, VirtualCamera, Work, paper,
+};
 use glamx::{Pose3, Vec3};
 /// Where two clouds meet in a view.
 pub(super) struct CommonPixels {
@@ -57,15 +58,19 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
-    /// Fills the culled points of both sides, one in as many as `strides` says. `false` if a cloud has no point in reach.
-    pub(super) fn cull(&mut self, query: &PairQuery, plan: &PairPlan, strides: [usize; 2]) -> bool {
+    /// Fills the culled points of both sides, one in as many as `strides` says, as `cull_side` does it. `false` if a
+    /// cloud has no point in reach.
+    pub(super) fn cull(
+        &mut self,
+        query: &PairQuery,
+        plan: &PairPlan,
+        strides: [usize; 2],
+        cull_side: fn(&mut Side, &PointCloud, &SidePlan, usize),
+    ) -> bool {
         let cull = |side: &mut Side, surface: Surface, plan: &SidePlan, stride| {
-            side.near.clear();
             if let Surface::Cloud(cloud) = surface {
-                let frame = &plan.frame_from_surface;
-                let Side { cull, points, .. } = side;
-                cull::cull(cloud, frame, &plan.region, stride, cull, points);
-                !points.is_empty()
+                cull_side(side, cloud, plan, stride);
+                !side.points.is_empty()
             } else {
                 side.points.clear();
                 true
@@ -84,6 +89,8 @@ impl Scratch {
     /// Finds the near points of both sides and their normals; `false` where nothing is near.
     pub(super) fn zone(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
         let reach = plan.zone_reach;
+        self.a.near.clear();
+        self.b.near.clear();
         match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
                 let zone_side = |points, mean_radius| ZoneSide {

@@ -10,18 +10,20 @@
 //! radius.
 
 mod region;
+mod sieve;
 mod survivors;
+mod thinning;
 
 pub use region::Region;
 pub(crate) use survivors::{PointRadii, Survivors};
 
 use crate::cloud::reach::Uneven;
-use crate::pair::sampling::first_taken;
 use crate::stage::stage;
 use crate::{BLOCK, PointCloud};
 use glamx::{Pose3, Vec3};
 use rayon::prelude::*;
-use region::{Kernel, Moved, classify};
+use sieve::Sieve;
+use thinning::Thinning;
 
 /// Blocks of points whose culling is one parallel task.
 const TASK_BLOCKS: usize = 128;
@@ -75,6 +77,21 @@ pub(crate) fn cull(
     }
 }
 
+/// Largest share of a cloud's bounds in which all points are held for several looks. Beyond it, to read the cloud once
+/// more takes less time than to write them down.
+const HELD: f32 = 0.2;
+
+/// Whether the points in `region` are so few that they are better held than culled again for each look.
+pub(crate) fn are_few(cloud: &PointCloud, frame_from_cloud: &Pose3, region: &Region) -> bool {
+    let all = cloud.bounds().extents();
+    let inside = region
+        .bounds_in(frame_from_cloud)
+        .intersection(cloud.bounds());
+    let share = inside.extents().max(Vec3::ZERO) / all;
+    // Of a flat cloud, the share of its length across is no number.
+    Vec3::select(all.cmpgt(Vec3::ZERO), share, Vec3::ONE).element_product() <= HELD
+}
+
 fn cull_blocks(
     cloud: &PointCloud,
     frame_from_cloud: &Pose3,
@@ -84,80 +101,29 @@ fn cull_blocks(
     out: &mut Survivors,
 ) {
     let uneven = Uneven::of(cloud);
-    let widest = region.of_radius(cloud.max_radius());
-    let mut kernel = Kernel::new(frame_from_cloud, &widest);
+    let bounds_of = |radius| region.of_radius(radius).bounds_in(frame_from_cloud);
+    let widest = bounds_of(cloud.max_radius());
+    let mut sieve = Sieve::new(frame_from_cloud, region, cloud.max_radius(), uneven);
     let thinning = Thinning::new(stride);
-    let [x, y, z] = cloud.coordinates();
-    let mut moved = Moved::default();
     for block in blocks {
         let bounds = &cloud.blocks()[block];
-        let bounds = match kernel.frame_from_cloud {
-            Some(_) => bounds.transformed(frame_from_cloud),
-            None => *bounds,
-        };
-        if !bounds.intersects(&widest.overlap) {
+        if !bounds.intersects(&widest) {
             continue;
         }
-        let range = block * BLOCK..((block + 1) * BLOCK).min(x.len());
+        let first = block * BLOCK;
+        let range = first..(first + BLOCK).min(cloud.len());
+        let mut region = widest;
         if let Some(uneven) = &uneven {
-            let region = region.of_radius(uneven.largest(range.clone()));
-            if !bounds.intersects(&region.overlap) {
+            region = bounds_of(uneven.largest(range.clone()));
+            if !bounds.intersects(&region) {
                 continue;
             }
-            kernel = Kernel::new(frame_from_cloud, &region);
         }
-        let [x, y, z] = [x, y, z].map(|c| &c[range.clone()]);
-        let taken = thinning.of_block(block);
-        if !classify(&kernel, x, y, z, taken, &mut moved) {
-            continue;
-        }
-        let first = range.start;
-        if let Some(uneven) = &uneven {
-            keep_own(uneven, &mut moved, first, region);
-        }
-        let before = out.len();
-        out.extend(&mut moved, |i| (first + i) as u32);
-        if let Some(uneven) = &uneven {
-            let kept = out.index[before..].iter();
-            (out.further).extend(kept.map(|&i| uneven.further(i as usize)));
-        }
+        let run = cloud.coordinates().map(|c| &c[range.clone()]);
+        let (taken, index_of) = (thinning.of_block(block), |i| (first + i) as u32);
+        sieve.put(run, taken, &region, index_of, out);
     }
-}
-
-/// Which points of a block are taken.
-struct Thinning {
-    stride: usize,
-    /// 1 for every `stride`-th, else 0.
-    taken: [u8; 2 * BLOCK],
-}
-
-impl Thinning {
-    fn new(stride: usize) -> Self {
-        Self {
-            stride,
-            taken: std::array::from_fn(|i| u8::from(i.is_multiple_of(stride))),
-        }
-    }
-
-    /// 1 for the points of a block that are taken, else 0.
-    fn of_block(&self, block: usize) -> &[u8; BLOCK] {
-        let first = first_taken(block, self.stride);
-        let from = (self.stride - first) % self.stride;
-        self.taken[from..]
-            .first_chunk()
-            .expect("a stride is no longer than a block")
-    }
-}
-
-/// Of the points in the region of the coarsest point, keeps those that are in their own region.
-fn keep_own(uneven: &Uneven, moved: &mut Moved, first: usize, region: &Region) {
-    for i in 0..BLOCK {
-        if moved.inside[i] > 0 {
-            let own = region.of_radius(uneven.radius(first + i));
-            let point = Vec3::new(moved.x[i], moved.y[i], moved.z[i]);
-            moved.inside[i] = u8::from(own.contains(point));
-        }
-    }
+    sieve.empty(out);
 }
 
 #[cfg(test)]
@@ -165,6 +131,14 @@ mod tests {
     use super::*;
     use crate::Aabb;
     use crate::cloud::reach::Ring;
+    use crate::pair::sampling::first_taken;
+
+    fn is_taken(index: usize, stride: usize) -> bool {
+        let first = first_taken(index / BLOCK, stride);
+        (index % BLOCK)
+            .checked_sub(first)
+            .is_some_and(|k| k.is_multiple_of(stride))
+    }
 
     /// Of an image whose rows are two blocks long, every 16th point leaves points in all columns.
     #[test]
@@ -237,13 +211,11 @@ mod tests {
                 selected.select(&all, &region);
                 assert_eq!(selected.index, kept.index);
                 assert_eq!(selected.x, kept.x);
-                let is_taken = |&i: &u32| {
-                    let (block, place) = (i as usize / BLOCK, i as usize % BLOCK);
-                    let first = first_taken(block, 3);
-                    place >= first && (place - first).is_multiple_of(3)
-                };
+                let is_taken = |&i: &u32| is_taken(i as usize, 3);
                 let thirds = kept.index.iter().copied().filter(is_taken);
                 assert!(thirds.eq(third.index.iter().copied()));
+                selected.thin_out(&kept, 3);
+                assert_eq!(selected.index, third.index);
                 assert_eq!(kept.len(), expected.len());
                 for (k, &p) in expected.iter().enumerate() {
                     // Rotations by quaternions and by matrices differ by rounding.
@@ -291,9 +263,8 @@ mod tests {
             cull(&cloud, &frame, &region, stride, &mut scratch, &mut kept);
             let is_kept = |&i: &usize| {
                 let beyond = (2.0 * radius(points[i]) - included).max(0.0);
-                let is_taken = (i % BLOCK).checked_sub(first_taken(i / BLOCK, stride));
-                points[i].abs().max_element() <= 0.5 + beyond
-                    && is_taken.is_some_and(|k| k % stride == 0)
+                let is_inside = points[i].abs().max_element() <= 0.5 + beyond;
+                is_inside && is_taken(i, stride)
             };
             let expected: Vec<usize> = (0..points.len()).filter(is_kept).collect();
             assert!(kept.index.iter().map(|&i| i as usize).eq(expected));

@@ -1,7 +1,10 @@
 //! The points that a cull leaves, and their radii.
 
-use crate::cpu::cull::region::{Kernel, Moved, Region, classify};
+use crate::cpu::cull::region::Region;
+use crate::cpu::cull::sieve::Sieve;
+use crate::cpu::cull::thinning::Thinning;
 use crate::cpu::fold::SpaceFold;
+use crate::stage::stage;
 use crate::{BLOCK, PointCloud, Radii};
 use glamx::{Pose3, Vec3};
 
@@ -66,19 +69,43 @@ impl Survivors {
         self.further.extend_from_slice(&other.further);
     }
 
-    /// Takes the points of `all` that are in `region`. The cloud is even.
-    pub(crate) fn select(&mut self, all: &Self, region: &Region) {
+    /// Takes every `stride`-th point of the cloud that is in `all`.
+    pub(crate) fn thin_out(&mut self, all: &Self, stride: usize) {
+        let _stage = stage!("cull");
         self.clear();
-        self.stride = all.stride;
-        let kernel = Kernel::new(&Pose3::IDENTITY, region);
-        let mut moved = Moved::default();
-        for first in (0..all.len()).step_by(BLOCK) {
-            let range = first..all.len().min(first + BLOCK);
-            let [x, y, z] = [&all.x, &all.y, &all.z].map(|c| &c[range.clone()]);
-            if classify(&kernel, x, y, z, &[1; BLOCK], &mut moved) {
-                self.extend(&mut moved, |i| all.index[first + i]);
+        self.stride = stride;
+        let thinning = Thinning::new(stride);
+        let block_of = |i: u32| i as usize / BLOCK;
+        let runs = (all.index).chunk_by(|&i, &next| block_of(i) == block_of(next));
+        let mut k = 0;
+        for run in runs {
+            let taken = thinning.of_block(block_of(run[0]));
+            for &i in run {
+                if taken[i as usize % BLOCK] > 0 {
+                    self.x.push(all.x[k]);
+                    self.y.push(all.y[k]);
+                    self.z.push(all.z[k]);
+                    self.index.push(i);
+                }
+                k += 1;
             }
         }
+    }
+
+    /// Takes those of `all` points that are in `region`. The cloud is even.
+    pub(crate) fn select(&mut self, all: &Self, region: &Region) {
+        let _stage = stage!("cull");
+        self.clear();
+        self.stride = all.stride;
+        let bounds = region.bounds_in(&Pose3::IDENTITY);
+        let mut sieve = Sieve::new(&Pose3::IDENTITY, region, 0.0, None);
+        for first in (0..all.len()).step_by(BLOCK) {
+            let range = first..all.len().min(first + BLOCK);
+            let run = [&all.x, &all.y, &all.z].map(|c| &c[range.clone()]);
+            let index_of = |i| all.index[first + i];
+            sieve.put(run, &[1; BLOCK], &bounds, index_of, self);
+        }
+        sieve.empty(self);
     }
 
     pub(super) fn append(&mut self, other: &Self) {
@@ -87,28 +114,6 @@ impl Survivors {
         self.z.extend_from_slice(&other.z);
         self.index.extend_from_slice(&other.index);
         self.further.extend_from_slice(&other.further);
-    }
-
-    /// Appends the points of a block that are inside the region, after moving them to its front.
-    pub(super) fn extend(&mut self, moved: &mut Moved, index_of: impl Fn(usize) -> u32) {
-        let Moved { x, y, z, inside } = moved;
-        let mut index = [0; BLOCK];
-        let mut kept = 0;
-        let (words, _) = inside.as_chunks::<64>();
-        for (word, flags) in words.iter().enumerate() {
-            let mut mask = bits(flags);
-            while mask != 0 {
-                let i = 64 * word + mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                (x[kept], y[kept], z[kept]) = (x[i], y[i], z[i]);
-                index[kept] = index_of(i);
-                kept += 1;
-            }
-        }
-        self.x.extend_from_slice(&x[..kept]);
-        self.y.extend_from_slice(&y[..kept]);
-        self.z.extend_from_slice(&z[..kept]);
-        self.index.extend_from_slice(&index[..kept]);
     }
 
     pub(super) fn reserve(&mut self, additional: usize, with_further: bool) {
@@ -120,16 +125,6 @@ impl Survivors {
             self.further.reserve(additional);
         }
     }
-}
-
-/// One bit for each of 64 flags that are 0 or 1.
-fn bits(flags: &[u8; 64]) -> u64 {
-    let (bytes, _) = flags.as_chunks::<8>();
-    bytes.iter().enumerate().fold(0, |mask, (k, flags)| {
-        // The product's highest byte collects the flags, the first as its lowest bit.
-        let byte = u64::from_le_bytes(*flags).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-        mask | byte << (8 * k)
-    })
 }
 
 /// Radii in metres of the culled points, scaled so that they cover the surface even where only
@@ -193,21 +188,6 @@ impl<'a> PointRadii<'a> {
         match self.radii {
             Radii::Global(r) => self.scale * r,
             Radii::PerPoint(r) => self.scale * r[self.index[i] as usize],
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bits_are_in_the_order_of_the_flags() {
-        let mut rng = fastrand::Rng::with_seed(1);
-        for _ in 0..1000 {
-            let mask = rng.u64(..);
-            let flags = std::array::from_fn(|i| (mask >> i & 1) as u8);
-            assert_eq!(bits(&flags), mask);
         }
     }
 }

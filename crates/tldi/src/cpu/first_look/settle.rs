@@ -10,7 +10,7 @@ use crate::cpu::crossings::{Crossings, swap_depth};
 use crate::cpu::first_look::cells::CellImaging;
 use crate::cpu::first_look::window::Window;
 use crate::cpu::scratch::{CommonPixels, Scratch};
-use crate::cpu::side::CloudView;
+use crate::cpu::side::{CloudView, Side};
 use crate::pair::pixels::largest_pixel;
 use crate::pair::plan::PairPlan;
 use crate::pair::sampling::stride;
@@ -132,7 +132,7 @@ impl Scratch {
                 depth = result.gap.map_or(0.0, |gap| -gap);
             }
             if depth >= DEEP * pixel {
-                if self.is_proven(query, plan, &result.axes, &mut came_to) {
+                if self.is_proven(query, plan, &result.axes) {
                     result.coarser = Some(pixel / query.params.pixel_size);
                     return FirstLook::Settled;
                 }
@@ -164,7 +164,7 @@ impl Scratch {
             ..plan.clone()
         };
         *came_to = FirstLook::Nothing;
-        if !self.cull(query, plan, strides) || !self.zone(query, &thinned) {
+        if !self.cull(query, plan, strides, Side::cull_and_hold) || !self.zone(query, &thinned) {
             return 0.0;
         }
         *came_to = FirstLook::Culled(strides);
@@ -179,36 +179,18 @@ impl Scratch {
     }
 
     /// Whether small pixels show in a few windows that the surfaces cross.
-    fn is_proven(
-        &mut self,
-        query: &PairQuery,
-        plan: &PairPlan,
-        axes: &[Vec3],
-        came_to: &mut FirstLook,
-    ) -> bool {
+    fn is_proven(&mut self, query: &PairQuery, plan: &PairPlan, axes: &[Vec3]) -> bool {
         let _stage = stage!("windows");
-        let holds_all = self.a.points.are_all() && self.b.points.are_all();
-        if !holds_all {
-            *came_to = FirstLook::Nothing;
-        }
         rank(&mut self.windows);
+        let pixel = query.params.pixel_size;
+        let strides = [query.a, query.b].map(|s| stride(s.mean_radius(), pixel));
         let mut crossings = Crossings::default();
+        self.swap_windows();
         for k in 0..self.windows.len().min(MOST_WINDOWS) {
             let window = self.windows[k];
             let camera = window.camera(query, axes);
             let plan = window.plan(query, plan, &camera);
-            let mut is_seen = true;
-            if holds_all {
-                for (side, plan) in [&mut self.a, &mut self.b].into_iter().zip(&plan.sides) {
-                    side.window.select(&side.points, &plan.region);
-                    std::mem::swap(&mut side.points, &mut side.window);
-                }
-            } else {
-                let pixel = query.params.pixel_size;
-                let strides = [query.a, query.b].map(|s| stride(s.mean_radius(), pixel));
-                is_seen = self.cull(query, &plan, strides);
-            }
-            if is_seen {
+            if self.cull(query, &plan, strides, Side::cull_window) {
                 let seen = Seen {
                     axes,
                     view: window.view,
@@ -216,16 +198,19 @@ impl Scratch {
                 };
                 self.look_through(query, &plan, &camera, &seen, &mut crossings);
             }
-            if holds_all {
-                for side in [&mut self.a, &mut self.b] {
-                    std::mem::swap(&mut side.points, &mut side.window);
-                }
-            }
             if crossings.are_enough() {
-                return true;
+                break;
             }
         }
-        false
+        self.swap_windows();
+        crossings.are_enough()
+    }
+
+    /// Puts the points of windows aside, and back in their place those of the look before.
+    fn swap_windows(&mut self) {
+        for side in [&mut self.a, &mut self.b] {
+            std::mem::swap(&mut side.points, &mut side.window);
+        }
     }
 
     /// Compares the images of the sums of what was culled. Returns how deep the surfaces are in this view, metres, or at
