@@ -257,7 +257,7 @@ fn row(setting: String, scan_points: usize, outcomes: &[Outcome], floor_ms: f64)
 }
 
 fn floor_ms(a: &PointCloud, b: &PointCloud) -> f64 {
-    let clouds = [a, b].map(|cloud| Coordinates::of(&cloud.points().collect::<Vec<_>>()));
+    let clouds = [a, b].map(|cloud| Coordinates::of(cloud.points()));
     let pass = || {
         let start = Stopwatch::of_thread();
         for cloud in &clouds {

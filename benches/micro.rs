@@ -176,7 +176,7 @@ fn pushes(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("push of a surface");
     for count in POINTS {
         let sheet = bumpy_sheet(count, true, 1);
-        let low: Vec<Vec3> = sheet.points().collect();
+        let low: Vec<Vec3> = sheet.points().to_vec();
         let normals = sheet.normals().map(<[Vec3]>::to_vec);
         let mut world = PhysicsWorld::default();
         let mut tldi = TldiPipeline::new(TldiConfig::default()).expect("the defaults are valid");

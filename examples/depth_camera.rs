@@ -252,7 +252,12 @@ impl LastView<'_> {
 
     /// Median depth in metres of the points.
     fn median_depth(&self, cloud: &PointCloud<'_>) -> f32 {
-        let mut depths: Vec<f32> = cloud.points().map(|point| self.depth(point)).collect();
+        let mut depths: Vec<f32> = cloud
+            .points()
+            .iter()
+            .copied()
+            .map(|point| self.depth(point))
+            .collect();
         let middle = depths.len() / 2;
         *(depths.select_nth_unstable_by(middle, f32::total_cmp).1)
     }
@@ -267,7 +272,14 @@ impl LastView<'_> {
         distance: f32,
         seed: u64,
     ) -> Result<Vec<Spot>, NoSpot> {
-        let radius = |body: &NamedCloud| body.cloud.points().map(Vec3::length).fold(0.0, f32::max);
+        let radius = |body: &NamedCloud| {
+            body.cloud
+                .points()
+                .iter()
+                .copied()
+                .map(Vec3::length)
+                .fold(0.0, f32::max)
+        };
         let demand = Demand {
             count: bodies.len(),
             body_radius: bodies.iter().map(radius).fold(0.0, f32::max),

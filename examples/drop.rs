@@ -148,7 +148,12 @@ fn load_bodies(args: &Args, scan_radius: f32) -> anyhow::Result<Vec<NamedCloud>>
 
 /// Radius in metres of the ball around the origin that holds the cloud.
 fn ball_radius(cloud: &PointCloud<'_>) -> f32 {
-    cloud.points().map(Vec3::length).fold(0.0, f32::max)
+    cloud
+        .points()
+        .iter()
+        .copied()
+        .map(Vec3::length)
+        .fold(0.0, f32::max)
 }
 
 /// What is drawn of a run.

@@ -33,17 +33,16 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     var radius = 0.0;
     if is_kept {
         let at = (*facts).first_point + index * (*facts).point_step;
-        let step = (*facts).coordinate_step;
         // Where radii are equal, the points have none of their own.
         radius = (*facts).max_radius;
         if ((*facts).flags & RADII_DIFFER) != 0u {
-            radius = points[at + 3u * step];
+            radius = points[at + 3u];
         }
         position = moved(
             (*facts).frame_from_cloud_x,
             (*facts).frame_from_cloud_y,
             (*facts).frame_from_cloud_z,
-            vec3f(points[at], points[at + step], points[at + 2u * step]),
+            vec3f(points[at], points[at + 1u], points[at + 2u]),
         );
         let in_other = moved(
             (*facts).other_from_frame_x,

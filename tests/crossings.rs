@@ -58,10 +58,17 @@ impl Jack {
 
     /// Least distance between the samples.
     fn distance(&self, other: &Self, self_from_other: &Pose3) -> f32 {
-        let others: Vec<Vec3> = other.cloud.points().map(|p| *self_from_other * p).collect();
+        let others: Vec<Vec3> = other
+            .cloud
+            .points()
+            .iter()
+            .map(|&p| *self_from_other * p)
+            .collect();
         let nearest = |p: Vec3| others.iter().map(move |q| p.distance(*q));
         self.cloud
             .points()
+            .iter()
+            .copied()
             .flat_map(nearest)
             .fold(f32::MAX, f32::min)
     }

@@ -158,7 +158,7 @@ fn body_on_scan(source: &Source, seed: u64) -> [Vec<Vec3>; 2] {
     let rise = BUMP - sunk - bounds(&body).min.y;
     body.iter_mut()
         .for_each(|p| *p += Vec3::new(quarter_wave, rise, 0.0));
-    [scan.points().collect(), body]
+    [scan.points().to_vec(), body]
 }
 
 /// Random points, evenly over the area.

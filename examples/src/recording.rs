@@ -269,7 +269,7 @@ mod stream {
 
     fn points_of(cloud: &PointCloud<'_>, color: [f32; 3]) -> Points3D {
         let [r, g, b] = color.map(|c| (255.0 * c) as u8);
-        let points = Points3D::new(cloud.points().map(|p| p.to_array()))
+        let points = Points3D::new(cloud.points().iter().map(|&p| p.to_array()))
             .with_radii((0..cloud.len()).map(|i| cloud.radius(i)));
         match cloud.colors() {
             Some(own) => {

@@ -71,7 +71,7 @@ pub fn choose_up(choice: UpChoice, scan: &PointCloud<'_>) -> Vec3 {
     if let UpChoice::Given(up) = choice {
         return up;
     }
-    let points: Vec<Vec3> = scan.points().collect();
+    let points: Vec<Vec3> = scan.points().to_vec();
     let Up {
         direction,
         confidence,

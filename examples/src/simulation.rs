@@ -203,7 +203,7 @@ impl DropSimulation {
     fn is_inside(&self, point: Vec3) -> bool {
         let (right, forward) = self.up.any_orthonormal_pair();
         let range = |axis: Vec3| {
-            let along = self.scan.points().map(|p| p.dot(axis));
+            let along = self.scan.points().iter().map(|&p| p.dot(axis));
             along.fold((f32::MAX, f32::MIN), |(min, max), a| {
                 (min.min(a), max.max(a))
             })
@@ -223,7 +223,7 @@ fn start_pose(cloud: &PointCloud<'_>, up: Vec3, spot: &Spot, rng: &mut Rng) -> P
     let tilt_axis = Quat::from_rotation_y(rng.f32() * std::f32::consts::TAU) * Vec3::X;
     let tilt = Quat::from_axis_angle(tilt_axis, rng.f32() * MAX_TILT);
     let rotation = upright * tilt * yaw;
-    let heights = cloud.points().map(|p| (rotation * p).dot(up));
+    let heights = cloud.points().iter().map(|&p| (rotation * p).dot(up));
     let (lowest, highest) = heights.fold((f32::MAX, f32::MIN), |(min, max), h| {
         (min.min(h), max.max(h))
     });

@@ -18,7 +18,7 @@ fn up_of_real_scans_is_found() {
             continue;
         };
         let scan = load::scan_from_file(&file, 1.0).unwrap();
-        let points: Vec<Vec3> = scan.points().collect();
+        let points: Vec<Vec3> = scan.points().to_vec();
         let found = detect_up(&points, scan.normals().unwrap());
         let angle = found.direction.angle_between(up).to_degrees();
         // 2°: the kitchen's frames are registered to about 1 cm on tables of half a metre (1°).

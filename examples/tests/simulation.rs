@@ -55,7 +55,7 @@ fn height_ranges(simulation: &DropSimulation) -> Vec<[f32; 2]> {
     let poses = simulation.snapshot().scan_from_body;
     (simulation.clouds().iter().zip(poses))
         .map(|(cloud, pose)| {
-            let heights = cloud.points().map(|p| (pose * p).z);
+            let heights = cloud.points().iter().map(|&p| (pose * p).z);
             heights.fold([f32::MAX, f32::MIN], |[min, max], h| {
                 [min.min(h), max.max(h)]
             })

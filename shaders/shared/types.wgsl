@@ -120,11 +120,11 @@ struct Side {
     merge_steps: u32,
     // Told standard deviation of the points, metres.
     noise: f32,
-    // Words from a point to the next one, and from a coordinate to the next one; the radius is the fourth.
+    // Words from a point to the next one; the radius is the fourth.
     point_step: u32,
-    coordinate_step: u32,
     padding_a: u32,
     padding_b: u32,
+    padding_c: u32,
 }
 
 struct Pair {

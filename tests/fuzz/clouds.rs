@@ -27,7 +27,7 @@ fn is_sound(
     prop_assert_eq!(cloud.len() + cloud.dropped(), spec.count);
     prop_assert!(!spec.refuses || cloud.dropped() == 0);
     let bounds = cloud.bounds();
-    for (k, point) in cloud.points().enumerate() {
+    for (k, point) in cloud.points().iter().copied().enumerate() {
         prop_assert!(point.is_finite());
         prop_assert!(bounds.min.cmple(point).all() && point.cmple(bounds.max).all());
         let radius = cloud.radius(k);
@@ -55,16 +55,16 @@ fn new_points_are_taken_or_refused() {
         let Ok(mut cloud) = before.build() else {
             return Ok(());
         };
-        let old: Vec<_> = cloud.points().collect();
+        let old: Vec<_> = cloud.points().to_vec();
         let given = after.points();
         match cloud.set_points(&given, None) {
             Ok(()) => {
                 prop_assert!(cloud.len() <= given.len() && !old.is_empty());
-                prop_assert!(cloud.points().all(|p| p.is_finite()));
+                prop_assert!(cloud.points().iter().all(|p| p.is_finite()));
             }
             Err(error) => {
                 prop_assert!(!error.to_string().is_empty());
-                prop_assert!(cloud.points().eq(old));
+                prop_assert!(cloud.points() == old);
             }
         }
         let radius = cloud.mean_radius();

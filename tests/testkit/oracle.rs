@@ -53,7 +53,7 @@ pub fn oracle_layers(
     let pixel = f64::from(params.pixel_size);
     let normals = cloud.normals().expect("the oracle needs normals");
     let mut fragments = Vec::new();
-    for (k, p) in cloud.points().enumerate() {
+    for (k, p) in cloud.points().iter().copied().enumerate() {
         fragments.extend(fragment(cloud, p, normals[k], k, [i, j], pixel, params)?);
     }
     fragments.sort_by(|f, g| {

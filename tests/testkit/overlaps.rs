@@ -36,13 +36,13 @@ impl ClosedShape {
     fn sampled(name: &'static str, shape: &SharedShape) -> Self {
         let sampled = |spacing| sample_shape(&**shape, spacing).expect("the shape has a surface");
         let cloud = sampled(R);
-        let points: Vec<Vec3> = cloud.points().collect();
+        let points: Vec<Vec3> = cloud.points().to_vec();
         let bare = (PointCloud::builder(points).radius(R).build()).expect("points of a cloud");
         let spacing = 0.5 * R;
         Self {
             name,
             clouds: [cloud, bare],
-            dense: sampled(spacing).points().collect(),
+            dense: sampled(spacing).points().to_vec(),
             spacing,
         }
     }
@@ -84,7 +84,7 @@ impl ClosedShape {
         let mesh = SharedShape::trimesh(raw.points.clone(), raw.faces.clone())
             .expect("the model has faces");
         let dense = sample_shape(&*mesh, spacing).expect("a mesh has a surface");
-        let dense = dense.points().collect();
+        let dense = dense.points().to_vec();
         let cloud =
             (raw.into_builder().knn_radii(7, 0.65).build()).expect("the test data is valid");
         Some(Self {

@@ -14,7 +14,6 @@ use crate::protocol::Case;
 use crate::stored::{AccuracyRow, DistanceTally};
 use std::collections::HashMap;
 use tldi::PointCloud;
-use tldi::glamx::Vec3;
 
 /// Name in the rows of the default, told how large the noise is.
 pub const TOLD: &str = "default, noise told";
@@ -69,9 +68,7 @@ pub fn measure(
     let radii = copies
         .clouds
         .map(|cloud| -> Vec<f32> { (0..cloud.len()).map(|i| cloud.radius(i)).collect() });
-    let points = copies
-        .clouds
-        .map(|cloud| cloud.points().collect::<Vec<Vec3>>());
+    let points = copies.clouds.map(|cloud| cloud.points().to_vec());
     let mean_radius = copies.clouds[0].mean_radius();
     let mut scaled: HashMap<u32, [Vec<f32>; 2]> = HashMap::new();
     for contender in &*contenders {

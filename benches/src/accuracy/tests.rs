@@ -2,6 +2,7 @@ use super::*;
 use crate::peers::Found;
 use crate::protocol::{ALL_CASES, cases};
 use crate::stored::Measured;
+use tldi::glamx::Vec3;
 use tldi::glamx::{Pose3, Quat};
 
 /// The cube of an edge of 2 about the origin.

@@ -58,7 +58,7 @@ impl Scene {
             let points = [case.a, case.b][k].points();
             let mesh = Mesh::new(case.shapes[k], CONTACT_SPACING);
             (
-                points.map(|p| poses[k] * p).collect(),
+                points.iter().map(|p| poses[k] * *p).collect(),
                 mesh.moved(&poses[k]),
             )
         };

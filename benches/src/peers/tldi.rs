@@ -1,4 +1,4 @@
-//! Ours, and the paper's, as a peer: clouds get new points, then are compared.
+//! Ours, and the paper's, as a peer: clouds are made of the points of a frame, then compared.
 
 use super::{Deepest, Found, Frame, Peer};
 use crate::stages::{StageTimes, staged};
@@ -6,8 +6,7 @@ use crate::stopwatch::Stopwatch;
 use crate::threads::workers;
 use ::tldi::glamx::{Pose3, Vec3};
 use ::tldi::{
-    Backend, CameraPolicy, PairQuery, PairResult, Params, PointCloud, Radii, Surface, View,
-    VirtualCamera,
+    Backend, CameraPolicy, PairQuery, PairResult, Params, PointCloud, Surface, View, VirtualCamera,
 };
 use tldi_tests::deepest_contact;
 
@@ -61,7 +60,7 @@ impl Method {
     }
 }
 
-/// A backend, with clouds whose memory is reused.
+/// A backend, whose memory is reused.
 pub struct TldiPeer {
     threads: rayon::ThreadPool,
     comparison: Comparison,
@@ -72,7 +71,6 @@ struct Comparison {
     backend: Box<dyn Backend>,
     method: Method,
     noise: f32,
-    clouds: Option<[PointCloud<'static>; 2]>,
     results: Vec<PairResult>,
 }
 
@@ -89,7 +87,6 @@ impl TldiPeer {
                 backend,
                 method,
                 noise: 0.0,
-                clouds: None,
                 results: Vec::new(),
             },
         })
@@ -107,17 +104,14 @@ impl TldiPeer {
     }
 }
 
-/// Points and radii of this frame.
-fn fill(cloud: &mut PointCloud<'static>, frame: &Frame, side: usize) {
-    let points = [frame.a, frame.b][side];
-    let outcome = cloud
-        .set_radii(Radii::Global(frame.radius))
-        .and_then(|()| cloud.set_points(points, None))
-        .and_then(|()| match frame.radii {
-            Some(radii) => cloud.set_radii(Radii::PerPoint(radii[side].to_vec().into())),
-            None => Ok(()),
-        });
-    outcome.expect("the points and radii of a bench are finite");
+/// A side of a frame, whose points stay where they are.
+fn cloud<'a>(frame: &Frame<'a>, side: usize, noise: f32) -> PointCloud<'a> {
+    let builder = PointCloud::builder([frame.a, frame.b][side]).noise(noise);
+    let builder = match frame.radii {
+        Some(radii) => builder.radii(radii[side]),
+        None => builder.radius(frame.radius),
+    };
+    (builder.build()).expect("the points and radii of a bench are finite")
 }
 
 impl Comparison {
@@ -127,24 +121,14 @@ impl Comparison {
             backend,
             method,
             noise,
-            clouds,
             results,
         } = self;
         let start = Stopwatch::of_threads(rayon::current_num_threads());
-        let clouds = clouds.get_or_insert_with(|| {
-            [frame.a, frame.b].map(|points| {
-                let builder = PointCloud::builder(points.to_vec()).radius(frame.radius);
-                let builder = builder.noise(*noise);
-                builder.build().expect("the points of a bench are finite")
-            })
-        });
-        let [a, b] = clouds;
-        rayon::join(|| fill(a, frame, 0), || fill(b, frame, 1));
+        let (a, b) = rayon::join(|| cloud(frame, 0, *noise), || cloud(frame, 1, *noise));
         let built = start.seconds();
-        let [a, b] = &*clouds;
         let query = PairQuery {
-            a: Surface::Cloud(a),
-            b: Surface::Cloud(b),
+            a: Surface::Cloud(&a),
+            b: Surface::Cloud(&b),
             a_from_b: Pose3::IDENTITY,
             view: method.view(frame.motion),
             params: method.params(a.mean_radius()),

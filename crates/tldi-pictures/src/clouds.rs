@@ -42,7 +42,7 @@ pub fn painted(
     cloud: &PointCloud<'_>,
     color: impl Fn(usize) -> [u8; 4],
 ) -> Result<PointCloud<'static>, CloudError> {
-    let points: Vec<Vec3> = cloud.points().collect();
+    let points: Vec<Vec3> = cloud.points().to_vec();
     let radii: Vec<f32> = (0..cloud.len()).map(|i| cloud.radius(i)).collect();
     let colors: Vec<[u8; 4]> = (0..cloud.len()).map(color).collect();
     let mut builder = PointCloud::builder(points).radii(radii).colors(colors);

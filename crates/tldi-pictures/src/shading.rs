@@ -72,6 +72,7 @@ impl<'a> Frame<'a> {
             .flat_map(|item| {
                 item.cloud
                     .points()
+                    .iter()
                     .step_by(16)
                     .map(|p| (item.scene_from_cloud * p).dot(scene.up))
             })

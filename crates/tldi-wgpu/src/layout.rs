@@ -230,9 +230,9 @@ pub(crate) struct SideData {
     merge_steps: u32,
     noise: f32,
     point_step: u32,
-    coordinate_step: u32,
     padding_a: u32,
     padding_b: u32,
+    padding_c: u32,
 }
 
 impl SideData {
@@ -280,9 +280,9 @@ impl SideData {
             merge_steps: DepthScale::new(0.0, params).merge_steps(params, cloud.noise),
             noise: cloud.noise,
             point_step: place.point_step,
-            coordinate_step: place.coordinate_step,
             padding_a: 0,
             padding_b: 0,
+            padding_c: 0,
         })
     }
 
@@ -422,7 +422,7 @@ mod tests {
             flags flags, first_point first_point, first_normal first_normal,
             radius_scale radius_scale, max_radius max_radius, cell_dims cell_dims,
             cell_first cell_first, cell_inv cell_inv, mean_radius mean_radius,
-            merge_steps merge_steps, noise noise, point_step point_step, coordinate_step coordinate_step,
+            merge_steps merge_steps, noise noise, point_step point_step,
         ]);
     }
 

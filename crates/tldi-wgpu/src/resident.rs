@@ -92,10 +92,8 @@ pub(crate) struct Place {
     pub(crate) first_point: u32,
     /// Normals before the first one.
     pub(crate) first_normal: u32,
-    /// Words from a point to the next one.
+    /// Words from a point to the next one. The radius, where points have their own, is the fourth.
     pub(crate) point_step: u32,
-    /// Words from a coordinate to the next one. The radius, where points have their own, is the fourth.
-    pub(crate) coordinate_step: u32,
 }
 
 impl Place {
@@ -105,7 +103,6 @@ impl Place {
             first_point,
             first_normal: 0,
             point_step: 4,
-            coordinate_step: 1,
         }
     }
 }
@@ -163,7 +160,7 @@ impl Resident {
     }
 
     /// Where the points of a cloud are. There is room for all; those of `blocks`, in ascending order, are uploaded if they are
-    /// not there. Coordinates lie as in the cloud: all x, all y, all z, then all radii if they are not equal.
+    /// not there. Each point is its x, y and z, followed by its radius if they are not equal.
     pub(crate) fn place(
         &mut self,
         gpu: &Gpu,
@@ -176,8 +173,8 @@ impl Resident {
             Radii::Global(_) => None,
             Radii::PerPoint(radii) => Some(&radii[..]),
         };
-        let arrays = cloud.coordinates().into_iter().chain(radii);
-        let words = numbered("points", arrays.clone().count() as u64 * u64::from(count))?;
+        let step = 3 + u32::from(radii.is_some());
+        let words = numbered("points", u64::from(step) * u64::from(count))?;
         let normals = cloud.normals();
         let (first_point, first_normal) = self.reserve(gpu, id, words, normals.map(|_| count))?;
         for points in self.missing(id, cloud.len(), blocks) {
@@ -192,18 +189,24 @@ impl Resident {
                     bytemuck::cast_slice(&self.staging),
                 );
             }
-            for (k, array) in arrays.clone().enumerate() {
-                let word =
-                    u64::from(first_point) + k as u64 * u64::from(count) + points.start as u64;
-                let some = bytemuck::cast_slice(&array[points.clone()]);
-                gpu.write(&self.points.buffer, 4 * word, some);
-            }
+            let some = &cloud.points()[points.clone()];
+            let word = u64::from(first_point) + u64::from(step) * points.start as u64;
+            let bytes = match radii {
+                None => bytemuck::cast_slice(some),
+                Some(radii) => {
+                    self.staging.clear();
+                    let with_radii = some.iter().zip(&radii[points]);
+                    let words = with_radii.flat_map(|(p, &radius)| [p.x, p.y, p.z, radius]);
+                    self.staging.extend(words);
+                    bytemuck::cast_slice(&self.staging)
+                }
+            };
+            gpu.write(&self.points.buffer, 4 * word, bytes);
         }
         Ok(Place {
             first_point,
             first_normal,
-            point_step: 1,
-            coordinate_step: count,
+            point_step: step,
         })
     }
 

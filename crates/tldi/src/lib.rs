@@ -22,7 +22,6 @@ pub use cloud::error::CloudError;
 pub use cloud::gather::BLOCK;
 pub use cloud::knn::{KdTree, Neighbor};
 pub use cloud::point_cloud::PointCloud;
-pub use cloud::positions::Positions;
 pub use cloud::radii::Radii;
 pub use cloud::recipe::{CloudRecipe, NonFinite, RadiusRule};
 pub use contact::bowl::Lowest;

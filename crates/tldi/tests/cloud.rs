@@ -6,8 +6,9 @@ use cloud_support::{
     Attributes, assert_bounds, assert_holds, attributes, bounds_of, random_points, state,
 };
 use fastrand::Rng;
+use std::borrow::Cow;
 use tldi::glamx::{Pose3, Quat, Vec3};
-use tldi::{Aabb, CloudError, NonFinite, PointCloud, Positions, Radii};
+use tldi::{Aabb, CloudError, NonFinite, PointCloud, Radii};
 
 /// Makes about one point in `rarity` non-finite.
 fn spoil(rng: &mut Rng, points: &mut [Vec3], rarity: usize) {
@@ -42,14 +43,8 @@ fn non_finite_points_are_dropped_with_their_attributes() {
                     *radius = f32::NAN; // what does not count is not refused
                 }
             }
-            let [x, y, z] = [0, 1, 2].map(|c| points.iter().map(|p| p[c]).collect::<Vec<f32>>());
-            for positions in [
-                Positions::from(&points),
-                Positions::from(points.clone()),
-                Positions::from([&x[..], &y, &z]),
-                Positions::from([x.clone(), y.clone(), z.clone()]),
-            ] {
-                let cloud = PointCloud::builder(positions)
+            for given_points in [Cow::Borrowed(&points[..]), Cow::Owned(points.clone())] {
+                let cloud = PointCloud::builder(given_points)
                     .radii(&radii)
                     .normals(&normals)
                     .colors(&colors)
@@ -68,15 +63,13 @@ fn non_finite_points_are_dropped_with_their_attributes() {
 fn finite_slices_are_borrowed() {
     let mut rng = Rng::with_seed(2);
     let points = random_points(&mut rng, 1000);
-    let [x, y, z] = [0, 1, 2].map(|c| points.iter().map(|p| p[c]).collect::<Vec<f32>>());
     let Attributes { radii, colors, .. } = attributes(1000);
-    let cloud = PointCloud::builder([&x[..], &y, &z])
+    let cloud = PointCloud::builder(&points)
         .radii(&radii)
         .colors(&colors)
         .build()
         .expect("valid");
-    let pointers = cloud.coordinates().map(<[f32]>::as_ptr);
-    assert_eq!(pointers, [x.as_ptr(), y.as_ptr(), z.as_ptr()]);
+    assert_eq!(cloud.points().as_ptr(), points.as_ptr());
     assert!(matches!(cloud.radii(), Radii::PerPoint(r) if r.as_ptr() == radii.as_ptr()));
     assert_eq!(cloud.colors().map(<[_]>::as_ptr), Some(colors.as_ptr()));
     assert_bounds(&cloud);
@@ -185,21 +178,15 @@ fn lengths_must_agree() {
     assert_eq!(error, mismatch("normals", 2));
     let error = error_of(&points, |b| b.radius(1.0).colors(vec![[0; 4]; 4]));
     assert_eq!(error, mismatch("colors", 4));
-    let (three, two) = ([0.0; 3], [0.0; 2]);
-    for (y, z, name) in [(&two[..], &three[..], "y"), (&three, &two, "z")] {
-        let soa = PointCloud::builder([&three[..], y, z]).radius(1.0).build();
-        assert_eq!(soa.err(), Some(mismatch(name, 2)));
-    }
 }
 
 #[test]
 fn too_many_points_are_refused_unread() {
     // Zeroed memory that is never touched.
     let limit = u32::MAX as usize / 64;
-    let zeros = vec![0.0f32; limit + 1];
-    let error = PointCloud::builder([&zeros[..], &zeros, &zeros])
-        .radius(1.0)
-        .build();
+    let zeros = vec![[0.0f32; 3]; limit + 1];
+    let points: &[Vec3] = bytemuck::cast_slice(&zeros);
+    let error = PointCloud::builder(points).radius(1.0).build();
     let count = limit + 1;
     assert_eq!(
         error.err(),

@@ -27,7 +27,7 @@ fn new_points_replace_the_old_ones() {
     let mut moved = random_points(&mut rng, 1000);
     let reversed: Vec<Vec3> = normals.iter().map(|n| *n * -2.0).collect();
     cloud.set_points(&moved, Some(&reversed)).expect("valid");
-    assert!(cloud.points().eq(moved.iter().copied()));
+    assert_eq!(cloud.points(), moved);
     let flipped = cloud.normals().expect("given").iter().zip(&normals);
     assert!(flipped.into_iter().all(|(a, b)| (*a + *b).length() < 1e-6));
     assert!(cloud.normals_oriented());
@@ -52,7 +52,7 @@ fn new_points_replace_the_old_ones() {
     for count in [1, 300, 5000] {
         let points = random_points(&mut rng, count);
         cloud.set_points(&points, None).expect("valid");
-        assert!(cloud.points().eq(points.iter().copied()));
+        assert_eq!(cloud.points(), points);
         assert_eq!((cloud.dropped(), cloud.colors()), (0, None));
         assert_bounds(&cloud);
     }
@@ -110,7 +110,7 @@ fn radii_for_each_point_follow_points_that_move() {
         assert_eq!(state(&cloud), before);
         cloud.set_radii(Radii::Global(0.25)).expect("valid");
         cloud.set_points(&moved[..599], None).expect("valid");
-        assert!(cloud.points().eq(moved[..599].iter().copied()));
+        assert_eq!(cloud.points(), &moved[..599]);
         assert_eq!((cloud.order(), cloud.max_radius()), (None, 0.25));
     }
 }
@@ -126,7 +126,7 @@ fn a_spatial_order_ends_with_dropped_points() {
     let normals: Vec<Vec3> = (0..600).map(normal_of).collect();
     cloud.set_points(&points, Some(&normals)).expect("valid");
     points.remove(100);
-    assert!(cloud.points().eq(points.iter().copied()), "as given");
+    assert_eq!(cloud.points(), points, "as given");
     assert_eq!(cloud.normals().expect("given")[100], normal_of(101));
     assert_eq!(cloud.order(), None);
 }

@@ -54,8 +54,8 @@ fn within(balls: &[PointCloud<'static>; 2], offset: Vec3, beyond: f32) -> usize 
         q.length() - bumpy(direction).length() < beyond
     };
     let [a, b] = [0, 1].map(|side| balls[side].points());
-    let of_a = a.map(|p| p - offset).filter(is_within).count();
-    of_a + b.map(|p| p + offset).filter(is_within).count()
+    let of_a = a.iter().map(|&p| p - offset).filter(is_within).count();
+    of_a + b.iter().map(|&p| p + offset).filter(is_within).count()
 }
 
 /// What is deep by many pixels is settled by large ones and three windows: no fine look, and no more than a tenth of

@@ -126,7 +126,13 @@ impl DepthSimulation {
                     RigidBodyBuilder::dynamic().pose(pose).angular_damping(1.0),
                     tldi.collider(named.cloud.clone()).density(DENSITY),
                 );
-                let radius = named.cloud.points().map(Vec3::length).fold(0.0, f32::max);
+                let radius = named
+                    .cloud
+                    .points()
+                    .iter()
+                    .copied()
+                    .map(Vec3::length)
+                    .fold(0.0, f32::max);
                 let below = height_below(&seen, pose.translation, radius, scene.up);
                 Body {
                     named,

@@ -222,11 +222,11 @@ impl GallopSimulation {
                 (self.true_depths).count(kind, TrueDepth { told, truth, step });
             }
         };
-        let points = runner_cloud.points().map(|p| *runner_pose * p);
+        let points = runner_cloud.points().iter().map(|&p| *runner_pose * p);
         let truth = below_ground(&self.scene.ground, time, points);
         compare([runner, ground], truth, Kind::Scripted);
         for (body, pose) in self.bodies.iter().zip(body_poses) {
-            let points = body.cloud.points().map(|p| *pose * p);
+            let points = body.cloud.points().iter().map(|&p| *pose * p);
             let truth = below_ground(&self.scene.ground, time, points);
             compare([body.collider, ground], truth, Kind::Resting);
             let reach = body.cloud.bounds().extents().length();

@@ -90,7 +90,7 @@ impl TrueBody {
         body_from_cloud: &Pose3,
         reach: f32,
     ) -> f32 {
-        (cloud.points().map(|p| *body_from_cloud * p))
+        (cloud.points().iter().map(|&p| *body_from_cloud * p))
             .filter(|p| p.length() < reach)
             .map(|p| -self.scale * self.distance(p / self.scale + self.center))
             .fold(f32::NEG_INFINITY, f32::max)

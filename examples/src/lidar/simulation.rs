@@ -173,7 +173,8 @@ impl LidarSimulation {
         let heights = named
             .cloud
             .points()
-            .map(|p| (*body.position() * p).dot(self.scene.up));
+            .iter()
+            .map(|&p| (*body.position() * p).dot(self.scene.up));
         let height = heights.fold(f32::MAX, f32::min) - spot.surface.dot(self.scene.up);
         LidarBodyReport {
             name: named.name.clone(),

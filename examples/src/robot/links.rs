@@ -100,7 +100,7 @@ pub(super) fn silent_pairs(
                 neighbor.distance() < reach || (p - b.cloud.point(k)).dot(normal) < 0.0
             })
         };
-        a.cloud.points().any(near)
+        a.cloud.points().iter().copied().any(near)
     };
     let mut pairs = Vec::new();
     for i in 0..clouds.len() {

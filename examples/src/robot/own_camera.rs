@@ -27,10 +27,10 @@ impl OwnCamera {
         links: &[LinkCloud],
         world_from_link: &[Pose3],
     ) -> Vec<Vec3> {
-        let mut frame: Vec<Vec3> = scan.points().collect();
+        let mut frame: Vec<Vec3> = scan.points().to_vec();
         for link in links {
             let pose = world_from_link[link.link];
-            frame.extend(link.cloud.points().map(|p| pose * p + self.error()));
+            frame.extend(link.cloud.points().iter().map(|&p| pose * p + self.error()));
         }
         frame
     }

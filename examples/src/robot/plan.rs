@@ -70,7 +70,7 @@ impl Build {
             (clouds
                 .iter()
                 .filter(|link| is_meant(kinematics.group(link.link))))
-            .flat_map(|link| link.cloud.points().map(|p| poses[link.link] * p))
+            .flat_map(|link| link.cloud.points().iter().map(|&p| poses[link.link] * p))
             .collect()
         };
         let lowest = |points: &[Vec3]| points.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
@@ -122,7 +122,8 @@ fn tip_of(kinematics: &Kinematics, clouds: &[LinkCloud]) -> Option<Tip> {
         .map(|link| (link, driven(link.link)))
         .max_by_key(|(link, chain)| (chain.len(), std::cmp::Reverse(link.link)))?;
     let first = *chain.first()?;
-    let point = (link.cloud.points()).max_by(|a, b| a.length().total_cmp(&b.length()))?;
+    let point =
+        (link.cloud.points().iter().copied()).max_by(|a, b| a.length().total_cmp(&b.length()))?;
     let chain = kinematics.chain(link.link);
     let beyond = chain.iter().skip_while(|k| **k != first).skip(1);
     let reach: f32 = beyond
@@ -254,7 +255,7 @@ pub(super) fn plan_motion(
 
 /// Points of the scan in front of the robot and in reach, in the frame of the root.
 fn touchable(scan: &PointCloud<'_>, root_from_scan: &Pose3, tip: &Tip, seed: u64) -> Vec<Vec3> {
-    let mut points: Vec<Vec3> = (scan.points().map(|p| *root_from_scan * p))
+    let mut points: Vec<Vec3> = (scan.points().iter().map(|&p| *root_from_scan * p))
         .filter(|p| {
             let distance = (*p - tip.shoulder * Vec3::Z).length() / tip.reach;
             (0.4..0.75).contains(&distance) && p.x > 0.3 * tip.reach

@@ -134,7 +134,7 @@ impl RobotSimulation {
             facing: scene.facing,
             seed,
         };
-        let points: Vec<Vec3> = scene.scan.points().collect();
+        let points: Vec<Vec3> = scene.scan.points().to_vec();
         let obstacles = SelfFilter::new(&clouds, if build.is_fixed { CLEARANCE } else { 0.0 });
         let placement = place(&scene.scan, up, &site, scene.at, |scan_from_root| {
             let poses: Vec<Pose3> = root_from_link
@@ -181,7 +181,7 @@ impl RobotSimulation {
         tldi.attach(&mut world);
         let scan_shape = if scene.own_camera {
             // Every frame has other points: one radius for all, and normals found on the way.
-            let bare = PointCloud::builder(scan.points().collect::<Vec<_>>());
+            let bare = PointCloud::builder(scan.points().to_vec());
             bare.radius(scan_radius).build()?.into_owned()
         } else {
             scan.clone()
@@ -429,7 +429,7 @@ impl RobotSimulation {
 
     /// Whether a robot that is not fixed is still on the scan: not below its lowest point.
     pub fn is_on_scan(&self) -> bool {
-        let lowest = (self.scan.points().map(|p| p.dot(self.up))).fold(f32::MAX, f32::min);
+        let lowest = (self.scan.points().iter().map(|&p| p.dot(self.up))).fold(f32::MAX, f32::min);
         self.root().translation.dot(self.up) >= lowest - 0.1
     }
 }

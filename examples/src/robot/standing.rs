@@ -87,7 +87,7 @@ impl Standing {
         weight: f32,
     ) -> Self {
         let lowest = |(cloud, pose): (&LinkCloud, &Pose3)| {
-            let heights = cloud.cloud.points().map(|p| (*pose * p).z);
+            let heights = cloud.cloud.points().iter().map(|&p| (*pose * p).z);
             heights.fold(f32::MAX, f32::min)
         };
         let heights: Vec<f32> = clouds.iter().zip(links).map(lowest).collect();
@@ -138,7 +138,7 @@ impl Standing {
             let bounds = link.cloud.bounds();
             let reach = 0.5 * bounds.extents().length();
             let is_near = self.terrain.distance(*pose * bounds.center()) < reach;
-            let deepest = (link.cloud.points().filter(|_| is_near))
+            let deepest = (link.cloud.points().iter().copied().filter(|_| is_near))
                 .map(|p| -self.terrain.distance(*pose * p))
                 .fold(0.0, f32::max);
             let worst = if *is_foot {

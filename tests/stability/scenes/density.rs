@@ -144,7 +144,13 @@ fn local_radius(floor: &Surface, at: Vec3) -> Result<f32, Stop> {
     };
     let near = |p: &Vec3| (*p - at).with_y(0.0).length() < 2.0 * COARSE;
     let (mut sum, mut count) = (0.0, 0);
-    for (i, _) in cloud.points().enumerate().filter(|(_, p)| near(p)) {
+    for (i, _) in cloud
+        .points()
+        .iter()
+        .copied()
+        .enumerate()
+        .filter(|(_, p)| near(p))
+    {
         sum += cloud.radius(i);
         count += 1;
     }

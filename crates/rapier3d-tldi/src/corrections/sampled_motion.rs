@@ -135,13 +135,8 @@ pub(crate) fn way_along(
         normal,
         radius: AROUND * radius,
     };
-    let [x, y, z] = cloud.coordinates();
-    let now = probe.around(
-        cloud.blocks(),
-        |i| Vector::new(x[i], y[i], z[i]),
-        cloud.len(),
-        AROUND * radius,
-    );
+    let points = cloud.points();
+    let now = probe.around(cloud.blocks(), |i| points[i], cloud.len(), AROUND * radius);
     let of = |old: &Snapshot, steps: f32| {
         let reach = (AROUND + steps * FARTHEST) * radius;
         probe.around(&old.blocks, |i| old.points[i], old.points.len(), reach)

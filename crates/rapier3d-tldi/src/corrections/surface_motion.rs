@@ -221,7 +221,7 @@ impl SurfaceMotions {
 /// is within two radii.
 fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector {
     let reach = 2.0 * cloud.mean_radius();
-    let [x, y, z] = cloud.coordinates();
+    let points = cloud.points();
     let (mut sum, mut total) = (Vector::ZERO, 0.0);
     let mut nearest = (f32::INFINITY, Vector::ZERO);
     for (block, bounds) in cloud.blocks().iter().enumerate() {
@@ -231,7 +231,7 @@ fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector
         }
         let first = block * tldi::BLOCK;
         for i in first..(first + tldi::BLOCK).min(values.len()) {
-            let squared = Vector::new(x[i], y[i], z[i]).distance_squared(point);
+            let squared = points[i].distance_squared(point);
             if squared < nearest.0 {
                 nearest = (squared, values[i]);
             }

@@ -325,6 +325,8 @@ impl PointCloudShape {
             let cloud = self.cloud();
             let leaves: Vec<Aabb> = cloud
                 .points()
+                .iter()
+                .copied()
                 .enumerate()
                 .map(|(i, p)| Aabb::from_half_extents(p, Vec3::splat(cloud.radius(i))))
                 .collect();
@@ -349,7 +351,7 @@ impl PointCloudShape {
         let cloud = self.cloud();
         cloud.normals().unwrap_or_else(|| {
             self.content.fitted_normals.get_or_init(|| {
-                let points: Vec<Vec3> = cloud.points().collect();
+                let points: Vec<Vec3> = cloud.points().to_vec();
                 let with_normals = PointCloud::builder(points)
                     .radius(cloud.max_radius())
                     .pca_normals(PCA_NEIGHBORS)
@@ -388,7 +390,7 @@ impl Shape for PointCloudShape {
         }
         let cloud = self.cloud();
         let largest = scale.abs().max_element();
-        let points: Vec<Vec3> = cloud.points().map(|p| p * scale).collect();
+        let points: Vec<Vec3> = cloud.points().iter().map(|&p| p * scale).collect();
         let mut builder = PointCloud::builder(points)
             .noise(cloud.noise() * largest)
             .non_finite(NonFinite::Refuse);

@@ -236,7 +236,12 @@ fn points_are_on_the_surface_even_and_close_it() {
                 (cloud.mean_radius(), cloud.max_radius()),
                 (spacing, spacing)
             );
-            for (p, n) in cloud.points().zip(cloud.normals().expect(name)) {
+            for (p, n) in cloud
+                .points()
+                .iter()
+                .copied()
+                .zip(cloud.normals().expect(name))
+            {
                 let distance = (case.distance)(p);
                 assert!(distance.abs() < ROUNDING, "{name}: {distance} at {p}");
                 // Outward: so far out, so far from the surface, up to the rim of an edge; in the seams
@@ -288,7 +293,12 @@ fn meshes_are_sampled_on_their_outside() {
     for faces in [faces, turned, holed] {
         let mesh = TriMesh::new(vertices.clone(), faces).expect("a mesh");
         let cloud = sample_shape(&mesh, SPACING).expect("a torus");
-        for (p, n) in cloud.points().zip(cloud.normals().expect("given")) {
+        for (p, n) in cloud
+            .points()
+            .iter()
+            .copied()
+            .zip(cloud.normals().expect("given"))
+        {
             let middle = large * Vector::new(p.x, 0.0, p.z).normalize();
             let from_middle = p - middle;
             let depth = small - from_middle.length();
@@ -340,7 +350,7 @@ fn small_shapes_have_a_point_and_equal_shapes_equal_ones() {
     let ball = SharedShape::ball(0.1);
     let sample = |spacing| sample_shape(&*ball, spacing).expect("a ball");
     assert!((1..5).contains(&sample(10.0).len()));
-    assert!(sample(0.01).points().eq(sample(0.01).points()));
+    assert_eq!(sample(0.01).points(), sample(0.01).points());
 }
 
 #[test]

@@ -197,6 +197,8 @@ fn projections_without_normals_go_to_the_nearest_point() {
         let nearest = shape
             .cloud()
             .points()
+            .iter()
+            .copied()
             .min_by(|a, b| {
                 a.distance_squared(point)
                     .total_cmp(&b.distance_squared(point))
@@ -230,7 +232,7 @@ fn moved_points_move_everything_but_the_mass_and_leave_clones_alone() {
     assert!((shape.cast_local_ray(&ray, 10.0, true).unwrap() - 4.0).abs() < 0.01);
 
     let radii: Vec<f32> = (0..2000).map(|i| shape.cloud().radius(i)).collect();
-    let doubled: Vec<Vec3> = shape.cloud().points().map(|p| 2.0 * p).collect();
+    let doubled: Vec<Vec3> = shape.cloud().points().iter().map(|&p| 2.0 * p).collect();
     let normals = shape.cloud().normals().unwrap().to_vec();
     shape.move_points(&doubled, Some(&normals)).unwrap();
     assert_ne!(shape.revision(), clone.revision());
@@ -285,7 +287,7 @@ fn scaling_keeps_the_cover_and_the_outside() {
         assert!(scaled.cloud().normals().unwrap()[i].distance(normal) < 1e-5);
     }
     assert!(scaled.cloud().normals_oriented());
-    let points: Vec<Vec3> = shape.cloud().points().collect();
+    let points: Vec<Vec3> = shape.cloud().points().to_vec();
     let noisy = PointCloud::builder(points).radius(0.1).noise(0.01);
     let noisy = PointCloudShape::new(noisy.build().unwrap());
     let scaled = noisy.scale_dyn(scale, 0).unwrap();
@@ -297,7 +299,7 @@ fn scaling_keeps_the_cover_and_the_outside() {
     let doubled = doubled.unwrap();
     let doubled = doubled.as_shape::<PointCloudShape>().unwrap();
     assert_eq!(doubled.cloud().max_radius(), 0.16);
-    let unoriented = PointCloud::builder(sphere(500, false).points().collect::<Vec<_>>())
+    let unoriented = PointCloud::builder(sphere(500, false).points().to_vec())
         .radius(0.2)
         .pca_normals(8)
         .build()

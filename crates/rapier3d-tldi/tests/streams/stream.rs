@@ -53,7 +53,12 @@ fn every_frame_is_made_as_it_was_asked_for() -> TestResult {
         );
         let cloud = cloud_of(&world, &stream);
         // Coordinates of up to 13 m, there and back, in f32.
-        let off = cloud.points().zip(&in_world).map(|(p, q)| p.distance(*q));
+        let off = cloud
+            .points()
+            .iter()
+            .copied()
+            .zip(&in_world)
+            .map(|(p, q)| p.distance(*q));
         assert!(off.fold(0.0, f32::max) < 1e-5, "{frame}");
         let middle = (n / 2 * n + n / 2) as usize;
         assert!(
@@ -273,7 +278,7 @@ fn radii_may_come_with_a_frame() -> TestResult {
     assert!(taken.own > 0 && taken.dropped == 1);
     let cloud = cloud_of(&world, &stream);
     assert!(cloud.normals().is_some());
-    for (i, point) in cloud.points().enumerate() {
+    for (i, point) in cloud.points().iter().copied().enumerate() {
         let given = points
             .iter()
             .position(|p| *p == point)

@@ -353,8 +353,11 @@ mod tests {
         };
         let mut backend = WgpuBackend::new(gpu.clone()).expect("the stages fit");
         let (small, large) = (sheet(40), sheet(80));
-        let [x, y, z] = large.coordinates();
-        let points: Vec<[f32; 4]> = (0..large.len()).map(|i| [x[i], y[i], z[i], R]).collect();
+        let points: Vec<[f32; 4]> = large
+            .points()
+            .iter()
+            .map(|p| p.extend(R).to_array())
+            .collect();
         let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let bytes: &[u8] = bytemuck::cast_slice(&points);
         let buffer = crate::buffers::create(&gpu, "points", usage, bytes.len() as u64);

@@ -1,14 +1,14 @@
 //! Builds and validates clouds.
 
 use crate::cloud::checks::{check_count, check_dropped, check_length};
-use crate::cloud::gather::{block_bounds, merged, without};
+use crate::cloud::gather::{bounds_of_blocks, merged, non_finite_indices, without};
 use crate::cloud::morton::{morton_order, permuted};
 use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_cloud::{Spare, next_content_id};
 use crate::cloud::point_normals::{fill_from_nearest, normalize, turn_towards};
 use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
 use crate::stage::stage;
-use crate::{CloudError, CloudRecipe, NonFinite, PointCloud, Positions, Radii, RadiusRule};
+use crate::{Aabb, CloudError, CloudRecipe, NonFinite, PointCloud, Radii, RadiusRule};
 use glamx::Vec3;
 use std::borrow::Cow;
 
@@ -44,7 +44,7 @@ struct GivenNormals<'a> {
 /// ```
 #[derive(Clone, Debug)]
 pub struct CloudBuilder<'a> {
-    positions: Positions<'a>,
+    points: Cow<'a, [Vec3]>,
     recipe: CloudRecipe,
     radii: Option<Cow<'a, [f32]>>,
     normals: Option<GivenNormals<'a>>,
@@ -53,17 +53,17 @@ pub struct CloudBuilder<'a> {
 }
 
 impl<'a> PointCloud<'a> {
-    /// Starts a builder over `points`: a slice or vector of vectors (transposed in the pass that
-    /// validates), or [`Positions::Soa`] slices, which are borrowed.
-    pub fn builder(points: impl Into<Positions<'a>>) -> CloudBuilder<'a> {
+    /// Starts a builder over `points`, metres, borrowed or owned. They are not copied, unless some are dropped or
+    /// reordered.
+    pub fn builder(points: impl Into<Cow<'a, [Vec3]>>) -> CloudBuilder<'a> {
         CloudBuilder::new(points.into())
     }
 }
 
 impl<'a> CloudBuilder<'a> {
-    fn new(positions: Positions<'a>) -> Self {
+    fn new(points: Cow<'a, [Vec3]>) -> Self {
         Self {
-            positions,
+            points,
             recipe: CloudRecipe::default(),
             radii: None,
             normals: None,
@@ -213,7 +213,9 @@ impl<'a> CloudBuilder<'a> {
         let _stage = stage!("points");
         self.recipe.check()?;
         let count = self.check_lengths()?;
-        let (mut coordinates, mut blocks, dropped) = self.positions.gather();
+        let mut points = self.points;
+        let mut blocks: Vec<Aabb> = bounds_of_blocks(&points).collect();
+        let dropped: Vec<u32> = non_finite_indices(&points, &blocks).collect();
         let recipe = self.recipe;
         check_dropped(recipe.non_finite, count, &dropped)?;
         let mut radii = self.radii;
@@ -221,6 +223,8 @@ impl<'a> CloudBuilder<'a> {
         let mut normals = self.normals.map(|given| given.normals);
         let mut colors = self.colors;
         if !dropped.is_empty() {
+            points = Cow::Owned(without(&points, &dropped));
+            blocks = bounds_of_blocks(&points).collect();
             radii = radii.map(|r| Cow::Owned(without(&r, &dropped)));
             normals = normals.map(|n| Cow::Owned(without(&n, &dropped)));
             colors = colors.map(|c| Cow::Owned(without(&c, &dropped)));
@@ -228,17 +232,16 @@ impl<'a> CloudBuilder<'a> {
 
         let mut order = None;
         if self.spatial_order {
-            let curve = morton_order(coordinates.each_ref().map(|c| &**c), merged(&blocks));
-            coordinates = coordinates.map(|c| Cow::Owned(permuted(&c, &curve)));
+            let curve = morton_order(&points, merged(&blocks));
+            points = Cow::Owned(permuted(&points, &curve));
             radii = radii.map(|r| Cow::Owned(permuted(&r, &curve)));
             normals = normals.map(|n| Cow::Owned(permuted(&n, &curve)));
             colors = colors.map(|c| Cow::Owned(permuted(&c, &curve)));
-            blocks = block_bounds(coordinates.each_ref().map(|c| &**c));
+            blocks = bounds_of_blocks(&points).collect();
             order = Some(curve);
         }
 
         let bounds = merged(&blocks);
-        let axes = coordinates.each_ref().map(|c| &**c);
         let given_index = |i: usize| {
             let kept = order
                 .as_ref()
@@ -251,32 +254,29 @@ impl<'a> CloudBuilder<'a> {
             normals: recipe.pca_neighbors.filter(|_| normals.is_none()),
             viewpoint: recipe.viewpoint,
         }
-        .of(axes)?;
+        .of(&points)?;
         let radii = match (radii, recipe.radii) {
             (Some(given), _) => Radii::PerPoint(given),
             (None, RadiusRule::Global(radius)) => Radii::Global(radius),
             (None, RadiusRule::NearestNeighbors { .. }) => Radii::PerPoint(found.radii.into()),
         };
         check_radii(&radii, given_index)?;
-        check_coordinates(axes, bounds, &radii, given_index)?;
+        check_coordinates(&points, bounds, &radii, given_index)?;
 
         let normals_given = normals.is_some();
         let normals = match (normals, recipe.viewpoint) {
             (Some(given), Some(viewpoint)) if !outward => {
-                let mut normals = usable_normals(given, axes)?.into_owned();
-                turn_towards(viewpoint, axes, &mut normals);
+                let mut normals = usable_normals(given, &points)?.into_owned();
+                turn_towards(viewpoint, &points, &mut normals);
                 Some(Cow::Owned(normals))
             }
-            (Some(given), _) => Some(usable_normals(given, axes)?),
+            (Some(given), _) => Some(usable_normals(given, &points)?),
             (None, _) => recipe.pca_neighbors.map(|_| Cow::Owned(found.normals)),
         };
 
         let (mean_radius, max_radius) = mean_and_max(&radii);
-        let [x, y, z] = coordinates;
         Ok(PointCloud {
-            x,
-            y,
-            z,
+            points,
             radii,
             radii_given,
             normals_oriented: normals.is_some() && (outward || recipe.viewpoint.is_some()),
@@ -297,13 +297,8 @@ impl<'a> CloudBuilder<'a> {
 
     /// Number of points given, if it is within the limit and all attributes have as many entries.
     fn check_lengths(&self) -> Result<usize, CloudError> {
-        let (count, [y, z]) = match &self.positions {
-            Positions::Vectors(points) => (points.len(), [points.len(); 2]),
-            Positions::Soa { x, y, z } => (x.len(), [y.len(), z.len()]),
-        };
+        let count = self.points.len();
         check_count(count)?;
-        check_length("y", y, count)?;
-        check_length("z", z, count)?;
         if let Some(radii) = &self.radii {
             check_length("radii", radii.len(), count)?;
         }
@@ -320,14 +315,14 @@ impl<'a> CloudBuilder<'a> {
 /// The given normals, normalised and completed; borrowed if nothing had to be done.
 fn usable_normals<'a>(
     given: Cow<'a, [Vec3]>,
-    coordinates: [&[f32]; 3],
+    points: &[Vec3],
 ) -> Result<Cow<'a, [Vec3]>, CloudError> {
     if given.iter().all(|n| n.is_normalized()) {
         return Ok(given);
     }
     let mut normals = given.into_owned();
     if !normalize(&mut normals) {
-        fill_from_nearest(&mut normals, coordinates)?;
+        fill_from_nearest(&mut normals, points)?;
     }
     Ok(Cow::Owned(normals))
 }

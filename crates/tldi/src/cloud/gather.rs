@@ -1,4 +1,4 @@
-//! The one pass over raw points: finiteness, transposition to structure of arrays, block bounds.
+//! The one pass over raw points: whether they are finite, and the bounds of their blocks.
 
 use crate::Aabb;
 use glamx::Vec3;
@@ -7,13 +7,11 @@ use multiversion::multiversion;
 /// Points per block: [`PointCloud::blocks`](crate::PointCloud::blocks) bounds that many consecutive points each.
 pub const BLOCK: usize = 256;
 
-/// Finite points as structure of arrays, with what was learnt while reading them. All buffers keep
-/// their memory from one [`Gathered::refill`] to the next.
+/// Copies of finite points, with what was learnt while reading them. All buffers keep their memory from one
+/// [`Gathered::refill`] to the next.
 #[derive(Debug, Default)]
 pub(crate) struct Gathered {
-    pub(crate) x: Vec<f32>,
-    pub(crate) y: Vec<f32>,
-    pub(crate) z: Vec<f32>,
+    pub(crate) points: Vec<Vec3>,
     /// Bounds of each run of [`BLOCK`] points.
     pub(crate) blocks: Vec<Aabb>,
     /// Indices, among the points given, of those left out because they are not finite; ascending.
@@ -24,125 +22,102 @@ impl Gathered {
     /// Replaces the content by `points`, in the order of their indices `order` where that is given,
     /// leaving out the non-finite ones.
     pub(crate) fn refill(&mut self, points: &[Vec3], order: Option<&[u32]>) {
-        let count = order.map_or(points.len(), <[u32]>::len);
-        for axis in [&mut self.x, &mut self.y, &mut self.z] {
-            axis.resize(count, 0.0);
-        }
-        // Block by block, so that the points are still in the core's cache when its bounds are
-        // taken.
-        let (x, y, z) = (&mut self.x, &mut self.y, &mut self.z);
-        let blocks = x
-            .chunks_mut(BLOCK)
-            .zip(y.chunks_mut(BLOCK))
-            .zip(z.chunks_mut(BLOCK));
+        self.points.clear();
         self.blocks.clear();
-        self.blocks
-            .extend(blocks.enumerate().map(|(k, ((x, y), z))| {
-                let range = k * BLOCK..k * BLOCK + x.len();
-                match order {
-                    Some(order) => {
-                        let slots = x.iter_mut().zip(&mut *y).zip(&mut *z);
-                        for (((x, y), z), &i) in slots.zip(&order[range]) {
-                            (*x, *y, *z) = points[i as usize].into();
-                        }
-                    }
-                    None => transpose(&points[range], [&mut *x, &mut *y, &mut *z]),
-                }
-                bounds_of([x, y, z])
-            }));
         self.dropped.clear();
-        let is_finite = |block: &Aabb| block.min.is_finite() && block.max.is_finite();
-        if !self.blocks.iter().all(is_finite) {
-            extend_non_finite([&self.x, &self.y, &self.z], &mut self.dropped);
-            for axis in [&mut self.x, &mut self.y, &mut self.z] {
-                remove(axis, &self.dropped);
+        match order {
+            Some(order) => {
+                let ordered = order.iter().map(|&i| points[i as usize]);
+                self.points.extend(ordered);
+                self.blocks.extend(bounds_of_blocks(&self.points));
             }
+            // Block by block, so that the points are still in the core's cache when they are copied.
+            None => {
+                self.points.reserve(points.len());
+                for block in points.chunks(BLOCK) {
+                    self.blocks.push(bounds_of(block));
+                    self.points.extend_from_slice(block);
+                }
+            }
+        }
+        if !are_finite(&self.blocks) {
+            self.dropped
+                .extend(non_finite_indices(&self.points, &self.blocks));
+            self.points.retain(|point| point.is_finite());
             self.blocks.clear();
-            self.blocks
-                .extend(bounds_of_blocks([&self.x, &self.y, &self.z]));
+            self.blocks.extend(bounds_of_blocks(&self.points));
         }
     }
 }
 
-#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
-fn transpose(points: &[Vec3], [x, y, z]: [&mut [f32]; 3]) {
-    let n = points.len();
-    let (x, y, z) = (&mut x[..n], &mut y[..n], &mut z[..n]);
-    for (i, point) in points.iter().enumerate() {
-        x[i] = point.x;
-        y[i] = point.y;
-        z[i] = point.z;
-    }
+/// Whether all points of some blocks are finite.
+fn are_finite(blocks: &[Aabb]) -> bool {
+    blocks.iter().all(is_finite)
 }
 
-/// Indices of the points with a non-finite coordinate, ascending.
-pub(crate) fn non_finite_indices(coordinates: [&[f32]; 3]) -> Vec<u32> {
-    let mut found = Vec::new();
-    extend_non_finite(coordinates, &mut found);
-    found
+fn is_finite(block: &Aabb) -> bool {
+    block.min.is_finite() && block.max.is_finite()
 }
 
-fn extend_non_finite(coordinates: [&[f32]; 3], found: &mut Vec<u32>) {
-    let [x, y, z] = coordinates;
-    for start in (0..x.len()).step_by(BLOCK) {
-        let end = x.len().min(start + BLOCK);
-        if coordinates.iter().all(|axis| all_finite(&axis[start..end])) {
-            continue;
-        }
-        let bad = |&i: &usize| !(x[i].is_finite() && y[i].is_finite() && z[i].is_finite());
-        found.extend((start..end).filter(bad).map(|i| i as u32));
-    }
+/// Indices of the points with a non-finite coordinate, ascending. `blocks` are their bounds.
+pub(crate) fn non_finite_indices<'a>(
+    points: &'a [Vec3],
+    blocks: &'a [Aabb],
+) -> impl Iterator<Item = u32> + 'a {
+    let bad_blocks = points.chunks(BLOCK).zip(blocks).enumerate();
+    let bad_blocks = bad_blocks.filter(|(_, (_, bounds))| !is_finite(bounds));
+    bad_blocks.flat_map(|(block, (points, _))| {
+        let indices = (BLOCK as u32 * block as u32..).zip(points);
+        let bad_points = indices.filter(|(_, point)| !point.is_finite());
+        bad_points.map(|(index, _)| index)
+    })
 }
 
-/// Bounds of each run of [`BLOCK`] points.
-pub(crate) fn block_bounds(coordinates: [&[f32]; 3]) -> Vec<Aabb> {
-    bounds_of_blocks(coordinates).collect()
+/// Bounds of each run of [`BLOCK`] points; not finite where one of them is not.
+pub(crate) fn bounds_of_blocks(points: &[Vec3]) -> impl Iterator<Item = Aabb> + '_ {
+    points.chunks(BLOCK).map(bounds_of)
 }
 
-fn bounds_of_blocks<'a>(coordinates: [&'a [f32]; 3]) -> impl Iterator<Item = Aabb> + 'a {
-    let [x, y, z] = coordinates.map(|axis| axis.chunks(BLOCK));
-    x.zip(y).zip(z).map(|((x, y), z)| bounds_of([x, y, z]))
-}
+/// Points whose coordinates are compared at once.
+const LANES: usize = 3 * 16;
 
 /// Bounds of points; not finite where one of them is not.
-fn bounds_of(coordinates: [&[f32]; 3]) -> Aabb {
-    let [x, y, z] = coordinates.map(total_min_max);
-    Aabb {
-        min: Vec3::new(x.0, y.0, z.0),
-        max: Vec3::new(x.1, y.1, z.1),
-    }
-}
-
-/// Least and greatest value in the total order of `f32`, where −NaN < −∞ and ∞ < NaN. Compared as
-/// integers: folds of integers are vectorised, folds of floats, which must not be reordered, not.
-#[multiversion(targets("x86_64+avx2", "aarch64+neon"))]
-fn total_min_max(values: &[f32]) -> (f32, f32) {
+///
+/// Coordinates are compared as integers in the total order of `f32`, where −NaN < −∞ and ∞ < NaN: folds of integers are
+/// vectorised, folds of floats, which must not be reordered, not. Every third lane holds the same axis.
+#[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+fn bounds_of(points: &[Vec3]) -> Aabb {
     // Flips the magnitude of negative values, as `f32::total_cmp` does; its own inverse.
     let key = |bits: i32| bits ^ ((bits >> 31) & i32::MAX);
-    let (mut least, mut greatest) = (i32::MAX, i32::MIN);
-    for value in values {
-        let key = key(value.to_bits() as i32);
-        least = least.min(key);
-        greatest = greatest.max(key);
+    let (mut least, mut greatest) = ([i32::MAX; LANES], [i32::MIN; LANES]);
+    let coordinates: &[f32] = bytemuck::cast_slice(points);
+    let (chunks, rest) = coordinates.as_chunks::<LANES>();
+    for chunk in chunks {
+        for l in 0..LANES {
+            let key = key(chunk[l].to_bits() as i32);
+            least[l] = least[l].min(key);
+            greatest[l] = greatest[l].max(key);
+        }
     }
-    let value = |bits: i32| f32::from_bits(key(bits) as u32);
-    (value(least), value(greatest))
-}
-
-/// Whether no value is NaN or infinite.
-fn all_finite(values: &[f32]) -> bool {
-    let (least, greatest) = total_min_max(values);
-    values.is_empty() || (least.is_finite() && greatest.is_finite())
-}
-
-/// Removes the entries at the ascending indices `dropped`.
-fn remove(values: &mut Vec<f32>, dropped: &[u32]) {
-    let mut dropped = dropped.iter().copied().peekable();
-    let mut i = 0;
-    values.retain(|_| {
-        i += 1;
-        dropped.next_if_eq(&(i - 1)).is_none()
-    });
+    for (l, value) in rest.iter().enumerate() {
+        let key = key(value.to_bits() as i32);
+        least[l] = least[l].min(key);
+        greatest[l] = greatest[l].max(key);
+    }
+    let mut lanes = LANES;
+    while lanes > 3 {
+        lanes /= 2;
+        for l in 0..lanes {
+            least[l] = least[l].min(least[l + lanes]);
+            greatest[l] = greatest[l].max(greatest[l + lanes]);
+        }
+    }
+    let value = |l: usize, keys: &[i32; LANES]| f32::from_bits(key(keys[l]) as u32);
+    let point = |keys| Vec3::new(value(0, keys), value(1, keys), value(2, keys));
+    Aabb {
+        min: point(&least),
+        max: point(&greatest),
+    }
 }
 
 /// `values` without the entries at the ascending indices `dropped`.

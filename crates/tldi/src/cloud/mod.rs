@@ -10,7 +10,6 @@ pub(crate) mod morton;
 pub(crate) mod neighborhoods;
 pub(crate) mod point_cloud;
 pub(crate) mod point_normals;
-pub(crate) mod positions;
 pub(crate) mod radii;
 pub(crate) mod reach;
 pub(crate) mod recipe;

@@ -9,16 +9,16 @@ const BITS: u32 = 21;
 
 /// The indices of the points in the order of a Morton curve through `bounds`; points of the same
 /// cell (2⁻²¹ of the longest edge) keep their order.
-pub(crate) fn morton_order(coordinates: [&[f32]; 3], bounds: Aabb) -> Vec<u32> {
-    let [x, y, z] = coordinates;
+pub(crate) fn morton_order(points: &[Vec3], bounds: Aabb) -> Vec<u32> {
     let origin = bounds.min.as_dvec3();
     let edge = (bounds.max.as_dvec3() - origin).max_element();
     let cells = f64::from((1u32 << BITS) - 1);
     let scale = if edge > 0.0 { cells / edge } else { 0.0 };
-    let mut keys: Vec<(u64, u32)> = (0..x.len())
-        .into_par_iter()
-        .map(|i| {
-            let cell = (Vec3::new(x[i], y[i], z[i]).as_dvec3() - origin) * scale;
+    let mut keys: Vec<(u64, u32)> = points
+        .par_iter()
+        .enumerate()
+        .map(|(i, point)| {
+            let cell = (point.as_dvec3() - origin) * scale;
             let code =
                 spread(cell.x as u64) << 2 | spread(cell.y as u64) << 1 | spread(cell.z as u64);
             (code, i as u32)

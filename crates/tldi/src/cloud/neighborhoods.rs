@@ -33,13 +33,13 @@ pub(crate) struct Found {
 
 impl Neighborhoods {
     /// Finds radii and normals of points in one search: see [`covering_radii`] and [`plane_normal`].
-    pub(crate) fn of(self, coordinates: [&[f32]; 3]) -> Result<Found, CloudError> {
+    pub(crate) fn of(self, points: &[Vec3]) -> Result<Found, CloudError> {
         let radius_neighbors = self.radii.map_or(0, |(k, _)| k);
         let most = radius_neighbors.max(self.normals.unwrap_or(0));
         if most == 0 {
             return Ok(Found::default());
         }
-        let tree = KdTree::from_coordinates(coordinates);
+        let tree = KdTree::from_points(points);
         let values = tree.map_positions(most, |tree, position, neighbors| {
             let radius_neighbors = &neighbors[..radius_neighbors.min(neighbors.len())];
             let normal = self.normals.map_or(Vec3::ZERO, |k| {
@@ -142,13 +142,13 @@ impl KdTree {
         let mut entries: Vec<usize> = (0..self.distinct()).collect();
         entries.sort_unstable_by_key(|&entry| self.points_at(entry)[0]);
         let mut stands_for = vec![usize::MAX; entries.len()];
-        let mut kept = [vec![], vec![], vec![]];
+        let mut kept = vec![];
         for entry in entries {
             if stands_for[entry] < usize::MAX {
                 continue;
             }
             let position = self.position(entry);
-            let point = kept[0].len();
+            let point = kept.len();
             let limit = twin_distance(position).powi(2);
             self.search(position, limit.sqrt() as f32, |twin, distance_squared| {
                 if distance_squared <= limit {
@@ -156,12 +156,9 @@ impl KdTree {
                 }
                 limit
             });
-            for (kept, coordinate) in kept.iter_mut().zip(position.to_array()) {
-                kept.push(coordinate);
-            }
+            kept.push(position);
         }
-        let [x, y, z] = &kept;
-        (Self::from_coordinates([x, y, z]), stands_for)
+        (Self::from_points(&kept), stands_for)
     }
 
     /// Hands each point the value of its position.

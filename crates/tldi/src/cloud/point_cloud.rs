@@ -14,8 +14,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Points of one body in its own frame, validated once, with what is derived from them.
 ///
-/// Coordinates are held as structure of arrays, owned or borrowed ([`Positions`](crate::Positions)). The balls of
-/// the radii around the points are meant to cover the surface that was sampled.
+/// Points are owned or borrowed, as they come. The balls of the radii around them are meant to cover the surface that
+/// was sampled.
 ///
 /// ```
 /// use tldi::{PointCloud, glamx::Vec3};
@@ -29,9 +29,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// ```
 #[derive(Clone, Debug)]
 pub struct PointCloud<'a> {
-    pub(crate) x: Cow<'a, [f32]>,
-    pub(crate) y: Cow<'a, [f32]>,
-    pub(crate) z: Cow<'a, [f32]>,
+    pub(crate) points: Cow<'a, [Vec3]>,
     pub(crate) radii: Radii<'a>,
     /// Whether the caller gave a radius for each point.
     pub(crate) radii_given: bool,
@@ -72,22 +70,17 @@ impl<'a> PointCloud<'a> {
         reason = "a cloud is never empty: the builder refuses"
     )]
     pub fn len(&self) -> usize {
-        self.x.len()
+        self.points.len()
     }
 
-    /// The coordinates in metres, in the cloud's own frame.
-    pub fn coordinates(&self) -> [&[f32]; 3] {
-        [&self.x, &self.y, &self.z]
+    /// All positions in metres, in the cloud's own frame.
+    pub fn points(&self) -> &[Vec3] {
+        &self.points
     }
 
     /// Position of one point in metres.
     pub fn point(&self, index: usize) -> Vec3 {
-        Vec3::new(self.x[index], self.y[index], self.z[index])
-    }
-
-    /// All positions, in order.
-    pub fn points(&self) -> impl ExactSizeIterator<Item = Vec3> + '_ {
-        (0..self.len()).map(|i| self.point(i))
+        self.points[index]
     }
 
     /// The radii in metres.
@@ -300,9 +293,9 @@ impl<'a> PointCloud<'a> {
             gathered.refill(points, None);
         }
         check_dropped(self.recipe.non_finite, points.len(), &gathered.dropped)?;
-        let same_points = points.len() == self.x.len() && gathered.dropped.is_empty();
+        let same_points = points.len() == self.points.len() && gathered.dropped.is_empty();
         let bounds = merged(&gathered.blocks);
-        let coordinates = [&*gathered.x, &*gathered.y, &*gathered.z];
+        let new_points = &gathered.points;
         let rule = match &self.radii {
             Radii::PerPoint(_) if same_points && (moved || self.radii_given) => None,
             Radii::PerPoint(radii) if self.radii_given => {
@@ -319,12 +312,12 @@ impl<'a> PointCloud<'a> {
             normals: self.recipe.pca_neighbors.filter(|_| normals.is_none()),
             viewpoint: self.recipe.viewpoint,
         }
-        .of(coordinates)?;
+        .of(new_points)?;
         let new_radii = rule.map(|_| Radii::PerPoint(found.radii.into()));
         let radii = new_radii.as_ref().unwrap_or(&self.radii);
         let given_index = |i: usize| order.map_or(i, |order| order[i] as usize);
         check_radii(radii, given_index)?;
-        check_coordinates(coordinates, bounds, radii, given_index)?;
+        check_coordinates(new_points, bounds, radii, given_index)?;
         if let Some(normals) = normals {
             new_normals.clear();
             match order {
@@ -332,7 +325,7 @@ impl<'a> PointCloud<'a> {
                 None => extend_without(new_normals, normals.iter().copied(), &gathered.dropped),
             }
             if !normalize(new_normals) {
-                fill_from_nearest(new_normals, coordinates)?;
+                fill_from_nearest(new_normals, new_points)?;
             }
         } else if self.recipe.pca_neighbors.is_some() {
             *new_normals = found.normals;
@@ -342,9 +335,7 @@ impl<'a> PointCloud<'a> {
         if order.is_none() {
             self.order = None;
         }
-        swap(&mut self.x, &mut gathered.x);
-        swap(&mut self.y, &mut gathered.y);
-        swap(&mut self.z, &mut gathered.z);
+        swap(&mut self.points, &mut gathered.points);
         std::mem::swap(&mut self.blocks, &mut gathered.blocks);
         let estimated = normals.is_none() && self.recipe.pca_neighbors.is_some();
         match &mut self.normals {
@@ -385,7 +376,7 @@ impl<'a> PointCloud<'a> {
         }
         let given_index = |i: usize| self.order.as_ref().map_or(i, |order| order[i] as usize);
         check_radii(&radii, given_index)?;
-        check_coordinates(self.coordinates(), self.bounds, &radii, given_index)?;
+        check_coordinates(&self.points, self.bounds, &radii, given_index)?;
         (self.mean_radius, self.max_radius) = mean_and_max(&radii);
         self.radii_given = matches!(radii, Radii::PerPoint(_));
         if let Radii::Global(radius) = radii {
@@ -399,9 +390,7 @@ impl<'a> PointCloud<'a> {
     /// The cloud with everything owned.
     pub fn into_owned(self) -> PointCloud<'static> {
         PointCloud {
-            x: Cow::Owned(self.x.into_owned()),
-            y: Cow::Owned(self.y.into_owned()),
-            z: Cow::Owned(self.z.into_owned()),
+            points: Cow::Owned(self.points.into_owned()),
             radii: match self.radii {
                 Radii::Global(r) => Radii::Global(r),
                 Radii::PerPoint(r) => Radii::PerPoint(Cow::Owned(r.into_owned())),

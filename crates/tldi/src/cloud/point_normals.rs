@@ -78,21 +78,17 @@ pub(crate) fn normalize(normals: &mut [Vec3]) -> bool {
     usable
 }
 
-/// Turns the normals of the points at `coordinates` to the side of `viewpoint`.
-pub(crate) fn turn_towards(viewpoint: Vec3, coordinates: [&[f32]; 3], normals: &mut [Vec3]) {
-    let [x, y, z] = coordinates;
-    for (i, normal) in normals.iter_mut().enumerate() {
-        if (viewpoint - Vec3::new(x[i], y[i], z[i])).dot(*normal) < 0.0 {
+/// Turns the normals of `points` to the side of `viewpoint`.
+pub(crate) fn turn_towards(viewpoint: Vec3, points: &[Vec3], normals: &mut [Vec3]) {
+    for (normal, point) in normals.iter_mut().zip(points) {
+        if (viewpoint - *point).dot(*normal) < 0.0 {
             *normal = -*normal;
         }
     }
 }
 
 /// Replaces the zero normals by that of the nearest point which has one.
-pub(crate) fn fill_from_nearest(
-    normals: &mut [Vec3],
-    coordinates: [&[f32]; 3],
-) -> Result<(), CloudError> {
+pub(crate) fn fill_from_nearest(normals: &mut [Vec3], points: &[Vec3]) -> Result<(), CloudError> {
     let usable: Vec<usize> = (0..normals.len())
         .filter(|&i| normals[i] != Vec3::ZERO)
         .collect();
@@ -101,12 +97,11 @@ pub(crate) fn fill_from_nearest(
             count: normals.len(),
         });
     }
-    let [x, y, z] = coordinates.map(|axis| usable.iter().map(|&i| axis[i]).collect::<Vec<_>>());
-    let tree = KdTree::from_coordinates([&x, &y, &z]);
-    let [x, y, z] = coordinates;
+    let of_usable: Vec<Vec3> = usable.iter().map(|&i| points[i]).collect();
+    let tree = KdTree::from_points(&of_usable);
     for i in 0..normals.len() {
         if normals[i] == Vec3::ZERO
-            && let Some(nearest) = tree.nearest(Vec3::new(x[i], y[i], z[i]), f32::INFINITY)
+            && let Some(nearest) = tree.nearest(points[i], f32::INFINITY)
         {
             normals[i] = normals[usable[nearest.index]];
         }

@@ -1,6 +1,7 @@
 //! Point radii: validation, and the spherical cover from nearest neighbours.
 
 use crate::{Aabb, CloudError, KdTree};
+use glamx::Vec3;
 use std::borrow::Cow;
 use std::ops::RangeInclusive;
 
@@ -49,29 +50,29 @@ pub(crate) fn check_radii(
 /// Fails for the first point whose coordinates are too coarse for its radius. `given_index` turns
 /// an index of the coordinates into the user's.
 pub(crate) fn check_coordinates(
-    coordinates: [&[f32]; 3],
+    points: &[Vec3],
     bounds: Aabb,
     radii: &Radii<'_>,
     given_index: impl Fn(usize) -> usize,
 ) -> Result<(), CloudError> {
-    let [x, y, z] = coordinates;
-    let largest = |i: usize| x[i].abs().max(y[i].abs()).max(z[i].abs());
+    let largest = |i: usize| points[i].abs().max_element();
     let too_large = match radii {
         Radii::Global(r) => {
             let limit = COORDINATE_PER_RADIUS * r;
             if bounds.min.abs().max(bounds.max.abs()).max_element() <= limit {
                 return Ok(());
             }
-            (0..x.len()).find(|&i| largest(i) > limit)
+            (0..points.len()).find(|&i| largest(i) > limit)
         }
-        Radii::PerPoint(r) => (0..x.len()).find(|&i| largest(i) > COORDINATE_PER_RADIUS * r[i]),
+        Radii::PerPoint(r) => {
+            (0..points.len()).find(|&i| largest(i) > COORDINATE_PER_RADIUS * r[i])
+        }
     };
     match too_large {
         None => Ok(()),
         Some(i) => Err(CloudError::CoordinateTooLarge {
             index: given_index(i),
-            coordinate: [x[i], y[i], z[i]]
-                .into_iter()
+            coordinate: (points[i].to_array().into_iter())
                 .fold(0.0, |a: f32, b| if b.abs() > a.abs() { b } else { a }),
             radius: match radii {
                 Radii::Global(r) => *r,

@@ -19,16 +19,18 @@ struct Entry {
 impl KdTree {
     /// Builds the tree of a cloud.
     pub fn new(cloud: &PointCloud<'_>) -> Self {
-        Self::from_coordinates(cloud.coordinates())
+        Self::from_points(cloud.points())
     }
 
     /// Builds the tree of at least one finite point, fewer than 2³².
-    pub(crate) fn from_coordinates([x, y, z]: [&[f32]; 3]) -> Self {
+    pub(crate) fn from_points(points: &[Vec3]) -> Self {
         // Equal positions become neighbours, ordered by index.
-        let mut keys: Vec<u128> = (0..x.len())
-            .into_par_iter()
-            .map(|i| {
-                [sort_key(x[i]), sort_key(y[i]), sort_key(z[i]), i as u32]
+        let mut keys: Vec<u128> = points
+            .par_iter()
+            .enumerate()
+            .map(|(i, point)| {
+                let [x, y, z] = point.to_array().map(sort_key);
+                [x, y, z, i as u32]
                     .into_iter()
                     .fold(0, |key, part| key << 32 | u128::from(part))
             })
@@ -40,7 +42,7 @@ impl KdTree {
             if start == 0 || keys[start - 1] >> 32 != key >> 32 {
                 let i = *key as u32 as usize;
                 entries.push(Entry {
-                    position: [x[i], y[i], z[i]],
+                    position: points[i].to_array(),
                     rank: entries.len() as u32,
                 });
                 sorted_starts.push(start as u32);

@@ -58,7 +58,7 @@ pub(crate) fn assert_holds(cloud: &PointCloud<'_>, points: &[Vec3], given: &[usi
 }
 
 pub(crate) fn assert_bounds(cloud: &PointCloud<'_>) {
-    let points: Vec<Vec3> = cloud.points().collect();
+    let points: Vec<Vec3> = cloud.points().to_vec();
     assert_eq!(cloud.bounds(), bounds_of(&points));
     let blocks: Vec<Aabb> = points.chunks(BLOCK).map(bounds_of).collect();
     assert_eq!(cloud.blocks(), blocks);
@@ -68,7 +68,7 @@ pub(crate) fn assert_bounds(cloud: &PointCloud<'_>) {
 pub(crate) fn state(cloud: &PointCloud<'_>) -> String {
     format!(
         "{:?} {:?} {:?} {} {:?} {:?} {:?} {} {} {} {:?}",
-        cloud.coordinates(),
+        cloud.points(),
         cloud.radii(),
         cloud.normals(),
         cloud.normals_oriented(),

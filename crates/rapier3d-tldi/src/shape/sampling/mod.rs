@@ -40,7 +40,7 @@ const MOST_SQUARES: f64 = 8_388_608.0; // 2²³
 /// let capsule = SharedShape::capsule_y(0.2, 0.1);
 /// let cloud = sample_shape(&*capsule, 0.02)?;
 /// let on_surface = |p: Vector| ((p - p.clamp(-0.2 * Vector::Y, 0.2 * Vector::Y)).length() - 0.1).abs();
-/// assert!(cloud.points().all(|p| on_surface(p) < 1e-6));
+/// assert!(cloud.points().iter().all(|&p| on_surface(p) < 1e-6));
 /// assert_eq!((cloud.mean_radius(), cloud.normals_oriented()), (0.02, true));
 /// let collider = cloud_collider(PointCloudShape::new(cloud)); // to be inserted
 /// # Ok::<(), Box<dyn std::error::Error>>(())

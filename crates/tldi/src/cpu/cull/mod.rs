@@ -112,16 +112,16 @@ fn cull_blocks(
         }
         let first = block * BLOCK;
         let range = first..(first + BLOCK).min(cloud.len());
-        let mut region = widest;
+        let mut reached = widest;
         if let Some(uneven) = &uneven {
-            region = bounds_of(uneven.largest(range.clone()));
-            if !bounds.intersects(&region) {
+            reached = bounds_of(uneven.largest(range.clone()));
+            if !bounds.intersects(&reached) {
                 continue;
             }
         }
-        let run = cloud.coordinates().map(|c| &c[range.clone()]);
+        let run = &cloud.points()[range];
         let (taken, index_of) = (thinning.of_block(block), |i| (first + i) as u32);
-        sieve.put(run, taken, &region, index_of, out);
+        sieve.put(run, taken, &reached, index_of, out);
     }
     sieve.empty(out);
 }

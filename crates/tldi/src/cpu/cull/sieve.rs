@@ -54,14 +54,14 @@ impl<'a> Sieve<'a> {
     /// get them later than those of the next run.
     pub(super) fn put(
         &mut self,
-        [x, y, z]: [&[f32]; 3],
+        points: &[Vec3],
         taken: &[u8; BLOCK],
         bounds: &Aabb,
         index_of: impl Fn(usize) -> u32,
         out: &mut Survivors,
     ) {
         let mut inside = [0; BLOCK];
-        find_within(bounds, x, y, z, taken, &mut inside);
+        find_within(bounds, points, taken, &mut inside);
         let (words, _) = inside.as_chunks::<64>();
         for (word, flags) in words.iter().enumerate() {
             let mut mask = bits(flags);
@@ -69,7 +69,7 @@ impl<'a> Sieve<'a> {
                 let i = 64 * word + mask.trailing_zeros() as usize;
                 mask &= mask - 1;
                 let at = self.count;
-                (self.x[at], self.y[at], self.z[at]) = (x[i], y[i], z[i]);
+                [self.x[at], self.y[at], self.z[at]] = points[i].to_array();
                 self.index[at] = index_of(i);
                 self.count += 1;
             }
@@ -135,18 +135,11 @@ fn is_within([x, y, z]: [f32; 3], aabb: &Aabb) -> bool {
 
 multiversioned! {
 /// Tells which of the points that are `taken` are within `bounds`: 1, else 0.
-fn find_within(
-    bounds: &Aabb,
-    x: &[f32],
-    y: &[f32],
-    z: &[f32],
-    taken: &[u8; BLOCK],
-    inside: &mut [u8; BLOCK],
-) {
-    let n = x.len().min(y.len()).min(z.len()).min(BLOCK);
-    let (x, y, z, inside) = (&x[..n], &y[..n], &z[..n], &mut inside[..n]);
+fn find_within(bounds: &Aabb, points: &[Vec3], taken: &[u8; BLOCK], inside: &mut [u8; BLOCK]) {
+    let n = points.len().min(BLOCK);
+    let (points, inside) = (&points[..n], &mut inside[..n]);
     for i in 0..n {
-        inside[i] = u8::from(is_within([x[i], y[i], z[i]], bounds)) & taken[i];
+        inside[i] = u8::from(is_within(points[i].to_array(), bounds)) & taken[i];
     }
 }
 }

@@ -75,21 +75,27 @@ impl Survivors {
         self.clear();
         self.stride = stride;
         let thinning = Thinning::new(stride);
+        for axis in [&mut self.x, &mut self.y, &mut self.z] {
+            axis.resize(all.len(), 0.0);
+        }
+        self.index.resize(all.len(), 0);
         let block_of = |i: u32| i as usize / BLOCK;
         let runs = (all.index).chunk_by(|&i, &next| block_of(i) == block_of(next));
-        let mut k = 0;
+        let (mut k, mut kept) = (0, 0);
         for run in runs {
             let taken = thinning.of_block(block_of(run[0]));
             for &i in run {
-                if taken[i as usize % BLOCK] > 0 {
-                    self.x.push(all.x[k]);
-                    self.y.push(all.y[k]);
-                    self.z.push(all.z[k]);
-                    self.index.push(i);
-                }
+                // All are written, and the next one over those that are not taken: no branch is guessed wrong.
+                (self.x[kept], self.y[kept], self.z[kept]) = (all.x[k], all.y[k], all.z[k]);
+                self.index[kept] = i;
+                kept += usize::from(taken[i as usize % BLOCK]);
                 k += 1;
             }
         }
+        for axis in [&mut self.x, &mut self.y, &mut self.z] {
+            axis.truncate(kept);
+        }
+        self.index.truncate(kept);
     }
 
     /// Takes those of `all` points that are in `region`. The cloud is even.
@@ -99,11 +105,14 @@ impl Survivors {
         self.stride = all.stride;
         let bounds = region.bounds_in(&Pose3::IDENTITY);
         let mut sieve = Sieve::new(&Pose3::IDENTITY, region, 0.0, None);
+        let mut run = [Vec3::ZERO; BLOCK];
         for first in (0..all.len()).step_by(BLOCK) {
-            let range = first..all.len().min(first + BLOCK);
-            let run = [&all.x, &all.y, &all.z].map(|c| &c[range.clone()]);
+            let count = BLOCK.min(all.len() - first);
+            for (k, point) in run[..count].iter_mut().enumerate() {
+                *point = all.point(first + k);
+            }
             let index_of = |i| all.index[first + i];
-            sieve.put(run, &[1; BLOCK], &bounds, index_of, self);
+            sieve.put(&run[..count], &[1; BLOCK], &bounds, index_of, self);
         }
         sieve.empty(self);
     }
