@@ -15,9 +15,6 @@ const UNEXPLAINED: f32 = 0.1;
 /// 0.02 mean radii off.
 const UNEXPLAINED_OF_MANY: f32 = 0.5;
 
-/// The same of a valley: the ends of a cylinder are bent by their rims. Half or twice: no row of any suite changes.
-const UNEXPLAINED_OF_VALLEY: f32 = 0.4;
-
 /// Number of points from which noise can be told from a rim or a crease. Half: no change in any suite; twice: a ball
 /// on new samples each frame fails with each of 6 seeds instead of none.
 const MANY: f32 = 30.0;
@@ -164,12 +161,11 @@ impl Bowl {
 
     /// The floor of a valley, which widens along one main axis only, if the gaps above a plane that rises by `slope`
     /// are one.
-    pub(crate) fn valley(&self, slope: Vec2, roughness: f32) -> Option<Valley> {
+    pub(crate) fn valley(&self, slope: Vec2) -> Option<Valley> {
         let across = usize::from(self.widening.y > self.widening.x);
         let bend = self.widening[across];
         let place = -0.5 * slope[across] / bend;
-        let is_valley = self.left < UNEXPLAINED_OF_VALLEY * roughness
-            && self.count >= MANY
+        let is_valley = self.count >= MANY
             && self.widening[1 - across] < LEAST_ALIKE * bend
             && place.abs() <= LOWEST;
         is_valley.then_some(Valley {

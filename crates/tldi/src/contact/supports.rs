@@ -136,7 +136,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
             radii: [aside.x * sigma.x * longest, aside.y * sigma.y * across],
         }
     });
-    let floor_of_valley = bowl.valley(slope, roughness).and_then(|valley| {
+    let floor_of_valley = bowl.valley(slope).and_then(|valley| {
         let Valley {
             across,
             place: lowest,
