@@ -19,10 +19,6 @@ use rapier3d::math::Pose;
 use rapier3d::parry::shape::Shape;
 use tldi::Penetration;
 
-/// Least cosine between the side that is remembered and the normal of a contact that pushes there. Half or twice the
-/// angle: no row of any suite changes.
-const SAME_SIDE: f32 = 0.5;
-
 /// A pair that rapier sweeps: what moves, and its target.
 pub(crate) struct SweptPair<'a> {
     pub(crate) shapes: [&'a dyn Shape; 2],
@@ -64,7 +60,7 @@ impl Batch {
         let comparison = part.comparison.as_ref()?;
         let normal = -comparison.last_axis()?;
         let depth = (self.results[comparison.query].patches.iter())
-            .filter(|patch| patch.normal.dot(normal) >= SAME_SIDE)
+            .filter(|patch| patch.normal.dot(normal) > 0.0)
             .flat_map(|patch| &patch.points)
             .fold(0.0, |depth, point| f32::max(depth, -point.gap));
         let in_collider = part.poses[0].map_or(normal, |pose| pose.rotation * normal);
