@@ -33,6 +33,11 @@ impl Growable {
         })
     }
 
+    /// Leaves the buffer to those that still use it; the next one is new.
+    pub(crate) fn give_up(&mut self) {
+        self.buffer = None;
+    }
+
     /// The buffer, where it was ensured.
     pub(crate) fn get(&self) -> Option<&wgpu::Buffer> {
         self.buffer.as_ref()

@@ -180,16 +180,15 @@ impl WgpuBackend {
         4 * (u64::from(COUNTERS) + pairs + contacts)
     }
 
-    /// Gives up what was asked for.
+    /// Gives up what was asked for, and the buffers in which it would come: `wgpu` makes a buffer that is asked for again
+    /// readable as soon as the first submission ends, with what that one wrote.
     pub(super) fn abandon(&mut self) {
         let Some(asked) = self.asked.take() else {
             return;
         };
-        if let Some(readback) = self.buffers.readback.get() {
-            readback.unmap();
-        }
-        if let (Some(_), Some(timer)) = (asked.times, &self.timer) {
-            timer.abandon();
+        self.buffers.readback.give_up();
+        if asked.times.is_some() {
+            self.timer = Timer::new(&self.gpu, self.gpu.pipelines().len());
         }
     }
 

@@ -86,11 +86,6 @@ impl Timer {
         Answer::to_reading(self.readback.slice(..))
     }
 
-    /// Gives up what was asked for.
-    pub(crate) fn abandon(&self) {
-        self.readback.unmap();
-    }
-
     /// Adds the times that came back to those of the same stages.
     pub(crate) fn take(&self, gpu: &Gpu, times: &mut Vec<StageTime>) -> Result<(), GpuError> {
         let view =

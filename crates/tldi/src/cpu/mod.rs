@@ -13,6 +13,7 @@ pub(crate) mod cull;
 mod exact;
 mod first_look;
 mod fold;
+mod held;
 mod lanes;
 mod motion;
 pub(crate) mod normals;

@@ -1,7 +1,7 @@
 //! One cloud of a pair: its culled points, their normals and its image.
 
 use super::columns::{Columns, Tiles, Touching};
-use super::cull::{self, CullScratch, PointRadii, Survivors};
+use super::cull::{CullScratch, PointRadii, Survivors};
 use super::exact::cast::{self, Rays};
 use super::exact::placed::{CellDistances, Placed};
 use super::first_look::cells::{CellImaging, Cells};
@@ -25,8 +25,8 @@ use glamx::{DVec3, Mat3, Pose3, Vec3};
 pub(super) struct Side {
     pub(super) points: Survivors,
     /// All points in reach of the other surface, if the pair is looked at several times and they are few.
-    held: Survivors,
-    is_held: bool,
+    pub(super) held: Survivors,
+    pub(super) is_held: bool,
     /// Those in a window or, while that is looked through, those of the look before.
     pub(super) window: Survivors,
     pub(super) cull: CullScratch,
@@ -99,53 +99,6 @@ impl CloudView<'_> {
 }
 
 impl Side {
-    pub(super) fn release(&mut self) {
-        self.is_held = false;
-    }
-
-    /// Fills `points` with every `stride`-th of the cloud in a region.
-    pub(super) fn cull(&mut self, cloud: &PointCloud, plan: &SidePlan, stride: usize) {
-        let (frame, region) = (&plan.frame_from_surface, &plan.region);
-        match self.is_held {
-            true => self.points.thin_out(&self.held, stride),
-            false => cull::cull(
-                cloud,
-                frame,
-                region,
-                stride,
-                &mut self.cull,
-                &mut self.points,
-            ),
-        }
-    }
-
-    /// The same, and holds all points of the region, if they are few, for the looks that follow.
-    pub(super) fn cull_and_hold(&mut self, cloud: &PointCloud, plan: &SidePlan, stride: usize) {
-        let (frame, region) = (&plan.frame_from_surface, &plan.region);
-        if stride > 1 && !self.is_held && cull::are_few(cloud, frame, region) {
-            self.is_held = true;
-            cull::cull(cloud, frame, region, 1, &mut self.cull, &mut self.held);
-        }
-        self.cull(cloud, plan, stride);
-    }
-
-    /// Fills `points` with those in a window, part of the region of the look before, whose points are in `window`.
-    pub(super) fn cull_window(&mut self, cloud: &PointCloud, plan: &SidePlan, stride: usize) {
-        let (frame, region) = (&plan.frame_from_surface, &plan.region);
-        let held = self.is_held.then_some(&self.held);
-        match held.or(Some(&self.window).filter(|window| window.are_all())) {
-            Some(all) if stride == 1 => self.points.select(all, region),
-            _ => cull::cull(
-                cloud,
-                frame,
-                region,
-                stride,
-                &mut self.cull,
-                &mut self.points,
-            ),
-        }
-    }
-
     /// Fills `near_normals` from an even selection of the near points.
     pub(super) fn sample_normals(&mut self, cloud: &PointCloud, frame_from_cloud: &Pose3) {
         let _stage = stage!("aim");
