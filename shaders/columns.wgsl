@@ -156,7 +156,7 @@ fn tile_of(view: u32, p: vec3f, pixel_size: f32) -> u32 {
     return NONE;
 }
 
-// Each tile's least depth of `a`, and least negated one of `b`, as splats may have it.
+// Each tile's least depth of `a`, and least negated one of `b`.
 @compute @workgroup_size(256)
 fn columns_depths(
     @builtin(workgroup_id) group: vec3u,
@@ -169,7 +169,6 @@ fn columns_depths(
     }
     let side = survivors[i].side;
     let params = pairs[side / 2u].params;
-    let margin = params.slope_damping * largest_radius(side, params);
     for (var v = 0u; v < MAX_VIEWS; v++) {
         let view = side / 2u * MAX_VIEWS + v;
         if views[view].exists != DRAWN {
@@ -178,7 +177,7 @@ fn columns_depths(
         let p = moved(views[view].view_x, views[view].view_y, views[view].view_z, survivors[i].position);
         let tile = tile_of(view, p, params.pixel_size);
         if tile != NONE {
-            let depth = select(p.z, -p.z, side % 2u == 1u) - margin;
+            let depth = select(p.z, -p.z, side % 2u == 1u);
             let at = batch.tiles_at + side % 2u * batch.tiles + views[view].first_tile + tile;
             atomicMax(&work[at], ordered(-depth));
         }

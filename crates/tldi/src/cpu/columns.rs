@@ -165,14 +165,15 @@ impl Columns {
         }
     }
 
-    /// Finds each tile's least `depth · sign` less `margin`, metres, that a splat of it or of its
-    /// neighbours may have.
-    pub(crate) fn reduce(&mut self, tiles: &Tiles, sign: f32, margin: f32) {
+    /// Finds the least `depth · sign`, metres, of the points in each tile and its neighbours. Their splats, which are
+    /// tilted, may be nearer by up to a radius: that much is not added, because the next points of the surface are in
+    /// the neighbouring tiles.
+    pub(crate) fn reduce(&mut self, tiles: &Tiles, sign: f32) {
         self.depths.clear();
         self.depths.resize(tiles.count() + 1, f32::INFINITY);
         for (tile, depth) in self.tile.iter().zip(&self.depth) {
             let least = &mut self.depths[*tile as usize];
-            let depth = sign * depth - margin;
+            let depth = sign * depth;
             *least = if depth < *least { depth } else { *least };
         }
         self.depths.truncate(tiles.count());
@@ -194,12 +195,11 @@ impl Columns {
         behind.fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// Finds each tile's least and greatest depth, metres, that a splat of it or of its neighbours may have,
-    /// `margin` beyond its point.
-    pub(crate) fn reduce_both(&mut self, tiles: &Tiles, margin: f32) {
-        self.reduce(tiles, -1.0, margin);
+    /// Finds the least and the greatest depth, metres, of the points in each tile and its neighbours.
+    pub(crate) fn reduce_both(&mut self, tiles: &Tiles) {
+        self.reduce(tiles, -1.0);
         std::mem::swap(&mut self.depths, &mut self.greatest);
-        self.reduce(tiles, 1.0, margin);
+        self.reduce(tiles, 1.0);
     }
 
     /// Least and greatest depth in a tile, metres; in this order where it holds something. After
@@ -443,9 +443,9 @@ mod tests {
             let rect = seen_a.rect.intersection(&seen_b.rect).expect("overlap");
             let tiles = Tiles::new(&rect, seen_a.reach);
             columns_a.sort(&tiles, &camera);
-            columns_a.reduce(&tiles, 1.0, 0.0);
+            columns_a.reduce(&tiles, 1.0);
             columns_b.sort(&tiles, &camera);
-            columns_b.reduce(&tiles, -1.0, 0.0);
+            columns_b.reduce(&tiles, -1.0);
             let mut touching = Touching::default();
             let meet = |tile: usize| columns_a.meet(&columns_b, tile, REACH);
             touching.mark(&tiles, &rect, 0.0, meet);

@@ -289,15 +289,11 @@ impl Scratch {
             seen.limit_depths(DepthScale::reach(params), || side.columns.median_depth());
         }
         let tiles = Tiles::new(&rect, seen_a.reach.max(seen_b.reach));
-        let sort = |side: &mut Side, sign: f32, radius: f32| {
+        let sort = |side: &mut Side, sign: f32| {
             side.columns.sort(&tiles, camera);
-            let margin = params.slope_damping * radius;
-            side.columns.reduce(&tiles, sign, margin);
+            side.columns.reduce(&tiles, sign);
         };
-        rayon::join(
-            || sort(side_a, 1.0, seen_a.radius),
-            || sort(side_b, -1.0, seen_b.radius),
-        );
+        rayon::join(|| sort(side_a, 1.0), || sort(side_b, -1.0));
         let support_px = support / seen_a.pixel_size.min(seen_b.pixel_size);
         let (columns_a, columns_b) = (&side_a.columns, &side_b.columns);
         let meet = |tile: usize| columns_a.meet(columns_b, tile, reach);

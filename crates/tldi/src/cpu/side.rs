@@ -219,8 +219,7 @@ impl Side {
         let seen = &self.around(view, seen, covered);
         let tiles = Tiles::new(&seen.rect, seen.reach);
         self.columns.sort(&tiles, view.camera);
-        let margin = view.params.slope_damping * seen.radius;
-        self.columns.reduce_both(&tiles, margin);
+        self.columns.reduce_both(&tiles);
         let support_px = self.support_radius(view.cloud) / seen.pixel_size;
         let reach = reach + tiles.half_diagonal() * seen.pixel_size;
         let meets = |tile: usize| {
