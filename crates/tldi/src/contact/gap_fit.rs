@@ -22,11 +22,17 @@ const LEAST_BEND_WEIGHT: f32 = 2.0;
 const PLACES: usize = 25;
 const MIDDLE: usize = PLACES / 2;
 
-/// 1, u, v and u² + v² at a place (u, v) in pixels from the middle.
-fn basis(place: usize) -> Vec4 {
-    let [u, v] = [place % 5, place / 5].map(|k| k as f32 - 2.0);
-    Vec4::new(1.0, u, v, u * u + v * v)
-}
+/// 1, u, v and u² + v² at each place, (u, v) in pixels from the middle.
+const BASIS: [Vec4; PLACES] = {
+    let mut basis = [Vec4::ZERO; PLACES];
+    let mut place = 0;
+    while place < PLACES {
+        let [u, v] = [(place % 5) as f32 - 2.0, (place / 5) as f32 - 2.0];
+        basis[place] = Vec4::new(1.0, u, v, u * u + v * v);
+        place += 1;
+    }
+    basis
+};
 
 /// Fits gaps; keeps what depends only on which of the neighbours are there, since that is alike for most
 /// pixels.
@@ -45,6 +51,8 @@ impl GapFit {
         let mut ring = ArrayVec::<(u32, usize), MOST_NEIGHBORS>::new();
         // The first of the ring in each of the 5 × 5 pixels: others in the same pixel are rare.
         let mut first = [NONE; PLACES];
+        let mut moments = BASIS[MIDDLE] * contacts[k as usize].gap;
+        let mut pattern = 1u32 << MIDDLE;
         ring.push((k, MIDDLE));
         first[MIDDLE] = k;
         let mut push_neighbors = |ring: &mut ArrayVec<_, MOST_NEIGHBORS>, of: u32, at: usize| {
@@ -58,6 +66,8 @@ impl GapFit {
                 }
                 if !ring.is_full() {
                     ring.push((l, place));
+                    moments += BASIS[place] * contacts[l as usize].gap;
+                    pattern |= 1 << place;
                 }
             }
         };
@@ -65,12 +75,6 @@ impl GapFit {
         for near in 1..ring.len() {
             let (of, at) = ring[near];
             push_neighbors(&mut ring, of, at);
-        }
-        let mut moments = Vec4::ZERO;
-        let mut pattern = 0u32;
-        for &(l, place) in &ring {
-            moments += basis(place) * contacts[l as usize].gap;
-            pattern |= 1 << place;
         }
         let places = ring.iter().map(|(_, place)| *place);
         if ring.len() != pattern.count_ones() as usize {
@@ -92,7 +96,7 @@ fn inverse_normal_matrix(places: impl Iterator<Item = usize>) -> Mat4 {
         LEAST_SLOPE_WEIGHT,
         LEAST_BEND_WEIGHT,
     ));
-    for basis in places.map(basis) {
+    for basis in places.map(|place| BASIS[place]) {
         normal_matrix += Mat4::from_cols(
             basis * basis.x,
             basis * basis.y,

@@ -110,7 +110,6 @@ impl Columns {
             rect,
             near: lo.z - radius,
             far: hi.z + radius,
-            radius,
             reach,
             pixel_size: nearest,
         })

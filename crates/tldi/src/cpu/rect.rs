@@ -47,8 +47,7 @@ pub(crate) struct Footprint {
     pub(crate) rect: Rect,
     pub(crate) near: f32,
     pub(crate) far: f32,
-    /// Largest radius of a splat in metres, and in pixels.
-    pub(crate) radius: f32,
+    /// Largest radius of a splat, pixels.
     pub(crate) reach: f32,
     /// Edge of a pixel in metres where the points are nearest.
     pub(crate) pixel_size: f32,

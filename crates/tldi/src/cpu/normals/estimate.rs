@@ -7,8 +7,8 @@
 
 use crate::cpu::fold::{SpaceFold, is_coarse};
 use crate::cpu::lanes::{bounds, multiversioned, truncated};
-use crate::cpu::normals::planes::{Batch, Moments, Plane};
-use glamx::Vec3;
+use crate::cpu::normals::planes::{Batch, PartialMoments, Plane};
+use glamx::{Vec3, Vec4};
 use std::ops::Range;
 
 /// Radius of the neighbourhood whose covariance gives the normal, in mean radii of the points.
@@ -335,7 +335,7 @@ fn locate(grid: &Grid, [x, y, z]: &[Vec<f32>; 3], cells: &mut [u32]) {
 
 multiversioned! {
 /// Of the candidates within the neighbourhood of `p`.
-fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> Moments {
+fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> PartialMoments {
     let mut sums = [[0.0f32; LANES]; 10];
     let [x, y, z] = candidates.coordinates.each_ref().map(|c| c.as_chunks::<LANES>().0);
     let chunks = x.iter().zip(y).zip(z).take(candidates.count / LANES);
@@ -357,13 +357,7 @@ fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> Moments {
             sums[9][l] += dz * dz;
         }
     }
-    let mut half = [[0.0f32; LANES / 2]; 10];
-    for (half, sum) in half.iter_mut().zip(&sums) {
-        for l in 0..LANES / 2 {
-            half[l] = sum[l] + sum[l + LANES / 2];
-        }
-    }
-    half.map(|s| (s[0] + s[2]) + (s[1] + s[3]))
+    sums.map(|s| Vec4::new(s[0] + s[4], s[1] + s[5], s[2] + s[6], s[3] + s[7]))
 }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::cloud::point_normals::least_variance_axis;
 use crate::cpu::lanes::multiversioned;
-use glamx::{DMat3, DVec3, FloatExt, Vec3};
+use glamx::{DMat3, DVec3, FloatExt, Mat4, Vec3, Vec4};
 
 /// Planes that are solved for side by side.
 const BATCH: usize = 64;
@@ -16,7 +16,10 @@ const LEAST_PLANAR: f32 = 1e-4;
 pub(crate) const CONSTANTS: [(&str, f64); 1] = [("LEAST_PLANAR", LEAST_PLANAR as f64)];
 
 /// Sums over the points around a point, of 1, x, y, z, xx, xy, xz, yy, yz and zz; metres from the point.
-pub(crate) type Moments = [f32; 10];
+type Moments = [f32; 10];
+
+/// The same, each in four parts that are still to be added up.
+pub(crate) type PartialMoments = [Vec4; 10];
 
 /// The plane that best fits the points around a point.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +60,7 @@ impl Plane {
 pub(crate) struct Batch {
     /// Where the plane goes.
     place: [u32; BATCH],
+    partial: [PartialMoments; BATCH],
     moments: [[f32; BATCH]; 10],
     normal: [[f32; BATCH]; 3],
     variance: [f32; BATCH],
@@ -70,6 +74,7 @@ impl Default for Batch {
     fn default() -> Self {
         Self {
             place: [0; BATCH],
+            partial: [[Vec4::ZERO; 10]; BATCH],
             moments: [[0.0; BATCH]; 10],
             normal: [[0.0; BATCH]; 3],
             variance: [0.0; BATCH],
@@ -82,12 +87,22 @@ impl Default for Batch {
 
 impl Batch {
     /// Adds a neighbourhood whose plane is to be the `place`-th.
-    pub(crate) fn push(&mut self, place: u32, moments: Moments) {
+    pub(crate) fn push(&mut self, place: u32, moments: PartialMoments) {
         self.place[self.count] = place;
-        for (to, from) in self.moments.iter_mut().zip(moments) {
-            to[self.count] = from;
-        }
+        self.partial[self.count] = moments;
         self.count += 1;
+    }
+
+    /// Adds up the parts of moments, of four neighbourhoods at once.
+    fn add_up(&mut self) {
+        let (fours, _) = self.partial.as_chunks::<4>();
+        for (k, [a, b, c, d]) in fours.iter().enumerate() {
+            for (m, sums) in self.moments.iter_mut().enumerate() {
+                let parts = Mat4::from_cols(a[m], b[m], c[m], d[m]).transpose();
+                let sum = (parts.x_axis + parts.z_axis) + (parts.y_axis + parts.w_axis);
+                sums[4 * k..4 * k + 4].copy_from_slice(&sum.to_array());
+            }
+        }
     }
 
     pub(crate) fn is_full(&self) -> bool {
@@ -96,6 +111,7 @@ impl Batch {
 
     /// Puts the planes of what was pushed into their places.
     pub(crate) fn solve(&mut self, planes: &mut [Plane]) {
+        self.add_up();
         solve_planar(self);
         for k in 0..self.count {
             planes[self.place[k] as usize] = match self.planar[k] {
