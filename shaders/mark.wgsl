@@ -12,10 +12,14 @@
 var<workgroup> total: atomic<u32>;
 var<workgroup> base: u32;
 
+fn is_bare(side: u32) -> bool {
+    return (pairs[side / 2u].sides[side % 2u].flags & HAS_NORMALS) == 0u;
+}
+
 fn normal_of(i: u32) -> vec3f {
     let side = survivors[i].side;
     let facts = &pairs[side / 2u].sides[side % 2u];
-    if ((*facts).flags & HAS_NORMALS) == 0u {
+    if is_bare(side) {
         return planes[i].normal;
     }
     let at = 3u * ((*facts).first_normal + survivors[i].index);
@@ -81,7 +85,7 @@ fn mark(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     let exists = fits && i < min(atomicLoad(&work[SURVIVORS]), batch.survivors);
     // One bit a view.
     var modelled = 0u;
-    if exists {
+    if exists && !(is_bare(survivors[i].side) && planes[i].stands_out > 0u) {
         let pair = survivors[i].side / 2u;
         for (var v = 0u; v < MAX_VIEWS; v++) {
             let view = pair * MAX_VIEWS + v;

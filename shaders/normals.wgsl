@@ -35,7 +35,7 @@ fn normals(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     plane.variance = INFINITE;
     if is_needed {
         plane = bare_plane(side, entries[k].position, false);
-        plane.is_needed = 1u;
+        plane.is_needed = 1u - plane.stands_out;
     }
     planes[i] = plane;
 }

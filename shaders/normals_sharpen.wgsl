@@ -27,10 +27,8 @@ fn sharpened(i: u32, is_second: bool) -> Plane {
     let side = survivors[i].side;
     let facts = &pairs[side / 2u].sides[side % 2u];
     let radius = support_radius(side);
-    let deviation = ON_PLANE / SUPPORT * radius;
-    let noise = (*facts).noise;
-    let on_plane = deviation * deviation + OF_NOISE * noise * noise;
-    if own.is_needed == 0u || !(own.variance > on_plane) {
+    let most = on_plane(side, radius);
+    if own.is_needed == 0u || !(own.variance > most) {
         return own;
     }
     let position = survivors[i].position;
@@ -82,7 +80,7 @@ fn sharpened(i: u32, is_second: bool) -> Plane {
     let normal = vec3f(normals);
     let weight = f32(weights);
     if weight > 0.0 && dot(normal, normal) > 0.0 {
-        let share = ramp(own.variance / on_plane, 1.0, OFF_PLANE) * min(weight / WEIGHT_STEPS, 1.0);
+        let share = ramp(own.variance / most, 1.0, OFF_PLANE) * min(weight / WEIGHT_STEPS, 1.0);
         let between = mix(own.normal, normalize(normal), share);
         if dot(between, between) > 0.0 {
             own.normal = normalize(between);

@@ -31,7 +31,11 @@ fn sample(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             vec3f(normals[at], normals[at + 1u], normals[at + 2u]),
         );
     } else {
-        normal = bare_plane(side, survivors[i].position, true).normal;
+        let plane = bare_plane(side, survivors[i].position, true);
+        if plane.stands_out > 0u {
+            return;
+        }
+        normal = plane.normal;
     }
     let slot = atomicAdd(&work[state + SAMPLE_COUNT], 1u);
     if slot < SAMPLE_SLOTS {

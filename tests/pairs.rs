@@ -409,6 +409,29 @@ fn over_sheet(beside: &[Vec3]) -> PairResult {
     )
 }
 
+/// A flying pixel within a ball does not hide the sheet in which the ball is one radius deep. The point's splat is as wide
+/// as the ball, as it is if radii come from neighbours.
+#[test]
+fn what_lone_points_hide_is_touched() {
+    let mut rng = fastrand::Rng::with_seed(8);
+    let sheet = sampled_plane(0.4, R, &mut rng).points;
+    let ball = sampled_sphere(0.05, R).cloud(R);
+    let mut radii = vec![R; sheet.len()];
+    radii.extend([5.0 * R; 2]);
+    // The second one is hidden by the first.
+    for lone in [&[0.07][..], &[0.07, 0.045]] {
+        let above = lone.iter().map(|y| Vec3::new(0.0, *y, 0.0));
+        let points: Vec<Vec3> = sheet.iter().copied().chain(above).collect();
+        let radii = radii[..points.len()].to_vec();
+        let cloud = PointCloud::builder(points).radii(radii).build();
+        let pose = Pose3::translation(0.0, 0.05 - R, 0.0);
+        let result = clouds(&cloud.expect("a valid cloud"), &ball, pose);
+        let gap = result.gap.expect("they touch");
+        assert!((gap + R).abs() < 0.1 * R, "{} r deep", -gap / R);
+        assert!(result.patches[0].normal.y > 0.999);
+    }
+}
+
 /// A flying pixel is not touched; a wire of points in its place is, and so are five points that are
 /// all there is.
 #[test]

@@ -19,6 +19,13 @@ fn support_radius(side: u32) -> f32 {
     return SUPPORT * mean * (*facts).radius_scale;
 }
 
+// Variance up to which points within `radius` metres are on a plane, square metres.
+fn on_plane(side: u32, radius: f32) -> f32 {
+    let deviation = ON_PLANE / SUPPORT * radius;
+    let noise = pairs[side / 2u].sides[side % 2u].noise;
+    return deviation * deviation + OF_NOISE * noise * noise;
+}
+
 fn cell_of(side: u32, position: vec3f) -> vec3u {
     let facts = &pairs[side / 2u].sides[side % 2u];
     let dims = (*facts).cell_dims;
@@ -107,8 +114,15 @@ fn bare_plane(side: u32, position: vec3f, near_only: bool) -> Plane {
         let mixed = vec3f(n.x * n.y, n.x * n.z, n.y * n.z);
         let off = dot(n * n, covariance.diagonal) + 2.0 * dot(mixed, covariance.rest);
         let step = radius / OFFSET_STEPS;
-        plane.variance = max(off, 0.0) / f32(count - 3) * step * step;
+        let all_squares = max(off, 0.0) * step * step;
+        plane.variance = all_squares / f32(count - 3);
         plane.height = -dot(n, mean) * step;
+        let own_square = plane.height * plane.height;
+        if own_square > on_plane(side, radius) && own_square > STANDS_OUT * all_squares {
+            plane.stands_out = 1u;
+            // No other point adopts it.
+            plane.variance = INFINITE;
+        }
     }
     return plane;
 }

@@ -9,6 +9,7 @@ override MAX_CANDIDATES: u32;
 override LEAST_PLANAR: f32;
 override ON_PLANE: f32;
 override OF_NOISE: f32;
+override STANDS_OUT: f32;
 override OFF_PLANE: f32;
 override FLAT_PLANE: f32;
 override LEAST_RADIUS_PX: f32;
@@ -207,8 +208,9 @@ struct Plane {
     height: f32,
     // Whether the point is modelled.
     is_needed: u32,
-    padding_a: u32,
-    padding_b: u32,
+    // Whether it lies far beside the surface that its neighbours are on.
+    stands_out: u32,
+    padding: u32,
 }
 
 struct View {

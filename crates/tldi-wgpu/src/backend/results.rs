@@ -5,6 +5,7 @@ use super::WgpuBackend;
 use super::parts::{Returned, Run};
 use crate::GpuError;
 use crate::counters::Counters;
+use crate::layout::lives_on_device;
 use crate::readback::Readback;
 use tldi::{PairQuery, PairResult};
 
@@ -53,8 +54,11 @@ impl WgpuBackend {
             return Ok(Returned::More);
         }
         for &pair in &self.upload.pairs_of {
-            self.patches
-                .reduce_pair(&mut run.results[pair], &run.batch[pair]);
+            let query = &run.batch[pair];
+            let hides = self.patches.reduce_pair(&mut run.results[pair], query);
+            if hides && !lives_on_device(query) {
+                run.left_to_cpu.push(pair);
+            }
         }
         let with_spare = |count: u32| count.saturating_add(count / SPARE);
         self.expected_contacts = with_spare(needed.contacts).max(LEAST_EXPECTED);

@@ -21,7 +21,7 @@ const ALONE: f32 = 2.5;
 
 /// Points closer to each other than this share of the mean radius are the same point. Half or twice: no row of any
 /// suite changes.
-const SAME_POINT: f32 = 1e-3;
+pub(crate) const SAME_POINT: f32 = 1e-3;
 
 /// Contact pixels of one component that are looked at. Half or twice: no row of any suite changes.
 const SAMPLES: usize = 9;
@@ -204,21 +204,20 @@ impl Surroundings {
         best
     }
 
-    /// Whether the point of `cloud` nearest to `place` stands alone.
-    fn is_alone(&self, cloud: &PointCloud, place: Vec3) -> bool {
+    /// The point of `cloud` nearest to `place`, if it stands alone.
+    fn lone_point(&self, cloud: &PointCloud, place: Vec3) -> Option<Vec3> {
         let [same, reach] = [SAME_POINT, REACH].map(|radii| radii * cloud.mean_radius());
         let [(_, point), ..] = self.nearest(cloud, place, 0.0, reach);
         let neighbors = self.nearest(cloud, point, same, reach);
         let (apart, _) = neighbors[NEIGHBORS - 1];
-        if !apart.is_finite() {
-            return false;
-        }
         // The nearest ones may stand alone as well.
         let usual = apart.sqrt() / ALONE;
-        neighbors.iter().any(|&(_, neighbor)| {
-            let [.., (fourth, _)] = self.nearest(cloud, neighbor, same, usual);
-            fourth.is_finite()
-        })
+        let is_alone = apart.is_finite()
+            && neighbors.iter().any(|&(_, neighbor)| {
+                let [.., (fourth, _)] = self.nearest(cloud, neighbor, same, usual);
+                fourth.is_finite()
+            });
+        is_alone.then_some(point)
     }
 }
 
@@ -226,7 +225,7 @@ impl Surroundings {
 pub(crate) fn is_alone(cloud: &PointCloud, place: Vec3) -> bool {
     let mut around = Surroundings::default();
     around.find(cloud, &Pose3::IDENTITY, None, &[place]);
-    around.is_alone(cloud, place)
+    around.lone_point(cloud, place).is_some()
 }
 
 /// Removes the components of linked contact pixels that points standing alone make.
@@ -238,6 +237,8 @@ pub(crate) struct LonePoints {
     /// Of the small components.
     middles: Vec<Vec3>,
     is_dropped: Vec<bool>,
+    /// The lone points that were found, of each side, in the frame of the query.
+    pub(crate) found: [Vec<Vec3>; 2],
 }
 
 impl LonePoints {
@@ -254,6 +255,7 @@ impl LonePoints {
         links.components(contacts.len(), &mut self.roots);
         self.components.sort(&self.roots);
         self.is_dropped.clear();
+        self.found.iter_mut().for_each(Vec::clear);
         for side in [0, 1] {
             let Surface::Cloud(cloud) = [query.a, query.b][side] else {
                 continue;
@@ -277,7 +279,7 @@ impl LonePoints {
             (self.around).find(cloud, frame_from_cloud, culled, &self.middles);
             for (component, &middle) in small().zip(&self.middles) {
                 let places = component.iter().map(|&m| at(&contacts[m as usize]));
-                if made_by_lone_point(&self.around, cloud, middle, places) {
+                if made_by_lone_points(&self.around, cloud, middle, places, &mut self.found[side]) {
                     self.is_dropped.resize(contacts.len(), false);
                     for &m in component {
                         self.is_dropped[m as usize] = true;
@@ -318,22 +320,28 @@ fn middle(
 
 /// Whether the middle of a component belongs to a point that stands alone, and so do most of its
 /// pixels. At the rim of a large splat, or where fine points border on coarse ones, some do not, or
-/// do.
-fn made_by_lone_point(
+/// do. If so, `found` gets these points.
+fn made_by_lone_points(
     around: &Surroundings,
     cloud: &PointCloud,
     middle: Vec3,
     places: impl ExactSizeIterator<Item = Vec3> + Clone,
+    found: &mut Vec<Vec3>,
 ) -> bool {
-    if !around.is_alone(cloud, middle) {
+    let Some(point) = around.lone_point(cloud, middle) else {
         return false;
-    }
+    };
     let step = places.len().div_ceil(SAMPLES);
-    let sampled = || places.clone().step_by(step);
-    let alone = sampled()
-        .filter(|&place| around.is_alone(cloud, place))
-        .count();
-    2 * alone > sampled().count()
+    let sampled = places.step_by(step);
+    let (count, before) = (sampled.len(), found.len());
+    found.extend(sampled.filter_map(|place| around.lone_point(cloud, place)));
+    let are_most = 2 * (found.len() - before) > count;
+    if are_most {
+        found.push(point);
+    } else {
+        found.truncate(before);
+    }
+    are_most
 }
 
 #[cfg(test)]

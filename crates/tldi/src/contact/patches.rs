@@ -49,7 +49,7 @@ pub struct PatchScratch {
     group: Vec<u32>,
     links: Links,
     way_out: WayOut,
-    lone_points: LonePoints,
+    pub(crate) lone_points: LonePoints,
     smooth: Vec<Smooth>,
     groups: Groups,
     stack: Vec<(usize, usize, u32)>,
@@ -85,8 +85,11 @@ impl PatchScratch {
     /// of a depth camera, dust. A point stands alone if its fourth nearest neighbour is 2.5 times as
     /// far away as that of one of these four is from it. Cost beside that of `reduce`: where there
     /// are components of few contact pixels, a pass over the points of the blocks around them.
-    pub fn reduce_pair(&mut self, result: &mut PairResult, query: &PairQuery) {
-        self.reduce_culled(result, query, [None; 2]);
+    ///
+    /// Returns whether there were such points. They hide what lies behind them, so the CPU backend then compares the pair
+    /// again without them.
+    pub fn reduce_pair(&mut self, result: &mut PairResult, query: &PairQuery) -> bool {
+        self.reduce_culled(result, query, [None; 2])
     }
 
     /// [`reduce_pair`](Self::reduce_pair) where all points of each cloud that can touch may be at hand.
@@ -95,16 +98,18 @@ impl PatchScratch {
         result: &mut PairResult,
         query: &PairQuery,
         culled: [Option<Culled>; 2],
-    ) {
+    ) -> bool {
         let _stage = stage!("patches");
         self.link(result, &query.params);
-        if self.lone_points.drop(result, &self.links, query, culled) {
+        let are_lone_points = self.lone_points.drop(result, &self.links, query, culled);
+        if are_lone_points {
             self.links.find(&result.contacts, &query.params);
         }
         let tells_inside = query.a.is_oriented() || query.b.is_oriented();
         self.reduce_linked(result, &query.params, tells_inside);
         let fitted = self.smooth.iter().map(|pixel| pixel.gap);
         allow_for_noise(result, fitted.reduce(f32::min), query);
+        are_lone_points
     }
 
     /// [`reduce`](Self::reduce) of the contact pixels of a first look, in which nothing stands alone. The surfaces are

@@ -6,6 +6,7 @@ use super::exact::placed::Placed;
 use super::first_look::settle::FirstLook;
 use super::scratch::Scratch;
 use super::side::{CloudView, ExactView, Scope, Side};
+use crate::contact::lone_points::SAME_POINT;
 use crate::pair::plan::{PairPlan, column_reach};
 use crate::pair::sampling::stride;
 use crate::view::camera_policy::{MAX_VIEWS, further_axes};
@@ -48,12 +49,32 @@ impl Scratch {
             FirstLook::Culled(taken) => taken == strides,
             FirstLook::Nothing => false,
         };
-        self.room.put_back(left);
         let is_near =
             is_found || self.cull(query, &plan, strides, Side::cull) && self.zone(query, &plan);
         if !is_near {
             return;
         }
+        // Each round takes out at least one point.
+        while self.compare_closely(query, &mut plan, left, result)
+            && self.take_out_lone_points(query)
+        {
+            result.clear();
+            if !self.zone(query, &plan) {
+                return;
+            }
+        }
+    }
+
+    /// Compares what was culled with pixels of the size asked for, or with larger ones where these are too many. Returns
+    /// whether points that stand alone hide anything.
+    fn compare_closely(
+        &mut self,
+        query: &PairQuery,
+        plan: &mut PairPlan,
+        left: f32,
+        result: &mut PairResult,
+    ) -> bool {
+        self.room.put_back(left);
         let place = self.place(query);
         result.coarser = (place.coarser > 1.0).then_some(place.coarser);
         self.merge_gaps = place.merging.map(|factor| factor * query.params.merge_gap);
@@ -66,23 +87,23 @@ impl Scratch {
         match query.view {
             View::Fixed(camera) => {
                 result.axes.push(camera.axis());
-                self.look(query, &plan, &camera, &[camera.axis()], 0, result);
+                self.look(query, plan, &camera, &[camera.axis()], 0, result);
             }
             View::Aim { policy, .. } => {
-                self.aim(query, &plan, policy, &mut result.axes);
+                self.aim(query, plan, policy, &mut result.axes);
                 if query.params.variant() == Variant::Paper {
                     let camera = VirtualCamera::along(result.axes[0], query.params.pixel_size);
                     self.compare_paper(query, &camera, result);
-                    return;
+                    return false;
                 }
                 let mut axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
                 for view in 0..axes.len() {
-                    self.look_along(query, &plan, &axes, view, result);
+                    self.look_along(query, plan, &axes, view, result);
                 }
                 if policy == CameraPolicy::AllDirections && !self.crossings.are_enough() {
                     axes.extend(further_axes(&result.axes));
                     for view in result.axes.len()..axes.len() {
-                        self.look_along(query, &plan, &axes, view, result);
+                        self.look_along(query, plan, &axes, view, result);
                     }
                 }
             }
@@ -90,12 +111,27 @@ impl Scratch {
         if let Some(coarser) = self.room.take_wanted() {
             self.room.put_back(left);
             self.compare_coarser(query, coarser, result);
-            return;
+            return false;
         }
         result.collides = self.crossings.are_enough();
         let sides = [(&self.a, &plan.sides[0]), (&self.b, &plan.sides[1])];
         let culled = sides.map(|(side, plan)| side.culled(plan));
-        self.patches.reduce_culled(result, query, culled);
+        self.patches.reduce_culled(result, query, culled)
+    }
+
+    /// Takes the lone points that were found out of what was culled, because they hide what lies behind them; whether
+    /// there were any.
+    fn take_out_lone_points(&mut self, query: &PairQuery) -> bool {
+        let [of_a, of_b] = &self.patches.lone_points.found;
+        let take_out = |side: &mut Side, surface: Surface, places: &[Vec3]| {
+            !places.is_empty()
+                && side
+                    .points
+                    .leave_out(places, SAME_POINT * surface.mean_radius())
+        };
+        let from_a = take_out(&mut self.a, query.a, of_a);
+        let from_b = take_out(&mut self.b, query.b, of_b);
+        from_a || from_b
     }
 
     /// Compares with pixels that are `coarser` times as large: there would be too many of the size asked for.

@@ -8,7 +8,7 @@ use super::first_look::cells::{CellImaging, Cells};
 use super::fold::{FARTHEST_PIXEL, ViewFold};
 use super::motion::core::BORDER;
 use super::normals::sharpen::{SharpenScratch, sharpen};
-use super::normals::{self, NormalScratch};
+use super::normals::{self, Neighborhood, NormalScratch};
 use super::rect::{Footprint, Rect};
 use super::room::{Cost, Room};
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
@@ -116,7 +116,7 @@ impl Side {
             &self.near,
             |i| self.points.point(i as usize),
             |k| is_aim_sample(self.points.index[self.near[k] as usize], step),
-            normals::SUPPORT * self.mean_radius(cloud),
+            &self.neighborhood(cloud),
             &mut self.normals,
             &mut self.kept,
             &mut self.near_normals,
@@ -166,11 +166,19 @@ impl Side {
         drawn as f32 * (edge * edge).min(rect.pixels() as f32)
     }
 
+    /// What decides the normal at a point, if it is not given.
+    pub(super) fn neighborhood(&self, cloud: &PointCloud) -> Neighborhood {
+        Neighborhood {
+            radius: normals::SUPPORT * self.mean_radius(cloud),
+            noise: cloud.noise(),
+        }
+    }
+
     /// Radius in metres about a point in which others decide its normal; 0 where it is given.
     pub(super) fn support_radius(&self, cloud: &PointCloud) -> f32 {
         match cloud.normals() {
             Some(_) => 0.0,
-            None => normals::SUPPORT * self.mean_radius(cloud),
+            None => self.neighborhood(cloud).radius,
         }
     }
 
@@ -322,25 +330,24 @@ impl Side {
         let wanted = |k: usize| {
             touching.is_none_or(|touching| self.columns.is_modelled(touching, support[k]))
         };
-        let radius = normals::SUPPORT * self.mean_radius(view.cloud);
+        let around = self.neighborhood(view.cloud);
         normals::estimate(
             support,
             |i| self.columns.view(i as usize),
             wanted,
-            radius,
+            &around,
             &mut self.normals,
             &mut self.kept,
             &mut self.kept_normals,
         );
         if view.sharpens {
-            let noise = view.cloud.noise();
             let Self {
                 normals,
                 sharpen: scratch,
                 kept_normals,
                 ..
             } = self;
-            sharpen(radius, noise, normals, scratch, kept_normals);
+            sharpen(&around, normals, scratch, kept_normals);
         }
     }
 

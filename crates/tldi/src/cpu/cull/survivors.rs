@@ -69,6 +69,31 @@ impl Survivors {
         self.further.extend_from_slice(&other.further);
     }
 
+    /// Leaves out the points within `apart` metres of one of `places`; whether there are any.
+    pub(crate) fn leave_out(&mut self, places: &[Vec3], apart: f32) -> bool {
+        let is_at = |point: Vec3| {
+            let squared = |place: &Vec3| place.distance_squared(point);
+            places.iter().any(|place| squared(place) <= apart * apart)
+        };
+        let mut kept = 0;
+        for i in 0..self.len() {
+            if !is_at(self.point(i)) {
+                (self.x[kept], self.y[kept], self.z[kept]) = (self.x[i], self.y[i], self.z[i]);
+                self.index[kept] = self.index[i];
+                if let Some(&further) = self.further.get(i) {
+                    self.further[kept] = further;
+                }
+                kept += 1;
+            }
+        }
+        let are_any = kept < self.len();
+        for axis in [&mut self.x, &mut self.y, &mut self.z, &mut self.further] {
+            axis.truncate(kept);
+        }
+        self.index.truncate(kept);
+        are_any
+    }
+
     /// Takes every `stride`-th point of the cloud that is in `all`.
     pub(crate) fn thin_out(&mut self, all: &Self, stride: usize) {
         let _stage = stage!("cull");

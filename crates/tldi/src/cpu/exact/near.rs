@@ -47,13 +47,13 @@ impl Side {
         } else {
             let _stage = stage!("aim");
             // Neighbours are not among the samples.
-            let support = self.support_radius(cloud);
+            let around = self.neighborhood(cloud);
             let of_support = &self.support;
             normals::estimate(
                 of_support,
                 |i| self.points.point(i as usize),
                 |k| self.near.binary_search(&of_support[k]).is_ok(),
-                support,
+                &around,
                 &mut self.normals,
                 &mut self.kept,
                 &mut self.near_normals,

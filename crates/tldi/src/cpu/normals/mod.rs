@@ -4,5 +4,6 @@ pub(crate) mod estimate;
 pub(crate) mod planes;
 pub(crate) mod sharpen;
 
-pub use estimate::SUPPORT;
 pub(crate) use estimate::{NormalScratch, estimate};
+pub(crate) use planes::Neighborhood;
+pub use planes::SUPPORT;

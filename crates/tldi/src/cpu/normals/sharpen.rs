@@ -8,17 +8,9 @@
 
 use crate::contact::ramp::ramp;
 use crate::cpu::lanes::multiversioned;
-use crate::cpu::normals::estimate::{LANES, MAX_CANDIDATES, NormalScratch, SUPPORT, Sorted};
-use crate::cpu::normals::planes::Plane;
+use crate::cpu::normals::estimate::{LANES, MAX_CANDIDATES, NormalScratch, Sorted};
+use crate::cpu::normals::planes::{Neighborhood, Plane, SUPPORT};
 use glamx::Vec3;
-
-/// Standard deviation of neighbours from their plane, in mean radii, up to which they are on it: a tenth of
-/// a pixel, which contacts may err by. Half or twice: no change in any suite.
-const ON_PLANE: f32 = 0.1;
-
-/// Largest ratio of a measured variance to the noise's own that noise alone explains. Over 20 points, a variance scatters
-/// by a third. Half or twice: no row of any suite changes.
-const OF_NOISE: f32 = 2.0;
 
 /// Variance at which neighbours are plainly not on a plane, in units of that up to which they are. Half or twice: no
 /// change in any suite.
@@ -29,12 +21,8 @@ const OFF_PLANE: f32 = 4.0;
 const FLAT: f32 = 0.05;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 4] = [
-    ("ON_PLANE", ON_PLANE as f64),
-    ("OF_NOISE", OF_NOISE as f64),
-    ("OFF_PLANE", OFF_PLANE as f64),
-    ("FLAT_PLANE", FLAT as f64),
-];
+pub(crate) const CONSTANTS: [(&str, f64); 2] =
+    [("OFF_PLANE", OFF_PLANE as f64), ("FLAT_PLANE", FLAT as f64)];
 
 /// Memory of the stage, kept from call to call.
 #[derive(Default)]
@@ -94,12 +82,10 @@ impl FlatPlanes {
     }
 }
 
-/// Sharpens the normals that were just estimated. `radius` is the neighbourhood's, `noise` the standard deviation of the
-/// points that the user gave, both in metres. Cost: less than estimating, and only for points whose neighbours lie on
+/// Sharpens the normals that were just estimated. Cost: less than estimating, and only for points whose neighbours lie on
 /// no plane.
 pub(crate) fn sharpen(
-    radius: f32,
-    noise: f32,
+    around: &Neighborhood,
     estimated: &mut NormalScratch,
     scratch: &mut SharpenScratch,
     normals: &mut [Vec3],
@@ -110,9 +96,8 @@ pub(crate) fn sharpen(
         rough,
         adopted,
     } = scratch;
-    let square = |of_radii: f32| (of_radii / SUPPORT * radius).powi(2);
-    let on_plane = square(ON_PLANE) + OF_NOISE * noise * noise;
-    let limits = [radius * radius, square(FLAT)];
+    let (radius, on_plane) = (around.radius, around.on_plane());
+    let limits = [radius * radius, (FLAT / SUPPORT * radius).powi(2)];
     let is_rough = |k: &u32, planes: &[Plane]| planes[*k as usize].variance > on_plane;
     rough.clear();
     rough.extend(sorted.wanted().filter(|k| is_rough(k, planes)));
@@ -147,11 +132,8 @@ pub(crate) fn sharpen(
 /// `own`. `limits` bound the square distance and the misfit.
 fn mean(point: Vec3, own: &Plane, limits: [f32; 2], flat: &FlatPlanes) -> Option<(Plane, f32)> {
     let [weight, x, y, z, variance, height] = sums(point, own.normal, limits, flat);
-    let plane = Plane {
-        normal: Vec3::new(x, y, z).try_normalize()?,
-        variance: variance / weight,
-        height: height / weight,
-    };
+    let normal = Vec3::new(x, y, z).try_normalize()?;
+    let plane = Plane::new(normal, variance / weight, height / weight);
     Some((plane, weight))
 }
 
@@ -205,13 +187,17 @@ mod tests {
         let support: Vec<u32> = (0..points.len() as u32).collect();
         let (mut targets, mut normals) = (vec![], vec![]);
         let mut scratch = NormalScratch::default();
+        let around = Neighborhood {
+            radius: SUPPORT,
+            noise,
+        };
         // Turned, so that neighbours on one face have normals either way.
         let turn = Quat::from_rotation_z(FRAC_PI_4);
         estimate(
             &support,
             |i| turn * points[i as usize],
             |k| is_wanted(points[k]),
-            SUPPORT,
+            &around,
             &mut scratch,
             &mut targets,
             &mut normals,
@@ -223,7 +209,7 @@ mod tests {
         };
         let estimated = placed(&normals);
         let mut own = SharpenScratch::default();
-        sharpen(SUPPORT, noise, &mut scratch, &mut own, &mut normals);
+        sharpen(&around, &mut scratch, &mut own, &mut normals);
         [estimated, placed(&normals)]
     }
 
