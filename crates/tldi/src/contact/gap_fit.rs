@@ -5,8 +5,12 @@
 //! 5 × 5 pixels it averages noise as well as that mean.
 
 use crate::ContactPixel;
-use crate::contact::links::Links;
+use crate::contact::links::{Links, NONE};
+use arrayvec::ArrayVec;
 use glamx::{Mat4, Vec4};
+
+/// Neighbours of a pixel in 5 × 5 pixels, and room for some with two layers.
+const MOST_NEIGHBORS: usize = 48;
 
 /// What neighbours must tell of the slope and of the curvature before they are believed, in squares
 /// of pixels: a row or a corner of them leaves the rest of the paraboloid open. Half or twice of either:
@@ -43,43 +47,56 @@ pub(crate) struct GapFit {
 impl GapFit {
     /// The gap at contact pixel `k`, in metres, by a fit to it and its neighbours up to two links away.
     pub(crate) fn gap(&mut self, k: u32, contacts: &[ContactPixel], links: &Links) -> f32 {
-        let mut moments = Vec4::ZERO;
-        let mut pattern = 0u32;
-        // Of several contact pixels in one place, the first one counts.
-        let mut put = |l: u32, place: usize| {
-            if pattern >> place & 1 == 0 {
-                moments += BASIS[place] * contacts[l as usize].gap;
-                pattern |= 1 << place;
+        // Contact pixels and their places.
+        let mut ring = ArrayVec::<(u32, usize), MOST_NEIGHBORS>::new();
+        // The first of the ring in each of the 5 × 5 pixels: others in the same pixel are rare.
+        let mut first = [NONE; PLACES];
+        let mut moments = BASIS[MIDDLE] * contacts[k as usize].gap;
+        let mut pattern = 1u32 << MIDDLE;
+        ring.push((k, MIDDLE));
+        first[MIDDLE] = k;
+        let mut push_neighbors = |ring: &mut ArrayVec<_, MOST_NEIGHBORS>, of: u32, at: usize| {
+            for (l, [u, v]) in links.placed_neighbors(of) {
+                let place = at.wrapping_add_signed(isize::from(5 * v + u));
+                let first = &mut first[place];
+                if *first == NONE {
+                    *first = l;
+                } else if *first == l || ring.iter().any(|(m, _)| *m == l) {
+                    continue;
+                }
+                if !ring.is_full() {
+                    ring.push((l, place));
+                    moments += BASIS[place] * contacts[l as usize].gap;
+                    pattern |= 1 << place;
+                }
             }
         };
-        let next = |[u, v]: [i8; 2], from: usize| from.wrapping_add_signed(isize::from(5 * v + u));
-        put(k, MIDDLE);
-        for (l, step) in links.placed_neighbors(k) {
-            put(l, next(step, MIDDLE));
+        push_neighbors(&mut ring, k, MIDDLE);
+        for near in 1..ring.len() {
+            let (of, at) = ring[near];
+            push_neighbors(&mut ring, of, at);
         }
-        for (l, step) in links.placed_neighbors(k) {
-            let place = next(step, MIDDLE);
-            for (m, step) in links.placed_neighbors(l) {
-                put(m, next(step, place));
-            }
+        let places = ring.iter().map(|(_, place)| *place);
+        if ring.len() != pattern.count_ones() as usize {
+            return (inverse_normal_matrix(places) * moments).x;
         }
         if pattern != self.pattern {
             self.pattern = pattern;
-            self.inverse = inverse_normal_matrix(pattern);
+            self.inverse = inverse_normal_matrix(places);
         }
         (self.inverse * moments).x
     }
 }
 
-fn inverse_normal_matrix(pattern: u32) -> Mat4 {
+/// Its sums are of small whole numbers: their order does not matter.
+fn inverse_normal_matrix(places: impl Iterator<Item = usize>) -> Mat4 {
     let mut normal_matrix = Mat4::from_diagonal(Vec4::new(
         0.0,
         LEAST_SLOPE_WEIGHT,
         LEAST_SLOPE_WEIGHT,
         LEAST_BEND_WEIGHT,
     ));
-    let is_there = |place: &usize| pattern >> place & 1 > 0;
-    for basis in (0..PLACES).filter(is_there).map(|place| BASIS[place]) {
+    for basis in places.map(|place| BASIS[place]) {
         normal_matrix += Mat4::from_cols(
             basis * basis.x,
             basis * basis.y,
