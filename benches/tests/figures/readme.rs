@@ -38,7 +38,7 @@ fn the_readme() {
         accuracy.contains("at least seven times") && (6.5..7.5).contains(&least),
         "{least}"
     );
-    // Deep: "0.3 of a grid's time or less, from 134,000 points"; slight: "1.1 to 5 times faster".
+    // Deep: "0.3 of a grid's time or less, from 134,000 points"; slight: "up to 5 times faster".
     let rows = stored("frames/frames_generated.json");
     let ratio = |points, k| {
         let of = |method| frame(&rows, Some(points), method, 1, k)[0];
@@ -52,12 +52,7 @@ fn the_readme() {
         );
     }
     let slight = [10_000, 134_000, 544_000, 1_000_000].map(|points| ratio(points, 1));
-    let (least, most) = slight
-        .iter()
-        .fold((f64::INFINITY, 0f64), |(l, m), r| (l.min(*r), m.max(*r)));
-    assert!(page.contains("is 1.1 to 5 times faster"));
-    assert!(
-        is_rounded("1.1", least) && is_rounded("5", most),
-        "{slight:?}"
-    );
+    let most = slight.into_iter().fold(0.0, f64::max);
+    assert!(page.contains("is up to 5 times faster"));
+    assert!((4.0..=5.0).contains(&most), "{slight:?}");
 }
