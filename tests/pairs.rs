@@ -1,12 +1,14 @@
 //! Whole pairs of clouds against analytic truth: gap, collision, contact normals and support points.
 
+use rapier3d::parry::shape::Ball;
+use rapier3d_tldi::ExactShape;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
     CameraPolicy, ContactPoint, PairQuery, PairResult, Params, PointCloud, Surface, View, Work,
 };
 use tldi_tests::{
-    Samples, aimed, compare_batch, compare_clouds, deepest_point, random_pose, random_unit,
-    sampled_box, sampled_plane, sampled_sphere,
+    Samples, aimed, compare, compare_batch, compare_clouds, deepest_point, random_pose,
+    random_unit, sampled_box, sampled_plane, sampled_sphere,
 };
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
@@ -430,6 +432,24 @@ fn what_lone_points_hide_is_touched() {
         assert!((gap + R).abs() < 0.1 * R, "{} r deep", -gap / R);
         assert!(result.patches[0].normal.y > 0.999);
     }
+}
+
+/// Nothing is left where a flying pixel is all that a body can reach of a cloud.
+#[test]
+fn nothing_but_a_lone_point_is_not_touched() {
+    let mut rng = fastrand::Rng::with_seed(8);
+    let mut points = sampled_plane(0.4, R, &mut rng).points;
+    points.push(Vec3::new(0.0, 0.3, 0.0));
+    let cloud = PointCloud::builder(points).radius(R).build();
+    let cloud = cloud.expect("a valid cloud");
+    let pose = Pose3::translation(0.0, 0.3 + 0.05 - 0.5 * R, 0.0);
+    let ball = sampled_sphere(0.05, R).cloud(R);
+    assert!(clouds(&cloud, &ball, pose).patches.is_empty());
+    let ball = Ball::new(0.05);
+    let ball = ExactShape(&ball);
+    let (a, b) = (Surface::Cloud(&cloud), Surface::Exact(&ball));
+    let result = compare(a, b, pose, Params::for_radius(R));
+    assert!(result.patches.is_empty());
 }
 
 /// A flying pixel is not touched; a wire of points in its place is, and so are five points that are

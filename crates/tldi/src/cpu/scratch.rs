@@ -91,6 +91,12 @@ impl Scratch {
         let reach = plan.zone_reach;
         self.a.near.clear();
         self.b.near.clear();
+        let is_empty = |side: &Side, surface: &Surface| {
+            matches!(surface, Surface::Cloud(_)) && side.points.is_empty()
+        };
+        if is_empty(&self.a, &query.a) || is_empty(&self.b, &query.b) {
+            return false;
+        }
         match (query.a, query.b) {
             (Surface::Cloud(a), Surface::Cloud(b)) => {
                 let zone_side = |points, mean_radius| ZoneSide {
