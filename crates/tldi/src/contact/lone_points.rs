@@ -237,7 +237,7 @@ pub(crate) struct LonePoints {
     /// Of the small components.
     middles: Vec<Vec3>,
     is_dropped: Vec<bool>,
-    /// The lone points that were found, of each side, in the frame of the query.
+    /// The lone points that were found, of each side, in the frame of the query; ascending in x.
     pub(crate) found: [Vec<Vec3>; 2],
 }
 
@@ -286,6 +286,10 @@ impl LonePoints {
                     }
                 }
             }
+        }
+        for found in &mut self.found {
+            found.sort_unstable_by(|p, q| p.x.total_cmp(&q.x));
+            found.dedup();
         }
         let mut is_dropped = self.is_dropped.iter();
         if !self.is_dropped.is_empty() {

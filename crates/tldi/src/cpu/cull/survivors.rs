@@ -69,11 +69,14 @@ impl Survivors {
         self.further.extend_from_slice(&other.further);
     }
 
-    /// Leaves out the points within `apart` metres of one of `places`; whether there are any.
+    /// Leaves out the points within `apart` metres of one of `places`, which ascend in x; whether there are any.
     pub(crate) fn leave_out(&mut self, places: &[Vec3], apart: f32) -> bool {
         let is_at = |point: Vec3| {
-            let squared = |place: &Vec3| place.distance_squared(point);
-            places.iter().any(|place| squared(place) <= apart * apart)
+            let first = places.partition_point(|place| place.x < point.x - apart);
+            let mut near = places[first..]
+                .iter()
+                .take_while(|p| p.x <= point.x + apart);
+            near.any(|place| place.distance_squared(point) <= apart * apart)
         };
         let mut kept = 0;
         for i in 0..self.len() {
