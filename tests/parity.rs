@@ -276,46 +276,6 @@ fn what_the_gpu_does_not_take_the_cpu_compares() {
     assert_eq!(cpu[1].contacts.len(), gpu[1].contacts.len());
 }
 
-/// A ball on a sheet with a flying pixel. One close to a bare sheet is not drawn; for one inside the ball, whose normal
-/// says that it is touched, the CPU compares the pair again.
-#[test]
-fn flying_pixels_do_not_count() {
-    let Some(mut backend) = gpu_backend() else {
-        return;
-    };
-    let mut rng = fastrand::Rng::with_seed(4);
-    let sheet = sampled_plane(0.5, R, &mut rng).points;
-    let ball = sampled_sphere(0.2, R).cloud(R);
-    let cloud = |is_bare: bool, flying: Option<f32>| {
-        let flying = flying.map(|height| Vec3::new(0.01, height, 0.01));
-        let points: Vec<Vec3> = sheet.iter().copied().chain(flying).collect();
-        let normals = vec![Vec3::Y; points.len()];
-        let builder = PointCloud::builder(points).radius(R);
-        let builder = match is_bare {
-            true => builder,
-            false => builder.normals(normals),
-        };
-        builder.build().expect("the points are valid")
-    };
-    for (is_bare, height, pairs_on_cpu) in [(true, 1.5 * R, 0), (false, 10.0 * R, 1)] {
-        let [with, without] = [Some(height), None].map(|flying| cloud(is_bare, flying));
-        let [with, without] = [&with, &without].map(|cloud| {
-            let pose = Pose3::translation(0.0, 0.2 - R, 0.0);
-            let (a, b) = (Surface::Cloud(cloud), Surface::Cloud(&ball));
-            [aimed(a, b, pose, Params::for_radius(R))]
-        });
-        let gpu = compare_on(&mut backend, &with);
-        assert_eq!(backend.pairs_on_cpu(), pairs_on_cpu, "{height}");
-        for cpu in [on_cpu(&with), on_cpu(&without)] {
-            let found = Difference::between(&cpu, &gpu);
-            assert!(
-                found.answers == 0 && found.gap < 0.05,
-                "{height}: {found:?}"
-            );
-        }
-    }
-}
-
 /// New points are uploaded, and old ones are not mistaken for them.
 #[test]
 fn clouds_follow_their_points() {

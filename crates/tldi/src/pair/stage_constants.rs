@@ -1,7 +1,7 @@
 //! The numbers of the stages, for backends on a device.
 
 use crate::BLOCK;
-use crate::cpu::normals::{estimate, planes, sharpen};
+use crate::cpu::normals::{planes, sharpen, sorted};
 use crate::cpu::{compare, crossings, splat, sweep};
 use crate::pair::sampling::AIM_SAMPLES;
 use crate::view::{approach, camera_policy};
@@ -10,7 +10,7 @@ use crate::view::{approach, camera_policy};
 /// declare for them.
 pub fn stage_constants() -> Vec<(&'static str, f64)> {
     let mut all = vec![("BLOCK", BLOCK as f64), ("AIM_SAMPLES", AIM_SAMPLES as f64)];
-    all.extend(estimate::CONSTANTS);
+    all.extend(sorted::CONSTANTS);
     all.extend(planes::CONSTANTS);
     all.extend(sharpen::CONSTANTS);
     all.extend(splat::CONSTANTS);

@@ -3,6 +3,7 @@
 pub(crate) mod estimate;
 pub(crate) mod planes;
 pub(crate) mod sharpen;
+pub(crate) mod sorted;
 
 pub(crate) use estimate::{NormalScratch, estimate};
 pub(crate) use planes::Neighborhood;

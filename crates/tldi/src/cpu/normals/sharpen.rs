@@ -8,8 +8,9 @@
 
 use crate::contact::ramp::ramp;
 use crate::cpu::lanes::multiversioned;
-use crate::cpu::normals::estimate::{LANES, MAX_CANDIDATES, NormalScratch, Sorted};
+use crate::cpu::normals::estimate::{LANES, NormalScratch};
 use crate::cpu::normals::planes::{Neighborhood, Plane, SUPPORT};
+use crate::cpu::normals::sorted::{MAX_CANDIDATES, Sorted};
 use glamx::Vec3;
 
 /// Variance at which neighbours are plainly not on a plane, in units of that up to which they are. Half or twice: no

@@ -1,0 +1,195 @@
+//! Points in a grid of cells, so that each finds its neighbours in 27 of them.
+
+use crate::cpu::lanes::{bounds, multiversioned, truncated};
+use glamx::Vec3;
+use std::ops::Range;
+
+/// Most cells per point: on a surface of 4 million points there are as many. Sparser ones get
+/// larger cells, which only makes for more candidates.
+const CELLS_PER_POINT: usize = 16;
+
+/// Most candidates whose distances are looked at, for all points of a cell: five times what a
+/// surface has. Of more, an even selection represents them.
+pub(crate) const MAX_CANDIDATES: usize = 512;
+
+/// Coordinates that are copied at once, needed or not: as many as a row of cells has on a surface, or half of them.
+pub(super) const RUN: usize = 16;
+
+/// For [`stage_constants`](crate::pair::plan::stage_constants).
+pub(crate) const CONSTANTS: [(&str, f64); 1] = [("MAX_CANDIDATES", MAX_CANDIDATES as f64)];
+
+/// Points in the order of their cells.
+#[derive(Default)]
+pub(crate) struct Sorted {
+    /// Coordinates of the points in the order in which they came, and their cells.
+    points: [Vec<f32>; 3],
+    cells: Vec<u32>,
+    /// What follows is in the order of the cells.
+    pub(super) entries: Vec<Entry>,
+    /// Coordinates, and [`RUN`] more of no meaning.
+    pub(super) coordinates: [Vec<f32>; 3],
+    /// First point of each cell; one entry more than cells.
+    offsets: Vec<u32>,
+    /// Numbers of cells along x and y.
+    dims: [usize; 2],
+}
+
+/// A point in the order of the cells.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Entry {
+    pub(super) id: u32,
+    pub(crate) cell: u32,
+    pub(super) wanted: bool,
+}
+
+/// Cells of the neighbourhood's size; a rim of empty cells spares bounds checks.
+pub(super) struct Grid {
+    min: Vec3,
+    pub(super) inv_cell: f32,
+    dims: [usize; 3],
+}
+
+impl Grid {
+    fn new(min: Vec3, max: Vec3, support: f32, points: usize) -> Self {
+        let limit = (CELLS_PER_POINT * points + 4096) as f32;
+        let extents = max - min;
+        let dims = |cell: f32| (extents / cell).floor() + Vec3::splat(3.0);
+        let mut cell = support;
+        while dims(cell).element_product() > limit {
+            cell *= 1.26; // a third of an octave: twice fewer cells
+        }
+        let d = dims(cell);
+        Self {
+            min,
+            inv_cell: 1.0 / cell,
+            dims: [d.x as usize, d.y as usize, d.z as usize],
+        }
+    }
+
+    fn cells(&self) -> usize {
+        self.dims.iter().product()
+    }
+}
+
+impl Sorted {
+    /// Takes the coordinates of points.
+    pub(super) fn put(&mut self, points: impl ExactSizeIterator<Item = Vec3>) {
+        let [x, y, z] = &mut self.points;
+        for coordinate in [&mut *x, &mut *y, &mut *z] {
+            coordinate.resize(points.len(), 0.0);
+        }
+        for (((x, y), z), point) in x.iter_mut().zip(y).zip(z).zip(points) {
+            (*x, *y, *z) = (point.x, point.y, point.z);
+        }
+    }
+
+    /// Cells of `support` metres over the points. Larger ones if there would be too many.
+    pub(super) fn grid(&self, support: f32) -> Grid {
+        let [x, y, z] = self.points.each_ref().map(|c| bounds(c));
+        let (min, max) = (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1));
+        Grid::new(min, max, support, self.points[0].len())
+    }
+
+    /// Counting sort of the points by cell.
+    pub(super) fn sort(&mut self, support: &[u32], wanted: impl Fn(usize) -> bool, grid: &Grid) {
+        let Self {
+            points,
+            cells,
+            entries,
+            coordinates,
+            offsets,
+            dims,
+        } = self;
+        *dims = [grid.dims[0], grid.dims[1]];
+        offsets.clear();
+        offsets.resize(grid.cells() + 1, 0);
+        cells.resize(support.len(), 0);
+        locate(grid, points, cells);
+        // Counts go one further, so that after the prefix sum an entry is its cell's cursor, and
+        // after the sort its end: the next cell's first point.
+        for &cell in &*cells {
+            offsets[cell as usize + 1] += 1;
+        }
+        let mut sum = 0;
+        for offset in &mut *offsets {
+            sum += *offset;
+            *offset = sum;
+        }
+        entries.resize(support.len(), Entry::default());
+        for coordinate in &mut *coordinates {
+            coordinate.resize(support.len() + RUN, 0.0);
+        }
+        for (k, (&id, &cell)) in support.iter().zip(&*cells).enumerate().rev() {
+            let cursor = &mut offsets[cell as usize + 1];
+            *cursor -= 1;
+            let place = *cursor as usize;
+            entries[place] = Entry {
+                id,
+                cell,
+                wanted: wanted(k),
+            };
+            for (to, from) in coordinates.iter_mut().zip(&*points) {
+                to[place] = from[k];
+            }
+        }
+        // Every entry has moved to its cell's first point, one index too far.
+        offsets.copy_within(1.., 0);
+        if let Some(end) = offsets.last_mut() {
+            *end = support.len() as u32;
+        }
+    }
+
+    /// Of the `k`-th point.
+    pub(crate) fn position(&self, k: usize) -> Vec3 {
+        Vec3::from_array(self.coordinates.each_ref().map(|c| c[k]))
+    }
+
+    /// The points whose normals are wanted.
+    pub(crate) fn wanted(&self) -> impl Iterator<Item = u32> {
+        let all = self.entries.iter().zip(0..);
+        all.filter(|(entry, _)| entry.wanted).map(|(_, k)| k)
+    }
+
+    /// Tells `put` which points are in a cell and its neighbours: all, or of more than
+    /// [`MAX_CANDIDATES`] an even selection. Returns how many.
+    #[inline(always)]
+    pub(crate) fn around(&self, cell: usize, mut put: impl FnMut(usize)) -> usize {
+        let rows = self.rows(cell);
+        let total: usize = rows.iter().map(|row| row.len()).sum();
+        let step = total.div_ceil(MAX_CANDIDATES).max(1);
+        let mut skip = 0;
+        for row in rows {
+            let mut k = row.start + skip;
+            while k < row.end {
+                put(k);
+                k += step;
+            }
+            skip = k - row.end;
+        }
+        total.div_ceil(step)
+    }
+
+    /// The points in a cell and its neighbours: three cells in a row along x are consecutive.
+    #[inline(always)]
+    pub(super) fn rows(&self, cell: usize) -> [Range<usize>; 9] {
+        let [row, slice] = [self.dims[0], self.dims[0] * self.dims[1]];
+        std::array::from_fn(|k| {
+            let first = cell + k / 3 * slice + k % 3 * row - slice - row - 1;
+            self.offsets[first] as usize..self.offsets[first + 3] as usize
+        })
+    }
+}
+
+multiversioned! {
+/// Finds the cells of points.
+fn locate(grid: &Grid, [x, y, z]: &[Vec<f32>; 3], cells: &mut [u32]) {
+    let (min, most) = (grid.min, grid.dims.map(|d| d as f32 - 3.0));
+    let [width, height] = [grid.dims[0] as u32, grid.dims[1] as u32];
+    for (((x, y), z), cell) in x.iter().zip(y).zip(z).zip(cells) {
+        let x = 1 + truncated((x - min.x) * grid.inv_cell, most[0]);
+        let y = 1 + truncated((y - min.y) * grid.inv_cell, most[1]);
+        let z = 1 + truncated((z - min.z) * grid.inv_cell, most[2]);
+        *cell = (z * height + y) * width + x;
+    }
+}
+}
