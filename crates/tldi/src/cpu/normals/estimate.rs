@@ -9,7 +9,7 @@ use crate::cpu::fold::{SpaceFold, is_coarse};
 use crate::cpu::lanes::multiversioned;
 use crate::cpu::normals::planes::{Batch, Neighborhood, PartialMoments, Plane};
 use crate::cpu::normals::sorted::{MAX_CANDIDATES, RUN, Sorted};
-use glamx::{Vec3, Vec4};
+use glamx::Vec3;
 
 /// Candidates that are summed side by side. With 16, slight frames take 3 to 5 % longer.
 pub(crate) const LANES: usize = 8;
@@ -167,7 +167,7 @@ fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> PartialMome
             sums[9][l] += dz * dz;
         }
     }
-    sums.map(|s| Vec4::new(s[0] + s[4], s[1] + s[5], s[2] + s[6], s[3] + s[7]))
+    sums
 }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::cloud::point_normals::least_variance_axis;
 use crate::cpu::lanes::multiversioned;
+use crate::cpu::normals::estimate::LANES;
 use glamx::{DMat3, DVec3, FloatExt, Mat4, Vec3, Vec4};
 
 /// Planes that are solved for side by side.
@@ -59,8 +60,8 @@ impl Neighborhood {
 /// Sums over the points around a point, of 1, x, y, z, xx, xy, xz, yy, yz and zz; metres from the point.
 type Moments = [f32; 10];
 
-/// The same, each in four parts that are still to be added up.
-pub(crate) type PartialMoments = [Vec4; 10];
+/// The same, each in parts that are still to be added up.
+pub(crate) type PartialMoments = [[f32; LANES]; 10];
 
 /// The plane that best fits the points around a point.
 #[derive(Clone, Copy, Debug)]
@@ -135,7 +136,7 @@ impl Default for Batch {
     fn default() -> Self {
         Self {
             place: [0; BATCH],
-            partial: [[Vec4::ZERO; 10]; BATCH],
+            partial: [[[0.0; LANES]; 10]; BATCH],
             moments: [[0.0; BATCH]; 10],
             normal: [[0.0; BATCH]; 3],
             variance: [0.0; BATCH],
@@ -158,9 +159,14 @@ impl Batch {
     /// Adds up the parts of moments, of four neighbourhoods at once.
     fn add_up(&mut self) {
         let (fours, _) = self.partial.as_chunks::<4>();
-        for (k, [a, b, c, d]) in fours.iter().enumerate() {
+        let halves = |parts: &[f32; LANES]| {
+            let (low, high) = parts.split_at(LANES / 2);
+            Vec4::from_slice(low) + Vec4::from_slice(high)
+        };
+        for (k, four) in fours.iter().enumerate() {
             for (m, sums) in self.moments.iter_mut().enumerate() {
-                let parts = Mat4::from_cols(a[m], b[m], c[m], d[m]).transpose();
+                let [a, b, c, d] = four.each_ref().map(|parts| halves(&parts[m]));
+                let parts = Mat4::from_cols(a, b, c, d).transpose();
                 let sum = (parts.x_axis + parts.z_axis) + (parts.y_axis + parts.w_axis);
                 sums[4 * k..4 * k + 4].copy_from_slice(&sum.to_array());
             }
