@@ -92,8 +92,8 @@ pub(crate) fn estimate(
             cell = entry.cell;
             candidates.gather(sorted, cell as usize);
         }
-        let moments = moments(sorted.position(k as usize), radius * radius, candidates);
-        batch.push(k, moments);
+        let sums = batch.push(k);
+        moments(sorted.position(k as usize), radius * radius, candidates, sums);
         if batch.is_full() {
             batch.solve(planes);
         }
@@ -144,8 +144,9 @@ impl Candidates {
 }
 
 multiversioned! {
-/// Of the candidates within the neighbourhood of `p`.
-fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> PartialMoments {
+/// Of the candidates within the neighbourhood of `p`. `out` gets all lanes: if they were added up here, compilers would make
+/// scalars of them.
+fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates, out: &mut PartialMoments) {
     let mut sums = [[0.0f32; LANES]; 10];
     let [x, y, z] = candidates.coordinates.each_ref().map(|c| c.as_chunks::<LANES>().0);
     let chunks = x.iter().zip(y).zip(z).take(candidates.count / LANES);
@@ -167,7 +168,7 @@ fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates) -> PartialMome
             sums[9][l] += dz * dz;
         }
     }
-    sums
+    *out = sums;
 }
 }
 

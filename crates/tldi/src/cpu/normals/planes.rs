@@ -149,11 +149,12 @@ impl Default for Batch {
 }
 
 impl Batch {
-    /// Adds a neighbourhood whose plane is to be the `place`-th.
-    pub(crate) fn push(&mut self, place: u32, moments: PartialMoments) {
-        self.place[self.count] = place;
-        self.partial[self.count] = moments;
+    /// Adds a neighbourhood whose plane is to be the `place`-th. Returns where its moments go.
+    pub(crate) fn push(&mut self, place: u32) -> &mut PartialMoments {
+        let k = self.count;
         self.count += 1;
+        self.place[k] = place;
+        &mut self.partial[k]
     }
 
     /// Adds up the parts of moments, of four neighbourhoods at once.
