@@ -392,11 +392,8 @@ impl Splat {
     /// A rise in depth within the splat, at most its radius.
     #[inline(always)]
     fn limited(&self, rise: f32) -> f32 {
-        if rise.is_finite() {
-            rise.max(-self.radius).min(self.radius)
-        } else {
-            0.0
-        }
+        let rise = if rise.is_finite() { rise } else { 0.0 };
+        rise.max(-self.radius).min(self.radius)
     }
 
     /// Rows of the image within `rows` that may be covered.
@@ -455,11 +452,7 @@ fn fill(splats: &[Splat], rows: &Rect, out: Out, rise: impl Fn(&Splat, [f32; 2],
                     let share = 1.0 - (dx * dx + dy * dy + rise * rise) * inv_radius_squared;
                     let depth = truncated(splat.depth + splat.steps * rise, MAX_DEPTH);
                     keys[l] = splat.class | depth & !1;
-                    let share_seen = if share > 0.0 {
-                        share * splat.facing
-                    } else {
-                        0.0
-                    };
+                    let share_seen = share.max(0.0) * splat.facing;
                     weights[l] = truncated(1.0 + (MAX_WEIGHT - 1.0) * share_seen, MAX_WEIGHT);
                     let inside = (i <= splat.last[0]) & (j <= last_row);
                     let hit = inside & ((share > 0.0) | (own(dx) & own(dy)));

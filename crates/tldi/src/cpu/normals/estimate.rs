@@ -93,7 +93,12 @@ pub(crate) fn estimate(
             candidates.gather(sorted, cell as usize);
         }
         let sums = batch.push(k);
-        moments(sorted.position(k as usize), radius * radius, candidates, sums);
+        moments(
+            sorted.position(k as usize),
+            radius * radius,
+            candidates,
+            sums,
+        );
         if batch.is_full() {
             batch.solve(planes);
         }
