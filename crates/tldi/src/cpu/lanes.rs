@@ -2,6 +2,10 @@
 
 /// Compiles a function for several instruction sets. The call chooses the best that the machine has. Results are equal:
 /// the compiler does not fuse a multiplication and an addition.
+///
+/// A loop can be SIMD with one set and scalar with another. Two things prevent SIMD most often: a branch in a lane (take `max`,
+/// `min`, or one of two computed values), and adding up lanes in the same function (give out all of them). `perf
+/// annotate` shows it: the loop then has `ss` instructions or `vinsertps`.
 macro_rules! multiversioned {
     ($function:item) => {
         #[multiversion::multiversion(targets(
