@@ -7,12 +7,9 @@
 
 use crate::cpu::fold::{SpaceFold, is_coarse};
 use crate::cpu::lanes::multiversioned;
-use crate::cpu::normals::planes::{Batch, Neighborhood, PartialMoments, Plane};
+use crate::cpu::normals::planes::{Batch, LANES, Neighborhood, PartialMoments, Plane};
 use crate::cpu::normals::sorted::{MAX_CANDIDATES, RUN, Sorted};
 use glamx::Vec3;
-
-/// Candidates that are summed side by side. With 16, slight frames take 3 to 5 % longer.
-pub(crate) const LANES: usize = 8;
 
 /// Memory of the stage, kept from call to call.
 #[derive(Default)]

@@ -8,8 +8,8 @@
 
 use crate::contact::ramp::ramp;
 use crate::cpu::lanes::multiversioned;
-use crate::cpu::normals::estimate::{LANES, NormalScratch};
-use crate::cpu::normals::planes::{Neighborhood, Plane, SUPPORT};
+use crate::cpu::normals::estimate::NormalScratch;
+use crate::cpu::normals::planes::{LANES, Neighborhood, Plane, SUPPORT};
 use crate::cpu::normals::sorted::{MAX_CANDIDATES, Sorted};
 use glamx::Vec3;
 
