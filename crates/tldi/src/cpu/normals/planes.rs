@@ -4,7 +4,7 @@ use crate::cloud::point_normals::least_variance_axis;
 use crate::cpu::lanes::multiversioned;
 use glamx::{DMat3, DVec3, FloatExt, Mat4, Vec3, Vec4};
 
-/// Neighbours that are summed side by side: an AVX2 register of `f32`. [`Batch::add_up`] is written for 8. With 16, slight
+/// Neighbours that are summed side by side: an AVX2 register of `f32`. `Batch::add_up` is written for 8. With 16, slight
 /// frames took 3 to 5 % longer.
 pub(crate) const LANES: usize = 8;
 
