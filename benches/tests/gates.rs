@@ -2,10 +2,7 @@
 //! change that makes one worse fails here. One that makes one better may lower its bound.
 //!
 //! Contacts that are told to be too deep have theirs in the package of the tests (`overlaps.rs`), allocations in
-//! `step_allocations.rs` of the crate for rapier, hard scenes in the stability suite. In release only: the numbers are the
-//! same without optimisation, and take ten times as long.
-
-#![cfg(not(debug_assertions))]
+//! `step_allocations.rs` of the crate for rapier, hard scenes in the stability suite.
 
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;

@@ -9,13 +9,8 @@ use tldi_examples::scene::BodyShape;
 use tldi_examples::spots::{Demand, find_spots};
 use tldi_sources::depth::{DepthCamera, DepthCloud};
 
-/// Five that were looked at while this was made, and five that were run once it was done. In debug, which takes four times as
-/// long, one of each.
-const SEEDS: &[u64] = if cfg!(debug_assertions) {
-    &[1, 101]
-} else {
-    &[1, 2, 3, 4, 5, 101, 102, 103, 104, 105]
-};
+/// Two that were looked at while this was made, and two that were run once it was done.
+const SEEDS: [u64; 4] = [1, 2, 101, 102];
 
 fn seen(frames: &RegisteredFrames) -> DepthCloud {
     let mut camera = DepthCamera::new(frames.intrinsics(), frames.model);
@@ -189,7 +184,7 @@ fn bodies_rest_within_two_seconds() {
     let mut restless = Vec::new();
     let empty = SEEDS
         .iter()
-        .take(5)
+        .step_by(2)
         .map(|&seed| (seed, RegisteredFrames::with_empty(seed, 0.6)));
     let plain = SEEDS
         .iter()

@@ -10,12 +10,8 @@ use tldi_memory::held;
 
 /// Frames, in two rounds with the same counts.
 const FRAMES: usize = 1000;
-/// Most points of a frame; fewer without optimisation.
-const MOST: usize = if cfg!(debug_assertions) {
-    3_000
-} else {
-    300_000
-};
+/// Most points of a frame.
+const MOST: usize = 300_000;
 /// Bytes by which the second round may exceed the first: what rapier and the threads keep of their own.
 const SLACK: usize = 64 << 10;
 
