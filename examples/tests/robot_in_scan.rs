@@ -175,16 +175,14 @@ fn a_walker_does_not_explode() {
         "floor.ply",
         "--steps",
         "120",
-        "--animate",
     ];
-    let report = common::report_with_pictures(BINARY, &folder, &options);
+    let report = report(&folder, &options);
     assert_eq!(report["base_fixed"], false);
     assert_eq!(report["driven_joints"], 8);
     let base = [0, 1, 2].map(|k| number(&report["base"][k]));
     // The torso stands 0.43 m over the floor; the legs bend by up to 0.3 rad.
     assert!((0.3..0.46).contains(&base[2]), "{base:?}");
     assert!(number(&report["max_penetration"]) < 0.03, "{report}");
-    assert!(folder.join("out/robot_in_scan/motion.png").exists());
 }
 
 /// The robot's own image holds it where it is, unless it is taken out.
@@ -334,18 +332,18 @@ fn what_is_wrong_is_said() {
     }
     // A single link without joints just stands there.
     fs::write(folder.join("robot.urdf"), format!("{one_link}</robot>")).unwrap();
-    let report = report(
-        &folder,
-        &[
-            "--urdf",
-            "robot.urdf",
-            "--scan",
-            "floor.ply",
-            "--steps",
-            "10",
-        ],
-    );
+    let options = [
+        "--urdf",
+        "robot.urdf",
+        "--scan",
+        "floor.ply",
+        "--steps",
+        "10",
+        "--animate",
+    ];
+    let report = common::report_with_pictures(BINARY, &folder, &options);
     assert_eq!(report["driven_joints"], 0);
+    assert_pictures(&folder.join("out/robot_in_scan"), &["motion.png"]);
     let cases: [(&[&str], i32, &str); 4] = [
         (&["--backend", "fast"], 2, "is no backend"),
         (&["--scan-scale", "0"], 2, "greater than 0"),

@@ -31,14 +31,7 @@ fn write_spheres(folder: &Path) {
 
 fn answer(folder: &Path, options: &[&str]) -> Value {
     write_spheres(folder);
-    let files = [
-        "a.ply",
-        "b.ply",
-        "--out",
-        "pictures",
-        "--json",
-        "answer.json",
-    ];
+    let files = ["a.ply", "b.ply", "--json", "answer.json"];
     let output = run(BINARY, folder, &[&files, options].concat());
     assert!(output.status.success(), "{}", stderr(&output));
     json(folder.join("answer.json"))
@@ -53,9 +46,14 @@ fn vector(value: &Value) -> [f64; 3] {
 #[test]
 fn spheres_answer_as_geometry_says() {
     let folder = folder("two_clouds_spheres");
-    for (distance, depth) in [(0.198, 0.002), (0.203, -0.003), (0.7, -0.5)] {
+    let drawn = ["--out", "pictures"];
+    for (distance, depth, pictures) in [
+        (0.198, 0.002, &drawn[..]),
+        (0.203, -0.003, &["--no-pictures"]),
+        (0.7, -0.5, &["--no-pictures"]),
+    ] {
         let pose = format!("0,{distance},0");
-        let answer = answer(&folder, &["--pose", &pose]);
+        let answer = answer(&folder, &[&["--pose", &pose], pictures].concat());
         assert_eq!(answer["collides"], depth > 0.0, "{answer}");
         let gap = answer["gap"].as_f64().unwrap();
         assert!((gap + depth).abs() < 4e-4, "{distance}: {gap}");
@@ -86,8 +84,9 @@ fn spheres_answer_as_geometry_says() {
 #[test]
 fn a_velocity_tells_when_they_meet() {
     let folder = folder("two_clouds_velocity");
-    let options = ["--pose", "0,0.7,0", "--velocity", "0,-2,0", "--animate"];
-    let impact = &answer(&folder, &options)["impact"];
+    let thrown = ["--pose", "0,0.7,0", "--velocity"];
+    let options = ["0,-2,0", "--animate", "--out", "pictures"];
+    let impact = &answer(&folder, &[&thrown[..], &options].concat())["impact"];
     assert!(
         (impact["time_seconds"].as_f64().unwrap() - 0.25).abs() < 4e-4,
         "{impact}"
@@ -97,7 +96,8 @@ fn a_velocity_tells_when_they_meet() {
         "{impact}"
     );
     assert!(folder.join("pictures/motion.png").exists());
-    let away = answer(&folder, &["--pose", "0,0.7,0", "--velocity", "0,2,0"]);
+    let options = ["0,2,0", "--no-pictures"];
+    let away = answer(&folder, &[&thrown[..], &options].concat());
     assert_eq!(away["impact"], Value::Null);
 }
 

@@ -1,6 +1,6 @@
 //! The backend that tests run on.
 
-use std::cell::RefCell;
+use std::sync::Mutex;
 use tldi::{Backend, PairQuery, PairResult};
 use tldi_wgpu::{AdapterChoice, BackendChoice, Gpu, WgpuBackend};
 
@@ -10,11 +10,15 @@ use tldi_wgpu::{AdapterChoice, BackendChoice, Gpu, WgpuBackend};
 /// # Panics
 /// If a query is not supported, or a GPU that was asked for is not there.
 pub fn compare_batch(batch: &[PairQuery<'_>]) -> Vec<PairResult> {
-    thread_local! {
-        static BACKEND: RefCell<Box<dyn Backend>> =
-            RefCell::new(BackendChoice::Auto.open().expect("the backend is there"));
-    }
-    BACKEND.with_borrow_mut(|backend| compare_on(&mut **backend, batch))
+    // One for each test that runs now. They outlive their threads: a device cannot be dropped with a thread's variables.
+    static IDLE: Mutex<Vec<Box<dyn Backend>>> = Mutex::new(Vec::new());
+    let idle = || IDLE.lock().expect("nothing panics with the lock held");
+    let taken = idle().pop();
+    let mut backend =
+        taken.unwrap_or_else(|| BackendChoice::Auto.open().expect("the backend is there"));
+    let results = compare_on(&mut *backend, batch);
+    idle().push(backend);
+    results
 }
 
 /// Compares a batch on a backend.

@@ -38,7 +38,6 @@ pub fn to_apng(pictures: &[Picture], seconds: f32) -> Result<Vec<u8>, AnimationE
     let mut encoder = png::Encoder::new(&mut bytes, expected[0], expected[1]);
     encoder.set_color(png::ColorType::Rgba);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::High);
     encoder.set_animated(pictures.len() as u32, 0)?;
     let milliseconds = (1e3 * seconds).round().clamp(1.0, f32::from(u16::MAX));
     encoder.set_frame_delay(milliseconds as u16, 1000)?;

@@ -52,18 +52,22 @@ impl FrontLayers {
     /// closes gaps of a few pixels, where a sparse scan does not quite cover the image. Real holes stay.
     fn close_pinholes(&mut self) {
         let width = self.size[0] as usize;
+        let inner = width + 1..self.pixels.len().saturating_sub(width + 1);
+        let mut empty: Vec<usize> = inner.filter(|&k| self.pixels[k].is_none()).collect();
         for _ in 0..PINHOLE_ROUNDS {
-            let before = self.pixels.clone();
-            for k in width + 1..before.len().saturating_sub(width + 1) {
-                if before[k].is_some() {
-                    continue;
-                }
-                let opposite = [1, width, width + 1, width - 1].into_iter();
-                let closed = opposite.filter_map(|step| before[k - step].zip(before[k + step]));
-                self.pixels[k] = closed
-                    .map(|(a, b)| if a.1.depth > b.1.depth { a } else { b })
-                    .max_by(|a, b| a.1.depth.total_cmp(&b.1.depth));
+            let closed: Vec<_> = (empty.iter())
+                .map(|&k| {
+                    let opposite = [1, width, width + 1, width - 1].into_iter();
+                    opposite
+                        .filter_map(|step| self.pixels[k - step].zip(self.pixels[k + step]))
+                        .map(|(a, b)| if a.1.depth > b.1.depth { a } else { b })
+                        .max_by(|a, b| a.1.depth.total_cmp(&b.1.depth))
+                })
+                .collect();
+            for (&k, closed) in empty.iter().zip(closed) {
+                self.pixels[k] = closed;
             }
+            empty.retain(|&k| self.pixels[k].is_none());
         }
     }
 }

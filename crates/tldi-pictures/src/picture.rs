@@ -63,7 +63,6 @@ impl Picture {
         let mut encoder = png::Encoder::new(&mut bytes, self.size[0], self.size[1]);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(png::Compression::High);
         encoder
             .write_header()?
             .write_image_data(self.rgb.as_flattened())?;
