@@ -10,7 +10,8 @@ use tldi_wgpu::{AdapterChoice, BackendChoice, Gpu, WgpuBackend};
 /// # Panics
 /// If a query is not supported, or a GPU that was asked for is not there.
 pub fn compare_batch(batch: &[PairQuery<'_>]) -> Vec<PairResult> {
-    // One for each test that runs now. They outlive their threads: a device cannot be dropped with a thread's variables.
+    // One for each test that runs at the same time. They outlive their threads: a device cannot be dropped with a thread's
+    // variables.
     static IDLE: Mutex<Vec<Box<dyn Backend>>> = Mutex::new(Vec::new());
     let idle = || IDLE.lock().expect("nothing panics with the lock held");
     let taken = idle().pop();

@@ -64,8 +64,8 @@ impl FrontLayers {
                         .max_by(|a, b| a.1.depth.total_cmp(&b.1.depth))
                 })
                 .collect();
-            for (&k, closed) in empty.iter().zip(closed) {
-                self.pixels[k] = closed;
+            for (&k, layer) in empty.iter().zip(closed) {
+                self.pixels[k] = layer;
             }
             empty.retain(|&k| self.pixels[k].is_none());
         }
