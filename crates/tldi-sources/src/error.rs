@@ -108,6 +108,14 @@ pub enum SourceErrorKind {
         /// Which rule.
         reason: String,
     },
+    /// Columns of text have no names, and neither their number nor their values tell what they mean.
+    #[error(
+        "{what}: name the columns in a first line such as `x y z r g b` or `x y z nx ny nz`; of files named .xyzrgb and .xyzn these are known"
+    )]
+    UnnamedColumns {
+        /// Which columns, and what was expected of them.
+        what: String,
+    },
     /// The file is sound as far as known, but needs what this reader does not have.
     #[error("{what} is not supported: convert the file, for example to binary PLY")]
     Unsupported {

@@ -16,6 +16,10 @@ pub enum Format {
     Kitti,
     /// One point a line, in columns: XYZ, TXT, CSV, ASC, PTS.
     Text,
+    /// Open3D's XYZRGB: as [`Text`](Self::Text); columns that no line names are x, y, z, red, green, blue.
+    XyzRgb,
+    /// Open3D's XYZN: as [`Text`](Self::Text); columns that no line names are x, y, z and the normal.
+    XyzNormals,
     /// ASPRS LAS and LAZ (feature `las`).
     Las,
     /// ASTM E57 (feature `e57`).
@@ -43,7 +47,9 @@ impl Format {
             "ply" => Some(Self::Ply),
             "pcd" => Some(Self::Pcd),
             "bin" => Some(Self::Kitti),
-            "xyz" | "txt" | "csv" | "asc" | "pts" | "xyzrgb" | "xyzn" => Some(Self::Text),
+            "xyz" | "txt" | "csv" | "asc" | "pts" => Some(Self::Text),
+            "xyzrgb" => Some(Self::XyzRgb),
+            "xyzn" => Some(Self::XyzNormals),
             "las" | "laz" => Some(Self::Las),
             "e57" => Some(Self::E57),
             _ => None,
@@ -86,6 +92,8 @@ impl fmt::Display for Format {
             Self::Pcd => "PCD",
             Self::Kitti => "KITTI",
             Self::Text => "XYZ/CSV",
+            Self::XyzRgb => "XYZRGB",
+            Self::XyzNormals => "XYZN",
             Self::Las => "LAS/LAZ",
             Self::E57 => "E57",
         })

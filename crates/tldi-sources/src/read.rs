@@ -117,7 +117,11 @@ fn dispatch(
         Format::Ply => crate::ply::parse(&mut input, options)?,
         Format::Pcd => crate::pcd::parse(&mut input, options)?,
         Format::Kitti => crate::kitti::parse(&mut input, options)?,
-        Format::Text => crate::text::parse(&mut input, options)?,
+        Format::Text => crate::text::parse(&mut input, options, &[])?,
+        Format::XyzRgb => crate::text::parse(&mut input, options, &["x", "y", "z", "r", "g", "b"])?,
+        Format::XyzNormals => {
+            crate::text::parse(&mut input, options, &["x", "y", "z", "nx", "ny", "nz"])?
+        }
         #[cfg(feature = "las")]
         Format::Las => crate::las::parse(&mut input, path, options)?,
         #[cfg(not(feature = "las"))]
