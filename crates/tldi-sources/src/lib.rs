@@ -62,6 +62,7 @@ mod kitti;
 #[cfg(feature = "las")]
 mod las;
 mod moving;
+mod numbered;
 mod options;
 mod pcd;
 mod ply;
@@ -77,6 +78,7 @@ mod text;
 
 pub use error::{Position, SourceError, SourceErrorKind};
 pub use moving::{MovingError, MovingPoints};
+pub use numbered::numbered_order;
 pub use options::{Format, Progress, ReadOptions};
 pub use point_cloud2::{PointCloud2, PointField};
 pub use raw_cloud::RawCloud;
