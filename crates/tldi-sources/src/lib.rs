@@ -5,7 +5,8 @@
 //! | PLY | `ply` | ascii, binary little and big endian; faces |
 //! | Gaussian splats | `ply` | as PLY, told by their properties; see below |
 //! | PCD | `pcd` | ascii, binary, binary_compressed |
-//! | KITTI | `bin` | x, y, z, intensity as little-endian `f32`, seen from the origin |
+//! | sweeps: KITTI | `bin` | x, y, z, intensity as little-endian `f32`, seen from the origin |
+//! | sweeps: nuScenes | `pcd.bin` | x, y, z, intensity, ring likewise |
 //! | columns of text | `xyz`, `txt`, `csv`, `asc`, `pts`, `xyzrgb`, `xyzn` | see below |
 //! | LAS, LAZ | `las`, `laz` | feature `las` |
 //! | E57 | `e57` | feature `e57` |
@@ -33,6 +34,8 @@
 //! splat of at least [`ReadOptions::least_opacity`] becomes a point: its radius is √(σ₁ σ₂) of its two
 //! longer axes, its normal the shortest one, of either sign, and its colour ½ + `f_dc` / (2 √π).
 //!
+//! Files of sweeps have no header: `.bin` means four numbers a point and `.pcd.bin` five, whatever is in them.
+//!
 //! Besides, [`PointCloud2`] reads messages of ROS, [`depth`] has folders of depth frames, and [`MovingPoints`] deforming meshes as NumPy arrays
 //! or folders of clouds.
 //!
@@ -58,7 +61,6 @@ mod e57;
 mod error;
 mod header;
 mod input;
-mod kitti;
 #[cfg(feature = "las")]
 mod las;
 mod moving;
@@ -74,6 +76,7 @@ mod scalar;
 mod seekable;
 mod slot;
 mod splat;
+mod sweep;
 mod text;
 
 pub use error::{Position, SourceError, SourceErrorKind};
