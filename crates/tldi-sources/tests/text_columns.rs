@@ -197,3 +197,17 @@ fn a_count_may_follow_the_names() {
         );
     }
 }
+
+/// CloudCompare with colours from 0 to 1, between tabs, where names of scalar fields keep their blanks.
+#[test]
+fn names_of_cloudcompare() {
+    let file = "//X\tY\tZ\tGPS time\tRf\tGf\tBf\tAf\tNx\tNy\tNz\n\
+                1\t2\t3\t77.5\t0.2\t1\t0\t0.4\t0\t0\t1\n";
+    let cloud = text(file, Format::Text);
+    assert_eq!(cloud.points, [Vec3::new(1.0, 2.0, 3.0)]);
+    assert_eq!(cloud.colors, Some(vec![[51, 255, 0, 102]]));
+    assert_eq!(cloud.normals, Some(vec![Vec3::Z]));
+    // Tabs and blanks mixed: words are names.
+    let cloud = text("x\ty z nx  ny\tnz\n1 2\t3 0 1 0\n", Format::Text);
+    assert_eq!(cloud.normals, Some(vec![Vec3::Y]));
+}

@@ -109,17 +109,22 @@ impl State<'_> {
     }
 }
 
-/// The words of a header line, without quotes.
+/// The words of a header line, without quotes. Between tabs, a name may have blanks.
 fn names(line: &[u8]) -> Vec<String> {
     let separator = Separator::of(line);
-    separator
-        .fields(line)
-        .map(|name| {
-            let name = String::from_utf8_lossy(name);
-            name.trim_matches(|c: char| c == '"' || c == '\'' || c.is_whitespace())
-                .to_owned()
-        })
-        .collect()
+    if separator == Separator::Blanks && line.contains(&b'\t') {
+        let names: Vec<String> = line.split(|b| *b == b'\t').map(name).collect();
+        if is_header(&names) {
+            return names;
+        }
+    }
+    separator.fields(line).map(name).collect()
+}
+
+fn name(field: &[u8]) -> String {
+    let name = String::from_utf8_lossy(field);
+    name.trim_matches(|c: char| c == '"' || c == '\'' || c.is_whitespace())
+        .to_owned()
 }
 
 fn is_header(names: &[String]) -> bool {
