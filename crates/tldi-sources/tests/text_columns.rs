@@ -74,6 +74,9 @@ fn xyzn_files_have_normals() {
     for (found, normal) in cloud.normals.expect("normals").iter().zip(normals) {
         assert!(found.distance(normal) < 1e-5, "{found} {normal}");
     }
+    // As whole numbers, and of a length that no guess takes for normals.
+    let cloud = text(&lines(5, |_| "0 0 2".to_owned()), format);
+    assert_eq!(cloud.normals, Some(vec![2.0 * Vec3::Z; 5]));
 }
 
 /// A header wins over the extension, and other numbers of columns are refused.
