@@ -10,7 +10,8 @@ use crate::input::Input;
 use crate::seekable::{self, ReadSeek, guarded};
 use crate::{Format, Position, RawCloud, ReadOptions, SourceError, SourceErrorKind};
 use ::e57::{
-    CartesianCoordinate, E57Reader, Error, PointCloud, RecordDataType, RecordName, RecordValue,
+    CartesianCoordinate, E57Reader, Error, PointCloud, Quaternion, RecordDataType, RecordName,
+    RecordValue,
 };
 use std::path::Path;
 use tldi::glamx::DVec3;
@@ -87,12 +88,22 @@ fn read(
     let mut cloud = collector.finish()?;
     if let [scan] = &scans[..]
         && let Some(pose) = &scan.transform
+        && is_scanner(scan, &pose.rotation)
     {
         let t = &pose.translation;
         let sensor = DVec3::new(t.x, t.y, t.z);
         cloud.viewpoint = Some((sensor - cloud.origin).as_vec3()).filter(|v| v.is_finite());
     }
     Ok(cloud)
+}
+
+/// Whether the pose of a scan is that of a scanner. That of a merged cloud is a mere shift: CloudCompare
+/// writes its global shift so.
+fn is_scanner(scan: &PointCloud, rotation: &Quaternion) -> bool {
+    let has = |name| scan.prototype.iter().any(|record| record.name == name);
+    let is_turned = [rotation.x, rotation.y, rotation.z] != [0.0; 3];
+    let is_organised = has(RecordName::RowIndex) && has(RecordName::ColumnIndex);
+    is_turned || is_organised || has(RecordName::SphericalRange)
 }
 
 /// Checks what the crate trusts: it fills memory if no value of a point takes any bit.

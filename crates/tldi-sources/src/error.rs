@@ -1,6 +1,7 @@
 //! What can be wrong with a file, where in it, and what to do about it.
 
 use crate::Format;
+use crate::options::MOST_POINTS;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -77,9 +78,17 @@ pub enum SourceErrorKind {
     Io(io::Error),
     /// Neither the content nor the file's extension tells the format.
     #[error(
-        "unknown format: name it .ply, .pcd, .xyz, .txt, .csv, .pts, .bin, .las, .laz or .e57 (each may be followed by .gz), or name the format in the call"
+        "unknown format: name it .ply, .pcd, .xyz, .xyzrgb, .xyzn, .txt, .csv, .asc, .pts, .bin, .pcd.bin, .las, .laz or .e57 (each may be followed by .gz), or name the format in the call"
     )]
     UnknownFormat,
+    /// The extension is that of a mesh that is not PLY.
+    #[error(
+        "a .{extension} file is a mesh, and of meshes only PLY is read: convert it to PLY, whose vertices become the points, or sample points on its faces and write these as PLY"
+    )]
+    Mesh {
+        /// The file's extension, in lower case.
+        extension: String,
+    },
     /// Support for this format was not compiled in.
     #[error("{format} is not compiled in: enable the feature `{feature}` of tldi-sources")]
     FormatDisabled {
@@ -108,6 +117,14 @@ pub enum SourceErrorKind {
         /// Which rule.
         reason: String,
     },
+    /// Columns of text have no names, and neither their number nor their values tell what they mean.
+    #[error(
+        "{what}: name the columns in a first line such as `x y z r g b` or `x y z nx ny nz`; of files named .xyzrgb and .xyzn these are known"
+    )]
+    UnnamedColumns {
+        /// Which columns, and what was expected of them.
+        what: String,
+    },
     /// The file is sound as far as known, but needs what this reader does not have.
     #[error("{what} is not supported: convert the file, for example to binary PLY")]
     Unsupported {
@@ -135,7 +152,7 @@ pub enum SourceErrorKind {
         limit: usize,
     },
     /// There are more points than asked for.
-    #[error("more than {limit} points: thin the cloud, or raise ReadOptions::max_points")]
+    #[error("more than {limit} points{}", advice(*limit))]
     TooManyPoints {
         /// [`ReadOptions::max_points`](crate::ReadOptions::max_points).
         limit: u64,
@@ -173,6 +190,16 @@ pub enum SourceErrorKind {
     /// The file is sound but has no points.
     #[error("there are no points in it: give a file with at least one")]
     NoPoints,
+}
+
+/// What helps against more points than `limit`.
+fn advice(limit: u64) -> String {
+    if limit < MOST_POINTS {
+        return ": thin the cloud, or raise ReadOptions::max_points".to_owned();
+    }
+    format!(
+        " (a cloud can have {MOST_POINTS}): thin it, or raise ReadOptions::max_points and thin what is read"
+    )
 }
 
 /// Result of reading.

@@ -5,29 +5,36 @@
 //! | PLY | `ply` | ascii, binary little and big endian; faces |
 //! | Gaussian splats | `ply` | as PLY, told by their properties; see below |
 //! | PCD | `pcd` | ascii, binary, binary_compressed |
-//! | KITTI | `bin` | x, y, z, intensity as little-endian `f32`, seen from the origin |
-//! | columns of text | `xyz`, `txt`, `csv`, `asc`, `pts` | see below |
+//! | sweeps: KITTI | `bin` | x, y, z, intensity as little-endian `f32`, seen from the origin |
+//! | sweeps: nuScenes | `pcd.bin` | x, y, z, intensity, ring likewise |
+//! | columns of text | `xyz`, `txt`, `csv`, `asc`, `pts`, `xyzrgb`, `xyzn` | see below |
 //! | LAS, LAZ | `las`, `laz` | feature `las` |
 //! | E57 | `e57` | feature `e57` |
 //!
 //! Columns of text: one point a line, columns separated by semicolons (then a comma may be the
 //! decimal mark), else commas, else blanks, as the first line of data shows. Lines that start with
 //! `#` or `//` are comments. Columns are named by a header line, which may be a comment: `x y z`,
-//! and any of `nx ny nz`, `r g b a` (or `red` …), `radius`; others are skipped. Without a header,
-//! their number decides:
+//! and any of `nx ny nz`, `r g b a` (or `red` …), `radius`; others are skipped. A first line with
+//! nothing but the count is passed over, before the header or behind it. Without a header, `xyzrgb`
+//! files have the columns x y z r g b, and `xyzn` files x y z nx ny nz, as Open3D writes them. In
+//! all others, number and values decide:
 //!
 //! | columns | meaning |
 //! |---|---|
 //! | 3 | x y z |
 //! | 4 | x y z, one ignored (intensity) |
-//! | 6 | x y z r g b if the last three are whole numbers from 0 to 255 in all lines, else x y z nx ny nz |
-//! | 7 | x y z, one ignored, r g b (the PTS layout; a first line with nothing but the count is passed over) |
-//! | 9 | x y z r g b nx ny nz, or x y z nx ny nz r g b if only the last three are such whole numbers |
+//! | 6 | x y z nx ny nz if nearly all of the last three have length 1; x y z r g b if they are whole numbers from 0 to 255 |
+//! | 7 | x y z, one ignored, r g b (the PTS layout) |
+//! | 9 | x y z r g b nx ny nz, or x y z nx ny nz r g b, told alike |
+//!
+//! All else is refused ([`SourceErrorKind::UnnamedColumns`]): a guess could take colours for normals.
 //!
 //! PLY files of Gaussian splats have the properties `scale_0` to `scale_2` (logarithms of standard
 //! deviations), `rot_0` to `rot_3` (quaternion, w first), `opacity` (logit) and `f_dc_0` to `f_dc_2`. A
 //! splat of at least [`ReadOptions::least_opacity`] becomes a point: its radius is √(σ₁ σ₂) of its two
 //! longer axes, its normal the shortest one, of either sign, and its colour ½ + `f_dc` / (2 √π).
+//!
+//! Files of sweeps have no header: `.bin` means four numbers a point and `.pcd.bin` five, whatever is in them.
 //!
 //! Besides, [`PointCloud2`] reads messages of ROS, [`depth`] has folders of depth frames, and [`MovingPoints`] deforming meshes as NumPy arrays
 //! or folders of clouds.
@@ -54,10 +61,10 @@ mod e57;
 mod error;
 mod header;
 mod input;
-mod kitti;
 #[cfg(feature = "las")]
 mod las;
 mod moving;
+mod numbered;
 mod options;
 mod pcd;
 mod ply;
@@ -69,10 +76,12 @@ mod scalar;
 mod seekable;
 mod slot;
 mod splat;
+mod sweep;
 mod text;
 
 pub use error::{Position, SourceError, SourceErrorKind};
 pub use moving::{MovingError, MovingPoints};
+pub use numbered::numbered_order;
 pub use options::{Format, Progress, ReadOptions};
 pub use point_cloud2::{PointCloud2, PointField};
 pub use raw_cloud::RawCloud;

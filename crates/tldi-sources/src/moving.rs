@@ -1,6 +1,6 @@
 //! Points that move: a deforming mesh as a NumPy array or as a folder of clouds.
 
-use crate::{ReadOptions, SourceError};
+use crate::{ReadOptions, SourceError, numbered_order};
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -44,7 +44,7 @@ pub enum MovingError {
     Cloud(#[from] SourceError),
     /// A folder has no clouds.
     #[error(
-        "there is no cloud in {0}: it needs one file for each frame, in order of their names (PLY, PCD, XYZ, also as .gz)"
+        "there is no cloud in {0}: it needs one file for each frame, in order of the numbers in their names (PLY, PCD, XYZ, also as .gz)"
     )]
     NoClouds(PathBuf),
     /// Frames have different numbers of points.
@@ -100,7 +100,8 @@ impl MovingPoints {
         Ok(Self { frames })
     }
 
-    /// Reads a NumPy file (`.npy`, also packed with gzip) or a folder with a cloud for each frame.
+    /// Reads a NumPy file (`.npy`, also packed with gzip) or a folder with a cloud for each frame, in
+    /// [the order of their numbers](numbered_order).
     ///
     /// # Errors
     /// [`MovingError`].
@@ -177,7 +178,7 @@ fn read_folder(folder: &Path) -> Result<MovingPoints, MovingError> {
             files.push(path);
         }
     }
-    files.sort();
+    files.sort_by(numbered_order);
     if files.is_empty() {
         return Err(MovingError::NoClouds(folder.to_owned()));
     }

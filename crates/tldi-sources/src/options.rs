@@ -12,10 +12,16 @@ pub enum Format {
     Ply,
     /// Point cloud data (PCL): ascii, binary, binary_compressed.
     Pcd,
-    /// Sweeps of KITTI's laser scanner: x, y, z, intensity.
+    /// Sweeps of KITTI's laser scanner: x, y, z, intensity; any `.bin` but those of nuScenes.
     Kitti,
+    /// Sweeps of nuScenes' laser scanner, `.pcd.bin`: x, y, z, intensity, ring.
+    NuScenes,
     /// One point a line, in columns: XYZ, TXT, CSV, ASC, PTS.
     Text,
+    /// Open3D's XYZRGB: as [`Text`](Self::Text); columns that no line names are x, y, z, red, green, blue.
+    XyzRgb,
+    /// Open3D's XYZN: as [`Text`](Self::Text); columns that no line names are x, y, z and the normal.
+    XyzNormals,
     /// ASPRS LAS and LAZ (feature `las`).
     Las,
     /// ASTM E57 (feature `e57`).
@@ -29,29 +35,28 @@ impl Format {
     /// use tldi_sources::Format;
     /// assert_eq!(Format::from_extension("scan.PLY.gz"), Some(Format::Ply));
     /// assert_eq!(Format::from_extension("scan.csv"), Some(Format::Text));
+    /// assert_eq!(Format::from_extension("0001.bin"), Some(Format::Kitti));
+    /// assert_eq!(Format::from_extension("0001.pcd.bin"), Some(Format::NuScenes));
     /// assert_eq!(Format::from_extension("scan"), None);
     /// ```
     pub fn from_extension(path: impl AsRef<Path>) -> Option<Self> {
         let path = path.as_ref();
-        let mut extension = path.extension()?.to_ascii_lowercase();
-        if extension == "gz" {
-            extension = Path::new(path.file_stem()?)
-                .extension()?
-                .to_ascii_lowercase();
-        }
-        match extension.to_str()? {
+        match extension(path)?.as_str() {
             "ply" => Some(Self::Ply),
             "pcd" => Some(Self::Pcd),
+            "bin" if unpacked_name(path).ends_with(".pcd.bin") => Some(Self::NuScenes),
             "bin" => Some(Self::Kitti),
-            "xyz" | "txt" | "csv" | "asc" | "pts" | "xyzrgb" | "xyzn" => Some(Self::Text),
+            "xyz" | "txt" | "csv" | "asc" | "pts" => Some(Self::Text),
+            "xyzrgb" => Some(Self::XyzRgb),
+            "xyzn" => Some(Self::XyzNormals),
             "las" | "laz" => Some(Self::Las),
             "e57" => Some(Self::E57),
             _ => None,
         }
     }
 
-    /// The format that the first bytes of an uncompressed file give away. Columns of text and KITTI's
-    /// sweeps have no mark of their own.
+    /// The format that the first bytes of an uncompressed file give away. Columns of text and sweeps
+    /// have no mark of their own.
     ///
     /// ```
     /// use tldi_sources::Format;
@@ -79,18 +84,38 @@ impl Format {
     }
 }
 
+/// The name of a file in lower case, without `.gz` at its end.
+fn unpacked_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    let name = name.to_string_lossy().to_ascii_lowercase();
+    name.strip_suffix(".gz").unwrap_or(&name).to_owned()
+}
+
+/// The extension of a file in lower case, of what is packed if it ends in `.gz`.
+pub(crate) fn extension(path: &Path) -> Option<String> {
+    let name = unpacked_name(path);
+    let extension = Path::new(&name).extension()?;
+    Some(extension.to_str()?.to_owned())
+}
+
 impl fmt::Display for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Ply => "PLY",
             Self::Pcd => "PCD",
             Self::Kitti => "KITTI",
+            Self::NuScenes => "nuScenes",
             Self::Text => "XYZ/CSV",
+            Self::XyzRgb => "XYZRGB",
+            Self::XyzNormals => "XYZN",
             Self::Las => "LAS/LAZ",
             Self::E57 => "E57",
         })
     }
 }
+
+/// Most points that a cloud can have.
+pub(crate) const MOST_POINTS: u64 = u32::MAX as u64 / 64;
 
 /// How to read.
 ///
@@ -101,7 +126,8 @@ impl fmt::Display for Format {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadOptions {
-    /// More points than this are an error, found before memory is taken for them. 100 million.
+    /// More points than this are an error, found before memory is taken for them. As many as a cloud can have:
+    /// 67,108,863. Raise it only if you thin what is read before you build a cloud.
     pub max_points: u64,
     /// What is subtracted from every coordinate before it is narrowed to `f32`, in units of the
     /// file. `None`: chosen per file as [`RawCloud::origin`](crate::RawCloud::origin) tells. Give
@@ -116,7 +142,7 @@ pub struct ReadOptions {
 impl Default for ReadOptions {
     fn default() -> Self {
         Self {
-            max_points: 100_000_000,
+            max_points: MOST_POINTS,
             origin: None,
             least_opacity: 0.5,
         }

@@ -39,7 +39,10 @@ pub struct RawCloud {
     /// steps would reach half a millimetre in metres. It is then that median, rounded to a whole
     /// number. Put it into the pose of the body.
     pub origin: DVec3,
-    /// Where the sensor was, relative to `origin`, if the file tells it for all points together.
+    /// Where the sensor was, relative to `origin`, if the file tells it for all points together: `VIEWPOINT` of a PCD
+    /// file, or the pose of an E57 file's only scan. Where these do not turn, they count only for points that
+    /// come in rows and columns, or in spherical coordinates: else they may be the shift of a merged cloud, as
+    /// CloudCompare writes it.
     pub viewpoint: Option<Vec3>,
     /// Columns and rows, if the points come in several rows, one after the other: `WIDTH` and `HEIGHT` of PCD files,
     /// `width` and `height` of messages. See [`organized`](Self::organized).

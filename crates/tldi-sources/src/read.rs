@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::input::{Counted, Input};
+use crate::options::extension;
 use crate::{Format, Position, Progress, RawCloud, ReadOptions, SourceError, SourceErrorKind};
 use flate2::bufread::MultiGzDecoder;
 use std::fs::File;
@@ -101,10 +102,6 @@ fn open<'a>(
 
 /// Calls the parser of the stream's format. Those that need random access open `path` anew, if
 /// there is one and it is not packed.
-#[cfg_attr(
-    not(any(feature = "las", feature = "e57")),
-    allow(unused_variables, reason = "`path` serves random access only")
-)]
 fn dispatch(
     mut input: Input<'_>,
     named: Option<Format>,
@@ -112,12 +109,17 @@ fn dispatch(
     options: &ReadOptions,
 ) -> Result<RawCloud> {
     let magic = Format::from_magic(input.peek(MAGIC_LENGTH)?);
-    let format = magic.or(named).ok_or(SourceErrorKind::UnknownFormat)?;
+    let format = magic.or(named).ok_or_else(|| unknown(path))?;
     let cloud = match format {
         Format::Ply => crate::ply::parse(&mut input, options)?,
         Format::Pcd => crate::pcd::parse(&mut input, options)?,
-        Format::Kitti => crate::kitti::parse(&mut input, options)?,
-        Format::Text => crate::text::parse(&mut input, options)?,
+        Format::Kitti => crate::sweep::parse(&mut input, options, 4)?,
+        Format::NuScenes => crate::sweep::parse(&mut input, options, 5)?,
+        Format::Text => crate::text::parse(&mut input, options, &[])?,
+        Format::XyzRgb => crate::text::parse(&mut input, options, &["x", "y", "z", "r", "g", "b"])?,
+        Format::XyzNormals => {
+            crate::text::parse(&mut input, options, &["x", "y", "z", "nx", "ny", "nz"])?
+        }
         #[cfg(feature = "las")]
         Format::Las => crate::las::parse(&mut input, path, options)?,
         #[cfg(not(feature = "las"))]
@@ -130,6 +132,16 @@ fn dispatch(
     input.points_read = cloud.points.len() as u64;
     input.finish()?;
     Ok(cloud)
+}
+
+/// Why a file without a format is refused.
+fn unknown(path: Option<&Path>) -> SourceErrorKind {
+    const MESHES: [&str; 7] = ["stl", "obj", "gltf", "glb", "dae", "off", "fbx"];
+    let extension = path.and_then(extension);
+    match extension.filter(|extension| MESHES.contains(&extension.as_str())) {
+        Some(extension) => SourceErrorKind::Mesh { extension },
+        None => SourceErrorKind::UnknownFormat,
+    }
 }
 
 #[cfg(not(all(feature = "las", feature = "e57")))]

@@ -315,6 +315,114 @@ fn errors_say_where() {
     assert!(message.contains("bad.csv: line 3: bad value"), "{message}");
 }
 
+/// Whoever has a mesh of another format learns what to do with it.
+#[test]
+fn meshes_are_told_from_unknown_files() {
+    for name in [
+        "gripper.stl",
+        "Room.OBJ",
+        "a.gltf",
+        "a.glb",
+        "arm.dae",
+        "packed.stl.gz",
+    ] {
+        let file = TemporaryFile::new(name, b"solid gripper");
+        let error = read(&file.0, &ReadOptions::default()).expect_err("a mesh");
+        assert!(
+            matches!(error.kind, SourceErrorKind::Mesh { .. }),
+            "{error}"
+        );
+        let message = error.to_string();
+        assert!(message.contains(name), "{message}");
+        assert!(message.contains("convert it to PLY"), "{message}");
+    }
+}
+
+/// The default limit is that of clouds, and the advice beyond it leads to a cloud.
+#[test]
+fn the_limit_is_that_of_clouds() {
+    let max_points = ReadOptions::default().max_points;
+    // The limit that the crate tldi refuses points beyond, in its test `too_many_points_are_refused_unread`.
+    let limit = u32::MAX / 64;
+    assert_eq!(max_points, u64::from(limit));
+    // One more than that, refused by the header.
+    let header = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\nend_header\n",
+        limit + 1
+    );
+    let message = |max_points| {
+        let options = ReadOptions {
+            max_points,
+            ..Default::default()
+        };
+        let outcome = read_from(header.as_bytes(), Format::Ply, &options, &mut |_| {});
+        outcome.expect_err("too many").to_string()
+    };
+    assert!(message(max_points).contains("a cloud can have 67108863"));
+    assert!(message(max_points).contains("thin what is read"));
+    assert!(
+        message(1000)
+            .ends_with("more than 1000 points: thin the cloud, or raise ReadOptions::max_points")
+    );
+}
+
+/// Headers that PCL reads: without sizes and types as in its first files, types in lower case, and bools.
+#[test]
+fn headers_of_pcd_as_pcl_takes_them() {
+    let rows = "1 2 3\n4 5 6\n";
+    let points = [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)];
+    for lines in [
+        "",
+        "SIZE 4 4 4\nTYPE f f f\n",
+        "SIZE 8 4 2\nTYPE f F i\nCOUNT 1 1 1\n",
+    ] {
+        let file = format!("FIELDS x y z\n{lines}WIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n{rows}");
+        let cloud = parse(file.as_bytes(), Format::Pcd).expect(lines);
+        assert_eq!(cloud.points, points, "{lines}");
+    }
+    let mut binary = Bytes::after(
+        "COLUMNS x y z\nPOINTS 2\nWIDTH 2\nDATA binary\n",
+        Order::Little,
+    );
+    binary.f32(1.0).f32(2.0).f32(3.0).f32(4.0).f32(5.0).f32(6.0);
+    let cloud = parse(&binary.bytes, Format::Pcd).expect("no sizes");
+    assert_eq!(cloud.points, points);
+    let header = "FIELDS valid x y z\nSIZE 1 4 4 4\nTYPE B F F F\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA binary\n";
+    let mut binary = Bytes::after(header, Order::Little);
+    binary.u8(1).f32(1.0).f32(2.0).f32(3.0);
+    binary.u8(0).f32(4.0).f32(5.0).f32(6.0);
+    let cloud = parse(&binary.bytes, Format::Pcd).expect("bools");
+    assert_eq!(cloud.points, points);
+    let half = "FIELDS x y z\nSIZE 4 4 4\nWIDTH 2\nHEIGHT 1\nDATA ascii\n1 2 3\n4 5 6\n";
+    let error = parse(half.as_bytes(), Format::Pcd).expect_err("sizes without types");
+    assert!(
+        matches!(error.kind, SourceErrorKind::Header { .. }),
+        "{error}"
+    );
+}
+
+/// CloudCompare writes its global shift as a viewpoint that is not turned. Real sensors turn, or have rows.
+#[test]
+fn shifts_are_no_viewpoints() {
+    for (pose, height, expected) in [
+        ("500000 4649776 0 1 0 0 0", 1, None),
+        ("500000 4649776 0 -1 0 0 0", 1, None),
+        ("0 0 0 1 0 0 0", 2, None),
+        ("4 5 6 1 0 0 0", 2, Some(Vec3::new(4.0, 5.0, 6.0))),
+        ("4 5 6 0.8 0 0.6 0", 1, Some(Vec3::new(4.0, 5.0, 6.0))),
+        ("0 0 0 0.8 0 0.6 0", 1, Some(Vec3::ZERO)),
+        ("nan 0 0 0.8 0 0.6 0", 1, None),
+    ] {
+        let width = 2 / height;
+        let file = format!(
+            "FIELDS x y z\nWIDTH {width}\nHEIGHT {height}\nVIEWPOINT {pose}\nDATA ascii\n1 2 3\n4 5 6\n"
+        );
+        let cloud = parse(file.as_bytes(), Format::Pcd).expect(pose);
+        assert_eq!(cloud.viewpoint, expected, "{pose}");
+    }
+}
+
 #[test]
 fn formats_that_are_not_compiled_in_say_so() {
     #[cfg(not(feature = "las"))]

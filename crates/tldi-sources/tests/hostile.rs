@@ -173,16 +173,17 @@ fn bad_headers_are_told_apart() {
             "{to}: {found}"
         );
     }
-    for bad in [
-        "hello world\n",
-        "x y\n1 2\n",
-        "1 2\n",
-        "1 2 3 4 5\n",
-        "x y z\nx y z\n",
-    ] {
+    for bad in ["hello world\n", "x y\n1 2\n", "x y z\nx y z\n"] {
         let found = kind(bad.as_bytes(), Format::Text);
         assert!(
             matches!(found, SourceErrorKind::Header { .. }),
+            "{bad}: {found}"
+        );
+    }
+    for bad in ["1 2\n", "1 2 3 4 5\n"] {
+        let found = kind(bad.as_bytes(), Format::Text);
+        assert!(
+            matches!(found, SourceErrorKind::UnnamedColumns { .. }),
             "{bad}: {found}"
         );
     }

@@ -162,7 +162,10 @@ fn any_bytes_are_read_or_refused() {
         Just(Format::Ply),
         Just(Format::Pcd),
         Just(Format::Kitti),
-        Just(Format::Text)
+        Just(Format::NuScenes),
+        Just(Format::Text),
+        Just(Format::XyzRgb),
+        Just(Format::XyzNormals)
     ];
     let start = prop_oneof![
         Just(""),

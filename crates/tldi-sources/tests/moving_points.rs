@@ -50,13 +50,14 @@ fn arrays_are_read_packed_and_not() {
 #[test]
 fn folders_are_read_in_order() {
     let folder = folder("moving_folder");
-    for (name, x) in [("f2.xyz", 2.0), ("f1.xyz", 1.0), ("f3.xyz", 3.0)] {
+    let files = [("f2.xyz", 2.0), ("f1.xyz", 1.0), ("f10.xyz", 10.0)];
+    for (name, x) in files {
         fs::write(folder.join(name), format!("{x} 0 0\n{x} 1 0\n")).unwrap();
     }
     fs::write(folder.join("notes.md"), "not a cloud").unwrap();
     let moving = MovingPoints::read(&folder).unwrap();
     let first: Vec<f32> = moving.frames().iter().map(|frame| frame[0].x).collect();
-    assert_eq!(first, [1.0, 2.0, 3.0]);
+    assert_eq!(first, [1.0, 2.0, 10.0]);
 }
 
 /// Frames are met, steady motion stays steady, and the end leads into the beginning.

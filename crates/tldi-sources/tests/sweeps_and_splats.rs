@@ -59,6 +59,32 @@ fn sweeps_are_records_of_four_numbers() {
     );
 }
 
+/// nuScenes: five numbers a point, the last of which is the ring.
+#[test]
+fn sweeps_of_nuscenes_have_five_numbers() {
+    let mut rng = Rng::with_seed(3);
+    let mut number = || 100.0 * (rng.f32() - 0.5);
+    let points: Vec<Vec3> = (0..10_000)
+        .map(|_| Vec3::new(number(), number(), number()))
+        .collect();
+    let mut file = Bytes::after("", Order::Little);
+    for (i, p) in points.iter().enumerate() {
+        file.f32(p.x).f32(p.y).f32(p.z).f32(17.0);
+        file.f32((i % 32) as f32);
+    }
+    for name in ["sweeps/LIDAR_TOP__1532402927647951.pcd.bin", "0.PCD.BIN.gz"] {
+        let format = Format::from_extension(name).expect("known");
+        let cloud = parse(&file.bytes, format).expect("sound");
+        assert_eq!(cloud.points, points);
+        assert_eq!(cloud.viewpoint, Some(Vec3::ZERO));
+    }
+    let error = parse(&file.bytes[..16 * 101], Format::NuScenes).expect_err("cut");
+    assert!(
+        matches!(error.kind, SourceErrorKind::Truncated { .. }),
+        "{error}"
+    );
+}
+
 /// The properties in the order in which trainers write them, with normals of zero.
 const SPLAT_PROPERTIES: [&str; 17] = [
     "x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1",

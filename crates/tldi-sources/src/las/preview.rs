@@ -48,8 +48,10 @@ impl Preview {
         }
         // The crate seeks there, also in packed files.
         if preview.points > u64::from(u32::MAX) * 16 {
-            let limit = u64::from(u32::MAX) * 16;
-            return Err(SourceErrorKind::TooManyPoints { limit }.into());
+            let points = preview.points;
+            return Err(bad_header(format!(
+                "it tells of {points} points: it is damaged, or the file must be split"
+            )));
         }
         if is_extended && u32_at(243) > 0 {
             let start = u64_at(235);

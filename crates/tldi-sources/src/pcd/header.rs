@@ -36,7 +36,8 @@ pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) fields: Vec<Field>,
     pub(super) points: u64,
-    /// Where the sensor was, unless at the default, which most files have whatever the truth.
+    /// Where the sensor was. Unless it is turned, only of points in rows and columns: CloudCompare writes its
+    /// global shift as the viewpoint of all others. Never the default, which most files have whatever the truth.
     pub(super) viewpoint: Option<DVec3>,
     /// Columns and rows, where there are several rows.
     pub(super) size: Option<[usize; 2]>,
@@ -98,7 +99,7 @@ struct Parser {
     width: Option<u64>,
     height: Option<u64>,
     points: Option<u64>,
-    viewpoint: Option<DVec3>,
+    viewpoint: Option<Viewpoint>,
 }
 
 impl Parser {
@@ -134,8 +135,13 @@ impl Parser {
         Ok(None)
     }
 
-    fn finish(self, encoding: Encoding) -> std::result::Result<Header, String> {
+    fn finish(mut self, encoding: Encoding) -> std::result::Result<Header, String> {
         let fields = self.names.len();
+        // Old files have neither line: all numbers are floats.
+        if self.sizes.is_empty() && self.types.is_empty() {
+            self.sizes = vec!["4".to_owned(); fields];
+            self.types = vec!["F".to_owned(); fields];
+        }
         let same = |lengths: usize| lengths == fields;
         if !same(self.sizes.len())
             || !same(self.types.len())
@@ -147,7 +153,9 @@ impl Parser {
             encoding,
             fields: Vec::new(),
             points: self.points()?,
-            viewpoint: self.viewpoint,
+            viewpoint: (self.viewpoint.as_ref())
+                .filter(|viewpoint| viewpoint.is_turned || self.size().is_some())
+                .map(|viewpoint| viewpoint.position),
             size: self.size(),
         };
         // Together less than this, a record fits into the buffer.
@@ -206,20 +214,32 @@ fn number(key: &str, words: &[String]) -> std::result::Result<u64, String> {
         .map_err(|_| format!("{key} `{}` is no count", excerpt(text.as_bytes())))
 }
 
-/// Translation and quaternion (w first) of the sensor.
-fn viewpoint(words: &[String]) -> std::result::Result<Option<DVec3>, String> {
+/// The pose of the sensor.
+struct Viewpoint {
+    position: DVec3,
+    is_turned: bool,
+}
+
+/// From translation and quaternion (w first); none if it is the default, or not finite.
+fn viewpoint(words: &[String]) -> std::result::Result<Option<Viewpoint>, String> {
     let values: Option<Vec<f64>> = words.iter().map(|w| w.parse().ok()).collect();
-    match values.as_deref() {
-        Some([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]) => Ok(None),
-        Some([x, y, z, _, _, _, _]) => Ok(Some(DVec3::new(*x, *y, *z)).filter(|v| v.is_finite())),
-        _ => Err("VIEWPOINT needs seven numbers".to_owned()),
-    }
+    let Some([x, y, z, _, turn @ ..]) = values.as_deref().filter(|v| v.len() == 7) else {
+        return Err("VIEWPOINT needs seven numbers".to_owned());
+    };
+    let position = DVec3::new(*x, *y, *z);
+    let is_turned = turn != [0.0; 3];
+    let is_default = position == DVec3::ZERO && !is_turned;
+    Ok((position.is_finite() && !is_default).then_some(Viewpoint {
+        position,
+        is_turned,
+    }))
 }
 
 fn scalar(kind: &str, size: &str) -> std::result::Result<Scalar, String> {
-    Ok(match (kind, size) {
+    // PCL takes letters of either case; `B` is its bool.
+    Ok(match (kind.to_ascii_uppercase().as_str(), size) {
         ("I", "1") => Scalar::I8,
-        ("U", "1") => Scalar::U8,
+        ("U" | "B", "1") => Scalar::U8,
         ("I", "2") => Scalar::I16,
         ("U", "2") => Scalar::U16,
         ("I", "4") => Scalar::I32,

@@ -142,7 +142,7 @@ pub(crate) fn pcd_header(data: &str) -> String {
         "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n\
          FIELDS z _ x y histogram rgba normal_x normal_y normal_z\n\
          SIZE 8 1 4 4 2 4 4 4 4\nTYPE F U F F I U F F F\nCOUNT 1 3 1 1 2 1 1 1 1\n\
-         WIDTH 5\nHEIGHT 1\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS 5\nDATA {data}\n"
+         WIDTH 5\nHEIGHT 1\nVIEWPOINT 1 2 3 0.6 0 0 0.8\nPOINTS 5\nDATA {data}\n"
     )
 }
 

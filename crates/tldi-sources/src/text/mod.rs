@@ -1,7 +1,9 @@
-//! Columns of text: XYZ, TXT, CSV, ASC, PTS. The rules are in the crate's documentation.
+//! Columns of text: XYZ, TXT, CSV, ASC, PTS, XYZRGB, XYZN. The rules are in the crate's documentation.
 //!
 //! The parser is our own because the csv crate neither takes runs of blanks as one separator nor
 //! bounds the length of a record.
+
+mod triple;
 
 use crate::collector::{Collector, Layout, Sample};
 use crate::error::Result;
@@ -9,14 +11,19 @@ use crate::input::Input;
 use crate::scalar::{Scalar, excerpt, parse_number};
 use crate::slot::{Column, Columns, Slot};
 use crate::{Format, RawCloud, ReadOptions, SourceErrorKind};
-use std::ops::Range;
-use tldi::glamx::Vec3;
+use triple::Triple;
 
 type Outcome<T> = std::result::Result<T, SourceErrorKind>;
 
-pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawCloud> {
+/// Reads all lines. Columns that no line names are `assumed`; if that is empty, their number decides.
+pub(crate) fn parse(
+    input: &mut Input<'_>,
+    options: &ReadOptions,
+    assumed: &[&str],
+) -> Result<RawCloud> {
     let mut state = State {
         options,
+        assumed,
         header: None,
         table: None,
         counted: false,
@@ -30,12 +37,14 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
     let Some(table) = state.table else {
         return Err(SourceErrorKind::NoPoints.into());
     };
-    table.finish().map_err(|kind| input.error_at_line(kind))
+    Ok(table.finish()?)
 }
 
 /// What has been read.
 struct State<'a> {
     options: &'a ReadOptions,
+    /// Names of the columns where there is no header.
+    assumed: &'a [&'a str],
     /// Names of the columns.
     header: Option<Vec<String>>,
     /// From the first line of data on.
@@ -69,13 +78,15 @@ impl State<'_> {
         if separator.number(first).is_err() {
             return self.take_header(line);
         }
-        if fields == 1 && !self.counted && self.header.is_none() {
+        // CloudCompare writes the count behind the names.
+        if fields == 1 && !self.counted {
             self.counted = true;
             return Ok(());
         }
         let mut table = match &self.header {
             Some(names) => Table::named(separator, names, self.options),
-            None => Table::unnamed(separator, fields, self.options)?,
+            None if self.assumed.is_empty() => Table::unnamed(separator, fields, self.options)?,
+            None => Table::assumed(separator, self.assumed, self.options),
         };
         table.line(line)?;
         self.table = Some(table);
@@ -98,17 +109,22 @@ impl State<'_> {
     }
 }
 
-/// The words of a header line, without quotes.
+/// The words of a header line, without quotes. Between tabs, a name may have blanks.
 fn names(line: &[u8]) -> Vec<String> {
     let separator = Separator::of(line);
-    separator
-        .fields(line)
-        .map(|name| {
-            let name = String::from_utf8_lossy(name);
-            name.trim_matches(|c: char| c == '"' || c == '\'' || c.is_whitespace())
-                .to_owned()
-        })
-        .collect()
+    if separator == Separator::Blanks && line.contains(&b'\t') {
+        let names: Vec<String> = line.split(|b| *b == b'\t').map(name).collect();
+        if is_header(&names) {
+            return names;
+        }
+    }
+    separator.fields(line).map(name).collect()
+}
+
+fn name(field: &[u8]) -> String {
+    let name = String::from_utf8_lossy(field);
+    name.trim_matches(|c: char| c == '"' || c == '\'' || c.is_whitespace())
+        .to_owned()
 }
 
 fn is_header(names: &[String]) -> bool {
@@ -179,47 +195,13 @@ impl Separator {
     }
 }
 
-/// Three columns without names: a colour if all values are whole numbers from 0 to 255.
-struct Triple {
-    places: Range<usize>,
-    values: Vec<[f32; 3]>,
-    is_color: bool,
-}
-
-impl Triple {
-    fn new(places: Range<usize>) -> Self {
-        Self {
-            places,
-            values: Vec::new(),
-            is_color: true,
-        }
-    }
-
-    fn push(&mut self, fields: &[f64]) {
-        let values = &fields[self.places.clone()];
-        let is_byte = |v: &f64| (0.0..=255.0).contains(v) && v.fract() == 0.0;
-        self.is_color &= values.iter().all(is_byte);
-        self.values.push([0, 1, 2].map(|i| values[i] as f32));
-    }
-
-    fn into_colors(self) -> Vec<[u8; 4]> {
-        // Exact: whole numbers from 0 to 255.
-        let color = |[r, g, b]: [f32; 3]| [r as u8, g as u8, b as u8, 255];
-        self.values.into_iter().map(color).collect()
-    }
-
-    fn into_normals(self) -> Vec<Vec3> {
-        self.values.into_iter().map(Vec3::from_array).collect()
-    }
-}
-
 /// The data.
 struct Table {
     separator: Separator,
     columns: Columns,
-    /// Columns in every line, where they have no names; else at least those that are kept.
+    /// Columns in every line if `exact`; else at least those that are kept.
     width: usize,
-    named: bool,
+    exact: bool,
     /// Columns whose meaning shows at the end.
     triples: Vec<Triple>,
     collector: Collector,
@@ -234,11 +216,20 @@ impl Table {
         Self {
             separator,
             width,
-            named: true,
+            exact: false,
             triples: Vec::new(),
             collector: Collector::new(Layout::of(&columns, options), 0, options),
             columns,
             fields: Vec::new(),
+        }
+    }
+
+    /// With these columns and no others.
+    fn assumed(separator: Separator, names: &[&str], options: &ReadOptions) -> Self {
+        let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+        Self {
+            exact: true,
+            ..Self::named(separator, &names, options)
         }
     }
 
@@ -249,19 +240,15 @@ impl Table {
             7 => vec![Triple::new(4..7)],
             9 => vec![Triple::new(3..6), Triple::new(6..9)],
             _ => {
-                return Err(SourceErrorKind::Header {
-                    format: Format::Text,
-                    reason: format!(
-                        "{width} columns without names could mean anything: name them in a first line such as `x y z r g b`"
-                    ),
-                });
+                let what = format!("{width} columns without names could mean anything");
+                return Err(SourceErrorKind::UnnamedColumns { what });
             }
         };
         let columns = named_columns(&["x", "y", "z"].map(str::to_owned));
         Ok(Self {
             separator,
             width,
-            named: false,
+            exact: true,
             triples,
             collector: Collector::new(Layout::of(&columns, options), 0, options),
             columns,
@@ -279,14 +266,14 @@ impl Table {
             }
             let place = found - 1;
             let kept = self.columns.0.iter().any(|c| c.place == place)
-                || self.triples.iter().any(|t| t.places.contains(&place));
+                || self.triples.iter().any(|t| t.contains(place));
             self.fields.push(if kept {
                 self.separator.number(field)?
             } else {
                 0.0
             });
         }
-        if found < self.width || found > self.width && !self.named {
+        if found < self.width || found > self.width && self.exact {
             let width = self.width;
             let reason = format!("the line does not have the expected {width} columns");
             return Err(SourceErrorKind::Value { reason });
@@ -308,30 +295,42 @@ impl Table {
         let mut triples = self.triples.into_iter();
         match (triples.next(), triples.next()) {
             (None, _) => {}
-            (Some(only), None) if width == 7 && !only.is_color => {
-                let reason = "the last three of seven columns are no colours from 0 to 255: name the columns in a first line";
-                return Err(SourceErrorKind::Value {
-                    reason: reason.to_owned(),
-                });
+            (Some(only), None) if only.is_color() => cloud.colors = Some(only.into_colors()),
+            (Some(only), None) if width == 6 && only.is_normal() => {
+                cloud.normals = Some(only.into_normals());
             }
-            (Some(only), None) if only.is_color => cloud.colors = Some(only.into_colors()),
-            (Some(only), None) => cloud.normals = Some(only.into_normals()),
+            (Some(_), None) if width == 6 => {
+                return Err(unclear(
+                    "the last three of six columns without names are neither colours (whole numbers from 0 to 255) nor normals (of length 1)",
+                ));
+            }
+            (Some(_), None) => {
+                return Err(unclear(
+                    "the last three of seven columns without names are no colours (whole numbers from 0 to 255)",
+                ));
+            }
             (Some(first), Some(second)) => {
-                let (color, normal) = if first.is_color || !second.is_color {
-                    (first, second)
-                } else {
-                    (second, first)
+                let fit = |color: &Triple, normal: &Triple| {
+                    color.is_color() && (normal.is_normal() || normal.is_missing())
                 };
-                if !color.is_color {
-                    let reason = "of nine columns, neither the middle nor the last three are colours from 0 to 255: name the columns in a first line";
-                    return Err(SourceErrorKind::Value {
-                        reason: reason.to_owned(),
-                    });
-                }
+                let (color, normal) = if fit(&first, &second) {
+                    (first, second)
+                } else if fit(&second, &first) {
+                    (second, first)
+                } else {
+                    return Err(unclear(
+                        "the last six of nine columns without names are not colours (whole numbers from 0 to 255) and normals (of length 1)",
+                    ));
+                };
                 cloud.colors = Some(color.into_colors());
                 cloud.normals = Some(normal.into_normals());
             }
         }
         Ok(cloud)
     }
+}
+
+fn unclear(what: &str) -> SourceErrorKind {
+    let what = what.to_owned();
+    SourceErrorKind::UnnamedColumns { what }
 }

@@ -1,13 +1,11 @@
-//! Sweeps of KITTI's laser scanner: x, y, z and intensity as little-endian `f32`, without a header.
+//! Sweeps of laser scanners as little-endian `f32` without a header: x, y, z, intensity, and whatever
+//! else a point has.
 
 use crate::collector::{Collector, Layout, Sample};
 use crate::error::Result;
 use crate::input::Input;
 use crate::scalar::{Endian, Scalar};
 use crate::{RawCloud, ReadOptions, SourceError};
-
-/// Bytes of a point.
-const RECORD: usize = 16;
 
 const LAYOUT: Layout = Layout {
     normals: false,
@@ -17,12 +15,18 @@ const LAYOUT: Layout = Layout {
     wide: false,
 };
 
-pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawCloud> {
+/// Reads points of `numbers` numbers, at least three.
+pub(crate) fn parse(
+    input: &mut Input<'_>,
+    options: &ReadOptions,
+    numbers: usize,
+) -> Result<RawCloud> {
+    let record_size = 4 * numbers;
     let mut collector = Collector::new(LAYOUT, 0, options);
     while !input.peek(1)?.is_empty() {
         let position = input.byte_position();
-        let records = input.records(RECORD, u64::MAX, "a point")?;
-        for record in records.chunks_exact(RECORD) {
+        let records = input.records(record_size, u64::MAX, "a point")?;
+        for record in records.chunks_exact(record_size) {
             let mut sample = Sample::EMPTY;
             for (axis, bytes) in record[..12].chunks_exact(4).enumerate() {
                 sample.position[axis] = Scalar::F32.decode(bytes, Endian::Little);
