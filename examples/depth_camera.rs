@@ -2,10 +2,9 @@
 
 use anyhow::{Context, bail};
 use clap::Parser;
-use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tldi::glamx::{Pose3, Vec3};
+use tldi::glamx::{DVec3, Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, UpChoice};
 use tldi_examples::depth::{
@@ -102,6 +101,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
+    args.common.check_outputs()?;
     if !(0.0..=3600.0).contains(&args.hold) {
         bail!("--hold must be from 0 to 3600 seconds");
     }
@@ -150,13 +150,11 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let recording = args.recording.start("depth_camera", up)?;
     let snapshots = simulate(&mut simulation, &source, recording, args)?;
     let report = simulation.report(missing);
+    let json = args.common.json.as_deref();
+    output::publish(&report, DVec3::ZERO, |out| report.write_table(out), json)?;
     if !args.common.no_pictures {
         draw(&simulation, up, &snapshots, args)?;
     }
-    if let Some(path) = &args.common.json {
-        output::write_json(path, &report)?;
-    }
-    report.write_table(&mut io::stdout().lock())?;
     Ok(())
 }
 

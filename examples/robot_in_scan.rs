@@ -2,12 +2,12 @@
 
 use anyhow::{Context, bail};
 use clap::Parser;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tldi::glamx::{Pose3, Vec3};
+use tldi::glamx::{DVec3, Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, Triple};
+use tldi_examples::load::Located;
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::robot::{
     BUILT_IN, Base, DT, Description, Motion, RobotScene, RobotSimulation, RobotSnapshot, Walk,
@@ -104,6 +104,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
+    args.common.check_outputs()?;
     if !(args.sensor_noise.is_finite() && args.sensor_noise >= 0.0) {
         bail!("--sensor-noise must be a number that is not negative");
     }
@@ -111,19 +112,23 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let terrain = args
         .terrain
         .map(|ground| Terrain::new(ground, args.common.seed));
-    let (scan, up) = match &terrain {
-        Some(terrain) => (load::scan_from_surface(terrain.scan())?, Vec3::Z),
+    let (scan, origin, up) = match &terrain {
+        Some(terrain) => {
+            let scan = load::scan_from_surface(terrain.scan())?;
+            (scan, DVec3::ZERO, Vec3::Z)
+        }
         None => {
-            let scan = load_scan(&args.source, args.common.seed)?;
-            let up = choose_up(args.source.up, &scan);
-            (scan, up)
+            let Located { cloud, origin } = load_scan(&args.source, args.common.seed)?;
+            let up = choose_up(args.source.up, &cloud);
+            (cloud, origin, up)
         }
     };
     let scene = RobotScene {
         scan,
         up,
         base: args.base,
-        at: (args.place.map(|Triple(place)| place)).or(args.terrain.map(|_| Vec3::ZERO)),
+        at: (args.place.map(|Triple(place)| (place - origin).as_vec3()))
+            .or(args.terrain.map(|_| Vec3::ZERO)),
         facing: args.terrain.map(|_| Vec3::X),
         terrain,
         motion: Walk::of(&robot.kinematics).map(Motion::Walk),
@@ -144,13 +149,11 @@ fn run(args: &Args) -> anyhow::Result<()> {
     }
     let (snapshots, hardest) = simulate(&mut simulation, args.steps, recording)?;
     let report = simulation.report();
+    let json = args.common.json.as_deref();
+    output::publish(&report, origin, |out| report.write_table(out), json)?;
     if !args.common.no_pictures {
         draw(&simulation, up, &snapshots, &hardest, args)?;
     }
-    if let Some(path) = &args.common.json {
-        output::write_json(path, &report)?;
-    }
-    report.write_table(&mut io::stdout().lock())?;
     if !simulation.is_on_scan() {
         bail!("the robot fell out of the scan");
     }

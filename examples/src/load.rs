@@ -4,7 +4,7 @@ use crate::surface_sampling::SampledSurface;
 use anyhow::Context;
 use rayon::prelude::*;
 use std::path::Path;
-use tldi::glamx::Vec3;
+use tldi::glamx::{DVec3, Vec3};
 use tldi::{CloudBuilder, CloudError, KdTree, PointCloud};
 
 /// Neighbours for the normals of a scan: enough to average the noise of a depth camera.
@@ -16,16 +16,27 @@ const PLAUSIBLE_BODY_SIZES: std::ops::RangeInclusive<f32> = 0.02..=1.0;
 /// Least extent of a body in mean radii of the scan: a smaller one would lie in the noise.
 const LEAST_BODY_RADII: f32 = 10.0;
 
+/// A cloud, and what was subtracted from its file's coordinates, in its own unit: place in the file = `origin` + point.
+pub struct Located {
+    /// The points.
+    pub cloud: PointCloud<'static>,
+    /// Zero on axes where coordinates are small enough for `f32`.
+    pub origin: DVec3,
+}
+
 /// Loads a scan, `scale` metres a unit of the file: colours, radii and normals of the file, else radii from
 /// neighbours and normals by principal component analysis.
 ///
 /// # Errors
 /// Those of reading the file and of building the cloud, with the path.
-pub fn scan_from_file(path: &Path, scale: f32) -> anyhow::Result<PointCloud<'static>> {
+pub fn scan_from_file(path: &Path, scale: f32) -> anyhow::Result<Located> {
     let raw = tldi_sources::read(path, &tldi_sources::ReadOptions::default())
-        .with_context(|| format!("cannot read the scan {}", path.display()))?;
-    finish_scan(raw.scaled(scale).into_builder())
-        .with_context(|| format!("cannot use the scan {}", path.display()))
+        .with_context(|| format!("cannot read the scan {}", path.display()))?
+        .scaled(scale);
+    let origin = raw.origin;
+    let cloud = finish_scan(raw.into_builder())
+        .with_context(|| format!("cannot use the scan {}", path.display()))?;
+    Ok(Located { cloud, origin })
 }
 
 /// The cloud of a generated scene, made like that of a file: its exact normals are not used.
@@ -44,19 +55,21 @@ fn finish_scan(builder: CloudBuilder<'_>) -> Result<PointCloud<'static>, CloudEr
     Ok(cloud.into_owned())
 }
 
-/// Loads a body: as in the file, or with its largest extent scaled to `size` metres.
+/// Loads a body, in the unit of the file.
 ///
 /// # Errors
 /// Those of reading the file and of building the cloud, with the path.
-pub fn body_from_file(path: &Path) -> anyhow::Result<PointCloud<'static>> {
+pub fn body_from_file(path: &Path) -> anyhow::Result<Located> {
     let raw = tldi_sources::read(path, &tldi_sources::ReadOptions::default())
         .with_context(|| format!("cannot read the body {}", path.display()))?;
+    let origin = raw.origin;
     let cloud = raw
         .into_builder()
         .pca_normals(BODY_NORMAL_NEIGHBORS)
         .build()
-        .with_context(|| format!("cannot use the body {}", path.display()))?;
-    Ok(cloud.into_owned())
+        .with_context(|| format!("cannot use the body {}", path.display()))?
+        .into_owned();
+    Ok(Located { cloud, origin })
 }
 
 /// The cloud of a generated body.

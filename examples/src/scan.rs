@@ -1,12 +1,12 @@
 //! The scan that a story takes place in: from a file or generated, with its up direction.
 
 use crate::cli::UpChoice;
-use crate::load;
+use crate::load::{self, Located};
 use crate::scene::furnished_room;
 use crate::up::{Confidence, Up, detect_up};
 use std::path::PathBuf;
 use tldi::PointCloud;
-use tldi::glamx::Vec3;
+use tldi::glamx::{DVec3, Vec3};
 
 /// Distance between the points of the generated room and standard deviation of their error, in
 /// metres: those of a good terrestrial scanner.
@@ -49,15 +49,18 @@ pub fn positive(text: &str) -> Result<f32, String> {
 ///
 /// # Errors
 /// Those of reading the file and of building the cloud, with the path.
-pub fn load_scan(source: &ScanSource, seed: u64) -> anyhow::Result<PointCloud<'static>> {
+pub fn load_scan(source: &ScanSource, seed: u64) -> anyhow::Result<Located> {
     let Some(path) = &source.scan else {
         eprintln!("generating a room");
         let room = furnished_room(ROOM_SPACING, ROOM_NOISE, seed);
-        return Ok(load::scan_from_surface(room)?);
+        return Ok(Located {
+            cloud: load::scan_from_surface(room)?,
+            origin: DVec3::ZERO,
+        });
     };
     eprintln!("reading {}", path.display());
     let scan = load::scan_from_file(path, source.scan_scale)?;
-    let extent = scan.bounds().extents().max_element();
+    let extent = scan.cloud.bounds().extents().max_element();
     if !PLAUSIBLE_EXTENTS.contains(&extent) {
         eprintln!(
             "warning: the scan is {extent:.2} m in size; if its unit is another one, give --scan-scale (0.001 for millimetres)"
