@@ -20,7 +20,7 @@ use tldi_pictures::animation;
 #[derive(Parser)]
 #[command(version)]
 struct Args {
-    /// First cloud (PLY, PCD, XYZ or CSV, also as .gz)
+    /// First cloud (PLY, PCD, XYZ or CSV, also as .gz) or mesh (PLY, STL, OBJ, DAE)
     #[arg(requires = "b")]
     a: Option<PathBuf>,
     /// Second cloud; without files, two generated ones

@@ -18,7 +18,7 @@ const PLAUSIBLE_EXTENTS: std::ops::RangeInclusive<f32> = 0.3..=2000.0;
 /// Options about the scan; flatten into the binary's own arguments.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ScanSource {
-    /// Scan (PLY, PCD, XYZ or CSV, also as .gz); a generated room if left out
+    /// Scan (PLY, PCD, XYZ or CSV, also as .gz) or mesh (PLY, STL, OBJ, DAE); a generated room if left out
     #[arg(long, value_name = "FILE")]
     pub scan: Option<PathBuf>,
     /// Metres in a unit of the scan's file, 0.001 for millimetres

@@ -1,7 +1,8 @@
 //! Reads a URDF: links, joints, and where its meshes lie.
 
-use super::geometry::{Mesh, mesh_of};
+use super::geometry::mesh_of;
 use super::kinematics::{JointKind, JointModel, Kinematics};
+use crate::mesh::Mesh;
 use rapier3d_urdf::urdf_rs;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
