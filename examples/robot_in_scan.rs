@@ -10,8 +10,8 @@ use tldi_examples::cli::{Common, Triple};
 use tldi_examples::load::Located;
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::robot::{
-    BUILT_IN, Base, DT, Description, Motion, RobotScene, RobotSimulation, RobotSnapshot, Walk,
-    quadruped,
+    BUILT_IN, Base, DT, Description, MeshFolders, Motion, RobotScene, RobotSimulation,
+    RobotSnapshot, Walk, quadruped,
 };
 use tldi_examples::scan::{ScanSource, choose_up, load_scan};
 use tldi_examples::terrain::{Ground, Terrain};
@@ -29,6 +29,9 @@ struct Args {
     /// Robot; links become clouds of their collision, else their visual geometry
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
+    /// Folder with packages that the URDF names as package://NAME/…; may be given several times
+    #[arg(long, value_name = "DIR", requires = "urdf")]
+    packages: Vec<PathBuf>,
     /// Built-in robot, where no file is given
     #[arg(long, value_enum, default_value_t = BuiltIn::Arm, conflicts_with = "urdf")]
     robot: BuiltIn,
@@ -164,13 +167,16 @@ fn load_robot(args: &Args) -> anyhow::Result<Description> {
     let robot = match &args.urdf {
         Some(path) => {
             eprintln!("reading {}", path.display());
-            Description::from_file(path)
+            Description::from_file(path, &args.packages)
                 .with_context(|| format!("cannot use the robot {}", path.display()))?
         }
-        None => match args.robot {
-            BuiltIn::Arm => Description::from_text(BUILT_IN, Path::new(""))?,
-            BuiltIn::Quadruped => Description::from_text(&quadruped(), Path::new(""))?,
-        },
+        None => {
+            let text = match args.robot {
+                BuiltIn::Arm => BUILT_IN,
+                BuiltIn::Quadruped => &quadruped(),
+            };
+            Description::from_text(text, &MeshFolders::new(Path::new(""), &[]))?
+        }
     };
     for warning in &robot.warnings {
         eprintln!("warning: {warning}");

@@ -5,7 +5,8 @@ use std::path::Path;
 use tldi::glamx::Vec3;
 use tldi_examples::load;
 use tldi_examples::robot::{
-    Base, DT, Description, Motion, RobotScene, RobotSimulation, StandingReport, Walk, quadruped,
+    Base, DT, Description, MeshFolders, Motion, RobotScene, RobotSimulation, StandingReport, Walk,
+    quadruped,
 };
 use tldi_examples::terrain::{Ground, Terrain};
 use tldi_wgpu::BackendChoice;
@@ -13,7 +14,8 @@ use tldi_wgpu::BackendChoice;
 /// Stands, walks and stands again, eight seconds in all.
 fn walk(ground: Ground, seed: u64) -> StandingReport {
     let terrain = Terrain::new(ground, seed);
-    let robot = Description::from_text(&quadruped(), Path::new("")).unwrap();
+    let robot =
+        Description::from_text(&quadruped(), &MeshFolders::new(Path::new(""), &[])).unwrap();
     let walk = Walk::of(&robot.kinematics).unwrap();
     let steps = (walk.seconds() / DT).ceil() as usize;
     let scene = RobotScene {

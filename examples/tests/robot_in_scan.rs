@@ -314,7 +314,7 @@ fn what_is_missing_is_named_and_the_rest_is_used() {
         let warnings = report["warnings"].to_string();
         assert!(warnings.contains("odd cannot mimic none"), "{warnings}");
         assert_eq!(
-            warnings.contains("lost.dae was not found"),
+            warnings.contains("not found (1): package://my_robot/meshes/lost.dae;"),
             links == 1,
             "{warnings}"
         );
