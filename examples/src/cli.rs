@@ -103,6 +103,26 @@ impl PoseArgument {
     }
 }
 
+/// The nearest and the farthest range that count, metres, `near,far`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RangeArgument(pub [f32; 2]);
+
+impl FromStr for RangeArgument {
+    type Err = BadNumbers;
+
+    fn from_str(text: &str) -> Result<Self, BadNumbers> {
+        match numbers(text).as_deref() {
+            Some(&[near, far]) if 0.0 <= near && near < far => {
+                Ok(Self([near, far].map(|n| n as f32)))
+            }
+            _ => Err(BadNumbers {
+                text: text.to_owned(),
+                expected: "the nearest and the farthest range in metres, as in 0.3,8",
+            }),
+        }
+    }
+}
+
 /// Numbers that cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("`{text}` cannot be read: write {expected}")]
@@ -177,6 +197,14 @@ mod tests {
         for bad in ["", "1,2", "1,2,3,4", "1,2,x", "nan,0,0", "1,2,3,4,5,6,7"] {
             assert!(bad.parse::<PoseArgument>().is_err(), "{bad}");
             assert!(bad.parse::<Triple>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_range_grows() {
+        assert_eq!("0, 25.5".parse(), Ok(RangeArgument([0.0, 25.5])));
+        for bad in ["", "8", "8,0.3", "1,1", "-1,2", "0,inf", "1,2,3"] {
+            assert!(bad.parse::<RangeArgument>().is_err(), "{bad}");
         }
     }
 
