@@ -2,6 +2,7 @@
 
 use anyhow::{Context, bail};
 use clap::Parser;
+use clap::builder::ArgPredicate;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::glamx::{DVec3, Pose3, Vec3};
@@ -32,10 +33,16 @@ struct Args {
     /// Folder with packages that the URDF names as package://NAME/…; may be given several times
     #[arg(long, value_name = "DIR", requires = "urdf")]
     packages: Vec<PathBuf>,
-    /// Built-in robot, where no file is given
-    #[arg(long, value_enum, default_value_t = BuiltIn::Arm, conflicts_with = "urdf")]
+    /// Built-in robot, where no file is given; on a terrain the quadruped
+    #[arg(
+        long,
+        value_enum,
+        default_value_t = BuiltIn::Arm,
+        default_value_if("terrain", ArgPredicate::IsPresent, "quadruped"),
+        conflicts_with = "urdf"
+    )]
     robot: BuiltIn,
-    /// Generated rough ground with all the faults of a scan; the quadruped stands, walks and is measured
+    /// Generated rough ground with all the faults of a scan; the robot stands, walks and is measured
     #[arg(long, value_enum, conflicts_with_all = ["scan", "place", "own_camera"])]
     terrain: Option<Ground>,
     #[command(flatten)]

@@ -4,7 +4,7 @@ use anyhow::bail;
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tldi::glamx::{DVec3, Pose3, Vec3};
+use tldi::glamx::{DVec3, Pose3};
 use tldi_examples::cli::{Common, PoseArgument, Triple};
 use tldi_examples::load::Located;
 use tldi_examples::query::{Answer, CloudQuery};
@@ -40,7 +40,7 @@ struct Args {
     #[arg(long, value_name = "DIR", default_value = "out/two_clouds")]
     out: PathBuf,
     /// Also write motion.png, an animated PNG of B on its way along the velocity
-    #[arg(long, conflicts_with = "no_pictures")]
+    #[arg(long, conflicts_with = "no_pictures", requires = "velocity")]
     animate: bool,
     #[command(flatten)]
     common: Common,
@@ -71,6 +71,9 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
+    if args.animate && args.velocity.0 == DVec3::ZERO {
+        bail!("--animate shows B on its way: give a --velocity that is not zero");
+    }
     args.common.check_outputs()?;
     let (query, origin) = load_query(args)?;
     let mut backend = args.common.backend.open()?;
@@ -142,9 +145,6 @@ fn draw(query: &CloudQuery, answer: &Answer, folder: &Path) -> anyhow::Result<()
 
 /// Asks again along the motion, up to the meeting or for a second.
 fn animate(args: &Args, query: &CloudQuery) -> anyhow::Result<()> {
-    if query.velocity == Vec3::ZERO {
-        bail!("--animate shows B on its way: give a --velocity");
-    }
     let mut backend = args.common.backend.open()?;
     let end = (query.ask(&mut *backend)?.report.impact).map_or(1.0, |impact| impact.time_seconds);
     let bar = output::progress_bar(MOTION_PICTURES, "pictures");

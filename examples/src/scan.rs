@@ -22,7 +22,7 @@ pub struct ScanSource {
     #[arg(long, value_name = "FILE")]
     pub scan: Option<PathBuf>,
     /// Metres in a unit of the scan's file, 0.001 for millimetres
-    #[arg(long, value_name = "M", default_value_t = 1.0, value_parser = positive)]
+    #[arg(long, value_name = "M", default_value_t = 1.0, value_parser = positive, requires = "scan")]
     pub scan_scale: f32,
     /// Direction against gravity in the frame of the scan; auto finds it in the scan
     #[arg(

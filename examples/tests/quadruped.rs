@@ -1,6 +1,8 @@
 //! The quadruped stands and walks on scans of rough ground. What it does is measured against the ground as it
 //! was generated.
 
+mod common;
+
 use std::path::Path;
 use tldi::glamx::Vec3;
 use tldi_examples::load;
@@ -10,6 +12,17 @@ use tldi_examples::robot::{
 };
 use tldi_examples::terrain::{Ground, Terrain};
 use tldi_wgpu::BackendChoice;
+
+/// On a terrain stands the quadruped with its twelve joints, unless another robot is named.
+#[test]
+fn a_terrain_has_the_quadruped() {
+    let folder = common::folder("quadruped_alone");
+    for (options, joints) in [(&[][..], 12), (&["--robot", "arm"], 6)] {
+        let options = [&["--terrain", "ramp", "--steps", "1"], options].concat();
+        let report = common::report(env!("CARGO_BIN_EXE_robot_in_scan"), &folder, &options);
+        assert_eq!(report["driven_joints"], joints, "{options:?}");
+    }
+}
 
 /// Stands, walks and stands again, eight seconds in all.
 fn walk(ground: Ground, seed: u64) -> StandingReport {

@@ -365,9 +365,11 @@ fn what_is_wrong_is_said() {
     let report = common::report_with_pictures(BINARY, &folder, &options);
     assert_eq!(report["driven_joints"], 0);
     assert_pictures(&folder.join("out/robot_in_scan"), &["motion.png"]);
-    let cases: [(&[&str], i32, &str); 4] = [
+    let cases: [(&[&str], i32, &str); 6] = [
         (&["--backend", "fast"], 2, "is no backend"),
         (&["--scan-scale", "0"], 2, "greater than 0"),
+        (&["--scan-scale", "0.001"], 2, "--scan <FILE>"),
+        (&["--packages", "."], 2, "--urdf <FILE>"),
         (&["--urdf", "missing.urdf"], 1, "missing.urdf"),
         (
             &["--scan", "floor.ply", "--scan-scale", "0.001"],

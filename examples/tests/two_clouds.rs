@@ -212,7 +212,7 @@ fn what_is_wrong_is_said() {
     let folder = folder("two_clouds_errors");
     write_spheres(&folder);
     write_ply(&folder.join("point.ply"), &[[1.0, 2.0, 3.0]; 4]);
-    let cases: [(&[&str], i32, &str); 7] = [
+    let cases: [(&[&str], i32, &str); 8] = [
         (&["a.ply", "b.ply", "--pose", "1,2"], 2, "three of degrees"),
         (
             &["a.ply", "b.ply", "--velocity", "fast"],
@@ -220,7 +220,12 @@ fn what_is_wrong_is_said() {
             "three numbers",
         ),
         (&["a.ply", "b.ply", "--backend", "fast"], 2, "is no backend"),
-        (&["a.ply", "b.ply", "--animate"], 1, "give a --velocity"),
+        (&["a.ply", "b.ply", "--animate"], 2, "--velocity <X,Y,Z>"),
+        (
+            &["--animate", "--velocity", "0,0,0"],
+            1,
+            "give a --velocity",
+        ),
         (&["a.ply"], 2, "<B>"),
         (&["a.ply", "missing.ply"], 1, "missing.ply"),
         (&["a.ply", "point.ply"], 1, "at one position"),
