@@ -12,19 +12,25 @@ const LONG_EDGE: f32 = 4.0;
 /// Share of the surface that must be in large faces: less of it closes the holes of a scan, where nothing was seen.
 const LARGE_SHARE: f64 = 0.1;
 
-/// Whether much of the surface is in faces with edges that are long compared with `spacing`.
+/// Whether the points are the corners of faces, of which many have edges that are long compared with `spacing`. A cloud
+/// most of whose points are in no face is a cloud.
 pub(crate) fn are_large(raw: &RawCloud, spacing: f32) -> bool {
+    let mut is_corner = vec![false; raw.points.len()];
     let (mut large, mut all) = (0.0, 0.0);
     for face in finite_faces(raw) {
         let [a, b, c] = face.map(|i| raw.points[i as usize]);
         let area = f64::from((b - a).cross(c - a).length());
         let longest = (a.distance(b)).max(b.distance(c)).max(c.distance(a));
         all += area;
+        for i in face {
+            is_corner[i as usize] = true;
+        }
         if longest > LONG_EDGE * spacing {
             large += area;
         }
     }
-    large > LARGE_SHARE * all
+    let corners = is_corner.iter().filter(|is_corner| **is_corner).count();
+    2 * corners > raw.points.len() && large > LARGE_SHARE * all
 }
 
 /// Even points on the faces, `spacing` apart, with outward normals and the colour of the nearest corner.

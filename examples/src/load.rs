@@ -24,7 +24,8 @@ const PLAUSIBLE_BODY_SIZES: std::ops::RangeInclusive<f32> = 0.02..=1.0;
 /// Least extent of a body in mean radii of the scan: a smaller one would lie in the noise.
 const LEAST_BODY_RADII: f32 = 10.0;
 
-/// A cloud, and what was subtracted from its file's coordinates, in its own unit: place in the file = `origin` + point.
+/// A cloud, and what was subtracted from the coordinates of its file, in the unit of the cloud: place in the file =
+/// `origin` + point.
 pub struct Located {
     /// The points.
     pub cloud: PointCloud<'static>,
@@ -48,11 +49,14 @@ pub fn scan_from_file(path: &Path, scale: f32) -> anyhow::Result<Located> {
 }
 
 /// Reads a cloud or a mesh. Of a mesh with large faces, and of one whose file repeats corners, points on the faces are
-/// taken: `spacing` of its extents apart.
+/// taken, as far apart as `spacing` says for its extents.
 fn read(path: &Path, spacing: impl Fn(Vec3) -> f32) -> anyhow::Result<RawCloud> {
     let is_mesh = mesh::is_mesh_file(path);
     let mut raw = if is_mesh {
         let Mesh { points, faces } = mesh::read_mesh(path)?;
+        if let Some(doubt) = mesh::doubt_about(path) {
+            eprintln!("warning: {doubt}");
+        }
         RawCloud {
             points,
             faces,
@@ -61,6 +65,13 @@ fn read(path: &Path, spacing: impl Fn(Vec3) -> f32) -> anyhow::Result<RawCloud> 
     } else {
         tldi_sources::read(path, &ReadOptions::default())?
     };
+    if !raw.faces.is_empty() {
+        let corners = raw.points.iter().copied().filter(|p| p.is_finite());
+        let spacing = spacing(corners.fold(Aabb::EMPTY, Aabb::including).extents());
+        if is_mesh || faces::are_large(&raw, spacing) {
+            return faces::sampled(raw, spacing);
+        }
+    }
     if !raw.has_unsigned_normals
         && let Some(normals) = &raw.normals
         && normal_signs::are_mixed(&raw.points, normals)
@@ -70,14 +81,6 @@ fn read(path: &Path, spacing: impl Fn(Vec3) -> f32) -> anyhow::Result<RawCloud> 
             path.display()
         );
         raw.has_unsigned_normals = true;
-    }
-    if raw.faces.is_empty() {
-        return Ok(raw);
-    }
-    let corners = raw.points.iter().copied().filter(|p| p.is_finite());
-    let spacing = spacing(corners.fold(Aabb::EMPTY, Aabb::including).extents());
-    if is_mesh || faces::are_large(&raw, spacing) {
-        return faces::sampled(raw, spacing);
     }
     Ok(raw)
 }

@@ -93,6 +93,40 @@ pub fn read_mesh(path: &Path) -> Result<Mesh, MeshError> {
     Ok(mesh)
 }
 
+/// What may be wrong with a mesh that was read, for people: nodes within nodes of COLLADA files, and nodes that are used from
+/// elsewhere, are not always put where they belong.
+pub fn doubt_about(path: &Path) -> Option<String> {
+    let extension = path.extension()?;
+    let bytes = (extension.eq_ignore_ascii_case("dae")).then(|| std::fs::read(path).ok())??;
+    has_placed_parts(&String::from_utf8_lossy(&bytes)).then(|| {
+        format!(
+            "mesh {} has nodes within nodes: its parts may be in wrong places; if so, save it as STL, OBJ or PLY",
+            path.display()
+        )
+    })
+}
+
+fn has_placed_parts(dae: &str) -> bool {
+    let mut depth = 0;
+    for tag in dae.split('<') {
+        let name = tag.split(|c: char| c.is_whitespace() || c == '/' || c == '>');
+        let is_empty = tag
+            .split('>')
+            .next()
+            .is_some_and(|head| head.ends_with('/'));
+        match name.into_iter().next() {
+            Some("instance_node") => return true,
+            Some("node") if !is_empty => depth += 1,
+            _ if tag.starts_with("/node>") => depth -= 1,
+            _ => {}
+        }
+        if depth > 1 {
+            return true;
+        }
+    }
+    false
+}
+
 fn load(bytes: &[u8], path: &Path) -> Result<Mesh, String> {
     // Damaged files, and parts of COLLADA that it does not know, make the loader panic.
     let loaded =
@@ -170,6 +204,21 @@ mod tests {
             let scaled = mesh.clone().scaled(scale);
             let [a, b, c] = scaled.faces[0].map(|i| scaled.points[i as usize]);
             assert_eq!((b - a).cross(c - a).z.signum(), up, "{scale}");
+        }
+    }
+
+    #[test]
+    fn nodes_within_nodes_are_told() {
+        for (dae, is_told) in [
+            (
+                "<node id=\"a\"><instance_geometry/></node><node><matrix/></node>",
+                false,
+            ),
+            ("<node/><node name='b'/><nodes><node></node></nodes>", false),
+            ("<node><node><instance_geometry/></node></node>", true),
+            ("<node><instance_node url=\"#a\"/></node>", true),
+        ] {
+            assert_eq!(has_placed_parts(dae), is_told, "{dae}");
         }
     }
 

@@ -69,8 +69,8 @@ struct Located<'a, R> {
     origin: Option<[f64; 3]>,
 }
 
-/// Writes the results of a run, whose places are relative to `origin`: the table for people to the standard output, then JSON. If one cannot be written, the
-/// other still is.
+/// Writes the results of a run, whose places are relative to `origin`: the table for people to the standard output, then
+/// JSON. If one cannot be written, the other still is.
 ///
 /// # Errors
 /// Those of writing, with the path.

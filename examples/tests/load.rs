@@ -167,6 +167,20 @@ fn a_mesh_of_large_faces_becomes_points_on_them() {
     assert_cube(&scan.cloud, 2.0 / 240.0);
 }
 
+/// A cloud with a single large face, of three of its 1000 points, stays a cloud.
+#[test]
+fn a_cloud_with_a_face_is_a_cloud() {
+    let path = common::folder("load_one_face").join("cloud.ply");
+    let mut text = "ply\nformat ascii 1.0\nelement vertex 1000\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar uint vertex_indices\nend_header\n"
+        .to_owned();
+    for k in 0..1000 {
+        text += &format!("{} {} {}\n", k % 10, k / 10 % 10, k / 100);
+    }
+    fs::write(&path, text + "3 0 9 990\n").unwrap();
+    assert_eq!(load::body_from_file(&path).unwrap().cloud.len(), 1000);
+}
+
 /// A sheet of 100 × 100 small squares keeps its corners: they show what it is.
 #[test]
 fn a_mesh_of_small_faces_keeps_its_corners() {
