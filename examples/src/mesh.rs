@@ -195,7 +195,11 @@ mod tests {
     /// A mirrored triangle faces where its mirror image does.
     #[test]
     fn a_mirrored_mesh_keeps_its_outside() {
-        let mesh = read_text("mirror.stl", format!("solid\n{FACET}endsolid\n").as_bytes()).unwrap();
+        let mesh = read_text(
+            "mirror.stl",
+            format!("solid a\n{FACET}endsolid\n").as_bytes(),
+        )
+        .unwrap();
         for (scale, up) in [
             (Vec3::new(1.0, -1.0, 1.0), 1.0),
             (Vec3::new(-1.0, -1.0, 2.0), 1.0),
