@@ -2,12 +2,11 @@
 
 use anyhow::{Context, bail};
 use clap::Parser;
-use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tldi::glamx::{Pose3, Vec3};
+use tldi::glamx::{DVec3, Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
-use tldi_examples::cli::{Common, UpChoice};
+use tldi_examples::cli::{Common, RangeArgument, UpChoice};
 use tldi_examples::depth::{
     DepthScene, DepthSimulation, DepthSnapshot, FrameSource, GeneratedCamera, camera_up,
 };
@@ -50,6 +49,9 @@ struct Args {
     /// Standard deviation of depth at 1 m, metres; it grows with the square of the range
     #[arg(long, value_name = "M", default_value_t = SensorModel::default().noise, value_parser = positive, allow_hyphen_values = true)]
     sensor_noise: f32,
+    /// Nearest and farthest depth that is believed, metres; 0.3,8 if left out
+    #[arg(long, value_name = "NEAR,FAR", allow_hyphen_values = true)]
+    range: Option<RangeArgument>,
     /// Direction against gravity in the world of the poses; auto finds it in the first frame
     #[arg(
         long,
@@ -102,12 +104,14 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
+    args.common.check_outputs()?;
     if !(0.0..=3600.0).contains(&args.hold) {
         bail!("--hold must be from 0 to 3600 seconds");
     }
     let (source, missing) = open(args)?;
     let model = SensorModel {
         noise: args.sensor_noise,
+        range: (args.range).map_or(SensorModel::default().range, |RangeArgument(range)| range),
         ..SensorModel::default()
     };
     let mut camera = DepthCamera::new(source.intrinsics(), model);
@@ -115,7 +119,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let seen = camera.points(&first.depths, &first.world_from_camera);
     if seen.points.is_empty() {
         bail!(
-            "{} has no measurement between {} and {} m: is the depth unit right?",
+            "{} has no measurement between {} and {} m: is the depth unit right? Else give a --range",
             first.name,
             model.range[0],
             model.range[1]
@@ -150,13 +154,11 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let recording = args.recording.start("depth_camera", up)?;
     let snapshots = simulate(&mut simulation, &source, recording, args)?;
     let report = simulation.report(missing);
+    let json = args.common.json.as_deref();
+    output::publish(&report, DVec3::ZERO, |out| report.write_table(out), json)?;
     if !args.common.no_pictures {
         draw(&simulation, up, &snapshots, args)?;
     }
-    if let Some(path) = &args.common.json {
-        output::write_json(path, &report)?;
-    }
-    report.write_table(&mut io::stdout().lock())?;
     Ok(())
 }
 

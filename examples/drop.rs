@@ -2,12 +2,12 @@
 
 use anyhow::{Context, bail};
 use clap::Parser;
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
 use tldi_examples::cli::Common;
+use tldi_examples::load::Located;
 use tldi_examples::report::DropReport;
 use tldi_examples::scan::{ScanSource, choose_up, load_scan, positive};
 use tldi_examples::scene::BodyShape;
@@ -78,7 +78,11 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
-    let scan = load_scan(&args.source, args.common.seed)?;
+    args.common.check_outputs()?;
+    let Located {
+        cloud: scan,
+        origin,
+    } = load_scan(&args.source, args.common.seed)?;
     let up = choose_up(args.source.up, &scan);
     let bodies = load_bodies(args, scan.mean_radius())?;
     let demand = Demand {
@@ -94,20 +98,23 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let mut simulation = DropSimulation::new(scan, up, bodies, &spots, seed, backend)?;
     let run = simulate(&mut simulation, args)?;
     let report = simulation.report();
+    let json = args.common.json.as_deref();
+    output::publish(&report, origin, |out| report.write_table(out), json)?;
     if !args.common.no_pictures {
         draw(&simulation, &report, up, &run, &args.out)?;
     }
-    if let Some(path) = &args.common.json {
-        output::write_json(path, &report)?;
+    let lost: Vec<&str> = report.lost().collect();
+    if !lost.is_empty() {
+        bail!("fell out of the scan: {}", lost.join(", "));
     }
-    finish(&report)
+    Ok(())
 }
 
 fn load_bodies(args: &Args, scan_radius: f32) -> anyhow::Result<Vec<NamedCloud>> {
     let kinds: Vec<(String, PointCloud<'static>)> = match &args.body {
         Some(path) => {
             eprintln!("reading {}", path.display());
-            vec![(load::stem(path), load::body_from_file(path)?)]
+            vec![(load::stem(path), load::body_from_file(path)?.cloud)]
         }
         None => (BodyShape::ALL.into_iter())
             .map(|shape| {
@@ -259,16 +266,5 @@ fn draw(
         bar.finish_and_clear();
     }
     eprintln!("pictures are in {}", folder.display());
-    Ok(())
-}
-
-fn finish(report: &DropReport) -> anyhow::Result<()> {
-    let mut out = io::stdout().lock();
-    report.write_table(&mut out)?;
-    out.flush()?;
-    let lost: Vec<&str> = report.lost().collect();
-    if !lost.is_empty() {
-        bail!("fell out of the scan: {}", lost.join(", "));
-    }
     Ok(())
 }

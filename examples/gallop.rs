@@ -2,10 +2,9 @@
 
 use anyhow::{Context, bail};
 use clap::Parser;
-use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tldi::glamx::{Pose3, Vec3};
+use tldi::glamx::{DVec3, Pose3, Vec3};
 use tldi::{KdTree, PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, UpChoice};
 use tldi_examples::gallop::{
@@ -100,6 +99,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
+    args.common.check_outputs()?;
     let mut runner = load_runner(args)?;
     let file_size = runner.size();
     if !(file_size.is_finite() && file_size > 0.0) {
@@ -139,14 +139,12 @@ fn run(args: &Args) -> anyhow::Result<()> {
         .unwrap_or_else(|| simulation.steps_of_run().min(MOST_STEPS));
     let recording = args.recording.start("gallop", Vec3::Y)?;
     let snapshots = simulate(&mut simulation, steps, args.animate, recording)?;
+    let report = simulation.report();
+    let json = args.common.json.as_deref();
+    output::publish(&report, DVec3::ZERO, |out| report.write_table(out), json)?;
     if !args.common.no_pictures {
         draw(&simulation, &snapshots, args)?;
     }
-    let report = simulation.report();
-    if let Some(path) = &args.common.json {
-        output::write_json(path, &report)?;
-    }
-    report.write_table(&mut io::stdout().lock())?;
     Ok(())
 }
 

@@ -2,10 +2,9 @@
 
 use anyhow::{Context, bail};
 use clap::Parser;
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tldi::glamx::{Pose3, Vec3};
+use tldi::glamx::{DVec3, Pose3, Vec3};
 use tldi::{KdTree, PointCloud};
 use tldi_examples::cli::{Common, UpChoice};
 use tldi_examples::lidar::{LidarReport, LidarScene, LidarSimulation, Scanner, Sweep, SweepSource};
@@ -70,6 +69,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
+    args.common.check_outputs()?;
     let source = match &args.sweeps {
         Some(folder) => SweepSource::open(folder)?,
         None => SweepSource::Generated(Scanner::new(args.count, args.common.seed)),
@@ -88,15 +88,11 @@ fn run(args: &Args) -> anyhow::Result<()> {
     }
     bar.finish_and_clear();
     let report = simulation.report();
+    let json = args.common.json.as_deref();
+    output::publish(&report, DVec3::ZERO, |out| report.write_table(out), json)?;
     if !args.common.no_pictures {
         draw(args, &simulation, &report)?;
     }
-    if let Some(path) = &args.common.json {
-        output::write_json(path, &report)?;
-    }
-    let mut out = io::stdout().lock();
-    report.write_table(&mut out)?;
-    out.flush()?;
     let lost = report.bodies.iter().filter(|body| body.lost);
     let lost: Vec<&str> = lost.map(|body| body.name.as_str()).collect();
     if !lost.is_empty() {

@@ -2,16 +2,17 @@
 
 use anyhow::{Context, bail};
 use clap::Parser;
-use std::io;
+use clap::builder::ArgPredicate;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tldi::glamx::{Pose3, Vec3};
+use tldi::glamx::{DVec3, Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, Triple};
+use tldi_examples::load::Located;
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::robot::{
-    BUILT_IN, Base, DT, Description, Motion, RobotScene, RobotSimulation, RobotSnapshot, Walk,
-    quadruped,
+    BUILT_IN, Base, DT, Description, MeshFolders, Motion, RobotScene, RobotSimulation,
+    RobotSnapshot, Walk, quadruped,
 };
 use tldi_examples::scan::{ScanSource, choose_up, load_scan};
 use tldi_examples::terrain::{Ground, Terrain};
@@ -29,10 +30,19 @@ struct Args {
     /// Robot; links become clouds of their collision, else their visual geometry
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
-    /// Built-in robot, where no file is given
-    #[arg(long, value_enum, default_value_t = BuiltIn::Arm, conflicts_with = "urdf")]
+    /// Folder with packages that the URDF names as package://NAME/…; may be given several times
+    #[arg(long, value_name = "DIR", requires = "urdf")]
+    packages: Vec<PathBuf>,
+    /// Built-in robot, where no file is given; on a terrain the quadruped
+    #[arg(
+        long,
+        value_enum,
+        default_value_t = BuiltIn::Arm,
+        default_value_if("terrain", ArgPredicate::IsPresent, "quadruped"),
+        conflicts_with = "urdf"
+    )]
     robot: BuiltIn,
-    /// Generated rough ground with all the faults of a scan; the quadruped stands, walks and is measured
+    /// Generated rough ground with all the faults of a scan; the robot stands, walks and is measured
     #[arg(long, value_enum, conflicts_with_all = ["scan", "place", "own_camera"])]
     terrain: Option<Ground>,
     #[command(flatten)]
@@ -104,6 +114,7 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
+    args.common.check_outputs()?;
     if !(args.sensor_noise.is_finite() && args.sensor_noise >= 0.0) {
         bail!("--sensor-noise must be a number that is not negative");
     }
@@ -111,19 +122,23 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let terrain = args
         .terrain
         .map(|ground| Terrain::new(ground, args.common.seed));
-    let (scan, up) = match &terrain {
-        Some(terrain) => (load::scan_from_surface(terrain.scan())?, Vec3::Z),
+    let (scan, origin, up) = match &terrain {
+        Some(terrain) => {
+            let scan = load::scan_from_surface(terrain.scan())?;
+            (scan, DVec3::ZERO, Vec3::Z)
+        }
         None => {
-            let scan = load_scan(&args.source, args.common.seed)?;
-            let up = choose_up(args.source.up, &scan);
-            (scan, up)
+            let Located { cloud, origin } = load_scan(&args.source, args.common.seed)?;
+            let up = choose_up(args.source.up, &cloud);
+            (cloud, origin, up)
         }
     };
     let scene = RobotScene {
         scan,
         up,
         base: args.base,
-        at: (args.place.map(|Triple(place)| place)).or(args.terrain.map(|_| Vec3::ZERO)),
+        at: (args.place.map(|Triple(place)| (place - origin).as_vec3()))
+            .or(args.terrain.map(|_| Vec3::ZERO)),
         facing: args.terrain.map(|_| Vec3::X),
         terrain,
         motion: Walk::of(&robot.kinematics).map(Motion::Walk),
@@ -144,13 +159,11 @@ fn run(args: &Args) -> anyhow::Result<()> {
     }
     let (snapshots, hardest) = simulate(&mut simulation, args.steps, recording)?;
     let report = simulation.report();
+    let json = args.common.json.as_deref();
+    output::publish(&report, origin, |out| report.write_table(out), json)?;
     if !args.common.no_pictures {
         draw(&simulation, up, &snapshots, &hardest, args)?;
     }
-    if let Some(path) = &args.common.json {
-        output::write_json(path, &report)?;
-    }
-    report.write_table(&mut io::stdout().lock())?;
     if !simulation.is_on_scan() {
         bail!("the robot fell out of the scan");
     }
@@ -161,13 +174,16 @@ fn load_robot(args: &Args) -> anyhow::Result<Description> {
     let robot = match &args.urdf {
         Some(path) => {
             eprintln!("reading {}", path.display());
-            Description::from_file(path)
+            Description::from_file(path, &args.packages)
                 .with_context(|| format!("cannot use the robot {}", path.display()))?
         }
-        None => match args.robot {
-            BuiltIn::Arm => Description::from_text(BUILT_IN, Path::new(""))?,
-            BuiltIn::Quadruped => Description::from_text(&quadruped(), Path::new(""))?,
-        },
+        None => {
+            let text = match args.robot {
+                BuiltIn::Arm => BUILT_IN,
+                BuiltIn::Quadruped => &quadruped(),
+            };
+            Description::from_text(text, &MeshFolders::new(Path::new(""), &[]))?
+        }
     };
     for warning in &robot.warnings {
         eprintln!("warning: {warning}");

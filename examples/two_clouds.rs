@@ -2,12 +2,11 @@
 
 use anyhow::bail;
 use clap::Parser;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tldi::PointCloud;
-use tldi::glamx::{Pose3, Vec3};
+use tldi::glamx::{DVec3, Pose3};
 use tldi_examples::cli::{Common, PoseArgument, Triple};
+use tldi_examples::load::Located;
 use tldi_examples::query::{Answer, CloudQuery};
 use tldi_examples::scene::BodyShape;
 use tldi_examples::{load, output, query_pictures};
@@ -21,7 +20,7 @@ use tldi_pictures::animation;
 #[derive(Parser)]
 #[command(version)]
 struct Args {
-    /// First cloud (PLY, PCD, XYZ or CSV, also as .gz)
+    /// First cloud (PLY, PCD, XYZ or CSV, also as .gz) or mesh (PLY, STL, OBJ, DAE)
     #[arg(requires = "b")]
     a: Option<PathBuf>,
     /// Second cloud; without files, two generated ones
@@ -41,7 +40,7 @@ struct Args {
     #[arg(long, value_name = "DIR", default_value = "out/two_clouds")]
     out: PathBuf,
     /// Also write motion.png, an animated PNG of B on its way along the velocity
-    #[arg(long, conflicts_with = "no_pictures")]
+    #[arg(long, conflicts_with = "no_pictures", requires = "velocity")]
     animate: bool,
     #[command(flatten)]
     common: Common,
@@ -72,57 +71,60 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
-    let query = load_query(args)?;
+    if args.animate && args.velocity.0 == DVec3::ZERO {
+        bail!("--animate shows B on its way: give a --velocity that is not zero");
+    }
+    args.common.check_outputs()?;
+    let (query, origin) = load_query(args)?;
     let mut backend = args.common.backend.open()?;
     let answer = query.ask(&mut *backend)?;
+    let (report, json) = (&answer.report, args.common.json.as_deref());
+    output::publish(report, origin, |out| report.write_table(out), json)?;
     if !args.common.no_pictures {
         draw(&query, &answer, &args.out)?;
     }
     if args.animate {
         animate(args, &query)?;
     }
-    if let Some(path) = &args.common.json {
-        output::write_json(path, &answer.report)?;
-    }
-    answer.report.write_table(&mut io::stdout().lock())?;
     Ok(())
 }
 
-fn load_query(args: &Args) -> anyhow::Result<CloudQuery> {
-    let generated: PoseArgument = GENERATED_POSE.parse()?;
+/// What to ask, and the origin of A in its file.
+fn load_query(args: &Args) -> anyhow::Result<(CloudQuery, DVec3)> {
     let (a, b, default_pose) = match (&args.a, &args.b) {
-        (Some(a), Some(b)) => (load_cloud(a)?, load_cloud(b)?, Pose3::IDENTITY),
+        (Some(a), Some(b)) => (load_cloud(a)?, load_cloud(b)?, PoseArgument::IDENTITY),
         _ => {
             let [a, b] = [BodyShape::Torus, BodyShape::Star];
             let [size_a, size_b] = GENERATED_SIZES;
             let seed = args.common.seed;
-            (
-                generate(a, size_a, seed)?,
-                generate(b, size_b, seed)?,
-                generated.0,
-            )
+            let (a, b) = (generate(a, size_a, seed)?, generate(b, size_b, seed)?);
+            (a, b, GENERATED_POSE.parse()?)
         }
     };
-    let [size_a, size_b] = [&a, &b].map(|cloud| cloud.bounds().extents().max_element());
+    let [size_a, size_b] = [&a, &b].map(|body| body.cloud.bounds().extents().max_element());
     if size_a.max(size_b) > UNLIKE_SIZES * size_a.min(size_b) {
         eprintln!("warning: A is {size_a:.3} in size and B {size_b:.3}: have they the same unit?");
     }
-    Ok(CloudQuery {
-        a,
-        b,
-        a_from_b: args.pose.map_or(default_pose, |PoseArgument(pose)| pose),
-        velocity: args.velocity.0,
-    })
+    let query = CloudQuery {
+        a: a.cloud,
+        b: b.cloud,
+        a_from_b: (args.pose.unwrap_or(default_pose)).between(a.origin, b.origin),
+        velocity: args.velocity.0.as_vec3(),
+    };
+    Ok((query, a.origin))
 }
 
-fn load_cloud(path: &Path) -> anyhow::Result<PointCloud<'static>> {
+fn load_cloud(path: &Path) -> anyhow::Result<Located> {
     eprintln!("reading {}", path.display());
     load::body_from_file(path)
 }
 
-fn generate(shape: BodyShape, size: f32, seed: u64) -> anyhow::Result<PointCloud<'static>> {
+fn generate(shape: BodyShape, size: f32, seed: u64) -> anyhow::Result<Located> {
     let cloud = load::body_from_surface(shape.sample(GENERATED_SPACING, seed))?;
-    Ok(load::resized(&cloud, size)?)
+    Ok(Located {
+        cloud: load::resized(&cloud, size)?,
+        origin: DVec3::ZERO,
+    })
 }
 
 fn draw(query: &CloudQuery, answer: &Answer, folder: &Path) -> anyhow::Result<()> {
@@ -143,9 +145,6 @@ fn draw(query: &CloudQuery, answer: &Answer, folder: &Path) -> anyhow::Result<()
 
 /// Asks again along the motion, up to the meeting or for a second.
 fn animate(args: &Args, query: &CloudQuery) -> anyhow::Result<()> {
-    if query.velocity == Vec3::ZERO {
-        bail!("--animate shows B on its way: give a --velocity");
-    }
     let mut backend = args.common.backend.open()?;
     let end = (query.ask(&mut *backend)?.report.impact).map_or(1.0, |impact| impact.time_seconds);
     let bar = output::progress_bar(MOTION_PICTURES, "pictures");

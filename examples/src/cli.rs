@@ -1,9 +1,10 @@
 //! Options that every binary has.
 
+use crate::output;
 use std::path::PathBuf;
 use std::str::FromStr;
 use thiserror::Error;
-use tldi::glamx::{EulerRot, Pose3, Quat, Vec3};
+use tldi::glamx::{DPose3, DQuat, DVec3, EulerRot, Pose3, Vec3};
 use tldi_wgpu::BackendChoice;
 
 /// Options that every binary has; flatten into the binary's own arguments.
@@ -22,6 +23,16 @@ pub struct Common {
     /// Draw nothing: pictures take longer than most simulations
     #[arg(long)]
     pub no_pictures: bool,
+}
+
+impl Common {
+    /// Makes sure that the results can be written, before they are computed.
+    ///
+    /// # Errors
+    /// Those of the file system, with the path.
+    pub fn check_outputs(&self) -> anyhow::Result<()> {
+        self.json.as_deref().map_or(Ok(()), output::check_writable)
+    }
 }
 
 /// The up direction of a scan: given, or to be found in the scan.
@@ -62,14 +73,55 @@ impl FromStr for UpChoice {
     }
 }
 
-/// Three numbers, `x,y,z`.
+/// Three numbers, `x,y,z`; wide, since they may be coordinates of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Triple(pub Vec3);
+pub struct Triple(pub DVec3);
 
 /// A pose, `x,y,z` in metres or `x,y,z,rx,ry,rz` with turns in degrees, about the fixed axes x,
 /// then y, then z.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseArgument(pub Pose3);
+pub struct PoseArgument(pub DPose3);
+
+impl PoseArgument {
+    /// The frames are one.
+    pub const IDENTITY: Self = Self(DPose3::IDENTITY);
+
+    /// The same pose of frames that were moved: from that of `b`, whose zero is now at `origin_b`, into that of `a`.
+    ///
+    /// ```
+    /// use tldi::glamx::{DVec3, Vec3};
+    /// use tldi_examples::cli::PoseArgument;
+    /// let pose: PoseArgument = "0,0,0,0,0,90".parse()?;
+    /// let [origin_a, origin_b] = [DVec3::Y, DVec3::X].map(|axis| 5e6 * axis);
+    /// // A quarter turn about z takes the one origin to the other.
+    /// assert!((pose.between(origin_a, origin_b) * Vec3::X - Vec3::Y).length() < 1e-6);
+    /// # Ok::<(), tldi_examples::cli::BadNumbers>(())
+    /// ```
+    pub fn between(&self, origin_a: DVec3, origin_b: DVec3) -> Pose3 {
+        let moved = DPose3::from_parts(self.0 * origin_b - origin_a, self.0.rotation);
+        moved.into()
+    }
+}
+
+/// The nearest and the farthest range that count, metres, `near,far`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RangeArgument(pub [f32; 2]);
+
+impl FromStr for RangeArgument {
+    type Err = BadNumbers;
+
+    fn from_str(text: &str) -> Result<Self, BadNumbers> {
+        match numbers(text).as_deref() {
+            Some(&[near, far]) if 0.0 <= near && near < far => {
+                Ok(Self([near, far].map(|n| n as f32)))
+            }
+            _ => Err(BadNumbers {
+                text: text.to_owned(),
+                expected: "the nearest and the farthest range in metres, as in 0.3,8",
+            }),
+        }
+    }
+}
 
 /// Numbers that cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -79,9 +131,12 @@ pub struct BadNumbers {
     expected: &'static str,
 }
 
-/// The finite numbers of a list with commas.
-fn numbers(text: &str) -> Option<Vec<f32>> {
-    let number = |part: &str| part.trim().parse().ok().filter(|n| f32::is_finite(*n));
+/// The numbers of a list with commas, all finite as `f32` too.
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    let number = |part: &str| {
+        let number: f64 = part.trim().parse().ok()?;
+        (number as f32).is_finite().then_some(number)
+    };
     text.split(',').map(number).collect()
 }
 
@@ -90,7 +145,7 @@ impl FromStr for Triple {
 
     fn from_str(text: &str) -> Result<Self, BadNumbers> {
         match numbers(text).as_deref() {
-            Some(&[x, y, z]) => Ok(Self(Vec3::new(x, y, z))),
+            Some(&[x, y, z]) => Ok(Self(DVec3::new(x, y, z))),
             _ => Err(BadNumbers {
                 text: text.to_owned(),
                 expected: "three numbers, as in 0,0,-1.5",
@@ -104,11 +159,11 @@ impl FromStr for PoseArgument {
 
     fn from_str(text: &str) -> Result<Self, BadNumbers> {
         let (place, turn) = match numbers(text).as_deref() {
-            Some(&[x, y, z]) => (Vec3::new(x, y, z), Quat::IDENTITY),
+            Some(&[x, y, z]) => (DVec3::new(x, y, z), DQuat::IDENTITY),
             Some(&[x, y, z, rx, ry, rz]) => {
-                let [rx, ry, rz] = [rx, ry, rz].map(f32::to_radians);
-                let turn = Quat::from_euler(EulerRot::ZYX, rz, ry, rx);
-                (Vec3::new(x, y, z), turn)
+                let [rx, ry, rz] = [rx, ry, rz].map(f64::to_radians);
+                let turn = DQuat::from_euler(EulerRot::ZYX, rz, ry, rx);
+                (DVec3::new(x, y, z), turn)
             }
             _ => {
                 return Err(BadNumbers {
@@ -117,31 +172,39 @@ impl FromStr for PoseArgument {
                 });
             }
         };
-        Ok(Self(Pose3::from_parts(place, turn)))
+        Ok(Self(DPose3::from_parts(place, turn)))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f32::consts::FRAC_1_SQRT_2;
+    use std::f64::consts::FRAC_1_SQRT_2;
 
     #[test]
     fn poses_turn_by_degrees_about_fixed_axes() {
         // A quarter turn about x takes y to z, one about z then leaves it there.
         let PoseArgument(pose) = "1,2,3,90,0,90".parse().unwrap();
-        assert!((pose * Vec3::Y - Vec3::new(1.0, 2.0, 4.0)).length() < 1e-6);
-        assert!((pose * Vec3::X - Vec3::new(1.0, 3.0, 3.0)).length() < 1e-6);
+        assert!((pose * DVec3::Y - DVec3::new(1.0, 2.0, 4.0)).length() < 1e-6);
+        assert!((pose * DVec3::X - DVec3::new(1.0, 3.0, 3.0)).length() < 1e-6);
         let PoseArgument(pose) = "0, 0, 0, 0, 45, 0".parse().unwrap();
-        let turned = Vec3::new(FRAC_1_SQRT_2, 0.0, -FRAC_1_SQRT_2);
-        assert!((pose * Vec3::X - turned).length() < 1e-6);
+        let turned = DVec3::new(FRAC_1_SQRT_2, 0.0, -FRAC_1_SQRT_2);
+        assert!((pose * DVec3::X - turned).length() < 1e-6);
         assert_eq!(
             "1,0,2".parse(),
-            Ok(PoseArgument(Pose3::translation(1.0, 0.0, 2.0)))
+            Ok(PoseArgument(DPose3::translation(1.0, 0.0, 2.0)))
         );
         for bad in ["", "1,2", "1,2,3,4", "1,2,x", "nan,0,0", "1,2,3,4,5,6,7"] {
             assert!(bad.parse::<PoseArgument>().is_err(), "{bad}");
             assert!(bad.parse::<Triple>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_range_grows() {
+        assert_eq!("0, 25.5".parse(), Ok(RangeArgument([0.0, 25.5])));
+        for bad in ["", "8", "8,0.3", "1,1", "-1,2", "0,inf", "1,2,3"] {
+            assert!(bad.parse::<RangeArgument>().is_err(), "{bad}");
         }
     }
 

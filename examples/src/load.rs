@@ -1,31 +1,88 @@
 //! Turns raw points into the clouds of a scan and of a body.
 
+use crate::faces;
+use crate::mesh::{self, Mesh};
+use crate::normal_signs;
+use crate::robot::Spacing;
 use crate::surface_sampling::SampledSurface;
 use anyhow::Context;
 use rayon::prelude::*;
 use std::path::Path;
-use tldi::glamx::Vec3;
-use tldi::{CloudBuilder, CloudError, KdTree, PointCloud};
+use tldi::glamx::{DVec3, Vec3};
+use tldi::{Aabb, CloudBuilder, CloudError, KdTree, PointCloud};
+use tldi_sources::{RawCloud, ReadOptions};
 
 /// Neighbours for the normals of a scan: enough to average the noise of a depth camera.
 const SCAN_NORMAL_NEIGHBORS: usize = 24;
 /// Neighbours for the normals of a body that brings none.
 const BODY_NORMAL_NEIGHBORS: usize = 16;
+/// Points that a mesh has along its longest side, as a scan and as a body. A room of 5 m gets a point every 2 cm.
+const SCAN_ACROSS: f32 = 240.0;
+const BODY_ACROSS: f32 = 60.0;
 /// Extents in metres that a body from a file is believed to have in earnest.
 const PLAUSIBLE_BODY_SIZES: std::ops::RangeInclusive<f32> = 0.02..=1.0;
 /// Least extent of a body in mean radii of the scan: a smaller one would lie in the noise.
 const LEAST_BODY_RADII: f32 = 10.0;
+
+/// A cloud, and what was subtracted from the coordinates of its file, in the unit of the cloud: place in the file =
+/// `origin` + point.
+pub struct Located {
+    /// The points.
+    pub cloud: PointCloud<'static>,
+    /// Zero on axes where coordinates are small enough for `f32`.
+    pub origin: DVec3,
+}
 
 /// Loads a scan, `scale` metres a unit of the file: colours, radii and normals of the file, else radii from
 /// neighbours and normals by principal component analysis.
 ///
 /// # Errors
 /// Those of reading the file and of building the cloud, with the path.
-pub fn scan_from_file(path: &Path, scale: f32) -> anyhow::Result<PointCloud<'static>> {
-    let raw = tldi_sources::read(path, &tldi_sources::ReadOptions::default())
-        .with_context(|| format!("cannot read the scan {}", path.display()))?;
-    finish_scan(raw.scaled(scale).into_builder())
-        .with_context(|| format!("cannot use the scan {}", path.display()))
+pub fn scan_from_file(path: &Path, scale: f32) -> anyhow::Result<Located> {
+    let raw = read(path, |extents| extents.max_element() / SCAN_ACROSS)
+        .with_context(|| format!("cannot read the scan {}", path.display()))?
+        .scaled(scale);
+    let origin = raw.origin;
+    let cloud = finish_scan(raw.into_builder())
+        .with_context(|| format!("cannot use the scan {}", path.display()))?;
+    Ok(Located { cloud, origin })
+}
+
+/// Reads a cloud or a mesh. Of a mesh with large faces, and of one whose file repeats corners, points on the faces are
+/// taken, as far apart as `spacing` says for its extents.
+fn read(path: &Path, spacing: impl Fn(Vec3) -> f32) -> anyhow::Result<RawCloud> {
+    let is_mesh = mesh::is_mesh_file(path);
+    let mut raw = if is_mesh {
+        let Mesh { points, faces } = mesh::read_mesh(path)?;
+        if let Some(doubt) = mesh::doubt_about(path) {
+            eprintln!("warning: {doubt}");
+        }
+        RawCloud {
+            points,
+            faces,
+            ..RawCloud::default()
+        }
+    } else {
+        tldi_sources::read(path, &ReadOptions::default())?
+    };
+    if !raw.faces.is_empty() {
+        let corners = raw.points.iter().copied().filter(|p| p.is_finite());
+        let spacing = spacing(corners.fold(Aabb::EMPTY, Aabb::including).extents());
+        if is_mesh || faces::are_large(&raw, spacing) {
+            return faces::sampled(raw, spacing);
+        }
+    }
+    if !raw.has_unsigned_normals
+        && let Some(normals) = &raw.normals
+        && normal_signs::are_mixed(&raw.points, normals)
+    {
+        eprintln!(
+            "warning: normals of {} point to either side: their signs are not used",
+            path.display()
+        );
+        raw.has_unsigned_normals = true;
+    }
+    Ok(raw)
 }
 
 /// The cloud of a generated scene, made like that of a file: its exact normals are not used.
@@ -44,19 +101,25 @@ fn finish_scan(builder: CloudBuilder<'_>) -> Result<PointCloud<'static>, CloudEr
     Ok(cloud.into_owned())
 }
 
-/// Loads a body: as in the file, or with its largest extent scaled to `size` metres.
+/// Loads a body, in the unit of the file.
 ///
 /// # Errors
 /// Those of reading the file and of building the cloud, with the path.
-pub fn body_from_file(path: &Path) -> anyhow::Result<PointCloud<'static>> {
-    let raw = tldi_sources::read(path, &tldi_sources::ReadOptions::default())
-        .with_context(|| format!("cannot read the body {}", path.display()))?;
+pub fn body_from_file(path: &Path) -> anyhow::Result<Located> {
+    let spacing = |extents: Vec3| {
+        let scan_radius = extents.max_element() / BODY_ACROSS;
+        Spacing { scan_radius }.of(extents)
+    };
+    let raw =
+        read(path, spacing).with_context(|| format!("cannot read the body {}", path.display()))?;
+    let origin = raw.origin;
     let cloud = raw
         .into_builder()
         .pca_normals(BODY_NORMAL_NEIGHBORS)
         .build()
-        .with_context(|| format!("cannot use the body {}", path.display()))?;
-    Ok(cloud.into_owned())
+        .with_context(|| format!("cannot use the body {}", path.display()))?
+        .into_owned();
+    Ok(Located { cloud, origin })
 }
 
 /// The cloud of a generated body.

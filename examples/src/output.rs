@@ -3,8 +3,10 @@
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use std::io::{self, IsTerminal};
+use std::fs::OpenOptions;
+use std::io::{self, IsTerminal, StdoutLock, Write};
 use std::path::Path;
+use tldi::glamx::DVec3;
 
 /// A progress bar over `length` of `things` (a plural) on a terminal; hidden elsewhere.
 pub fn progress_bar(length: usize, things: &str) -> ProgressBar {
@@ -38,10 +40,58 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Writes a value as JSON.
+/// Makes sure that a file can be written later: makes its folder, and opens the file for writing. Its content stays, and
+/// a file that was not there is not there afterwards either.
 ///
 /// # Errors
 /// Those of the file system, with the path.
-pub fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
-    write_file(path, &serde_json::to_vec_pretty(value)?)
+pub fn check_writable(path: &Path) -> anyhow::Result<()> {
+    if let Some(folder) = path.parent() {
+        make_folder(folder)?;
+    }
+    let is_new = !path.exists();
+    (OpenOptions::new().create(true).append(true).open(path))
+        .with_context(|| format!("cannot write {}", path.display()))?;
+    if is_new {
+        // An empty file that stays does no harm.
+        std::fs::remove_file(path).ok();
+    }
+    Ok(())
+}
+
+/// Results whose places are relative to an origin: that of the file.
+#[derive(Serialize)]
+struct Located<'a, R> {
+    #[serde(flatten)]
+    report: &'a R,
+    /// Left out where it is zero.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin: Option<[f64; 3]>,
+}
+
+/// Writes the results of a run, whose places are relative to `origin`: the table for people to the standard output, then
+/// JSON. If one cannot be written, the other still is.
+///
+/// # Errors
+/// Those of writing, with the path.
+pub fn publish(
+    report: &impl Serialize,
+    origin: DVec3,
+    write_table: impl FnOnce(&mut StdoutLock<'_>) -> io::Result<()>,
+    json: Option<&Path>,
+) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    let origin = Some(origin.to_array()).filter(|origin| *origin != [0.0; 3]);
+    let write_origin = |out: &mut StdoutLock<'_>| match origin {
+        Some([x, y, z]) => writeln!(out, "places are relative to {x} {y} {z} in the file"),
+        None => Ok(()),
+    };
+    let told = write_table(&mut out)
+        .and_then(|()| write_origin(&mut out))
+        .and_then(|()| out.flush());
+    if let Some(path) = json {
+        let located = Located { report, origin };
+        write_file(path, &serde_json::to_vec_pretty(&located)?)?;
+    }
+    told.context("cannot write the table")
 }

@@ -1,12 +1,12 @@
 //! The scan that a story takes place in: from a file or generated, with its up direction.
 
 use crate::cli::UpChoice;
-use crate::load;
+use crate::load::{self, Located};
 use crate::scene::furnished_room;
 use crate::up::{Confidence, Up, detect_up};
 use std::path::PathBuf;
 use tldi::PointCloud;
-use tldi::glamx::Vec3;
+use tldi::glamx::{DVec3, Vec3};
 
 /// Distance between the points of the generated room and standard deviation of their error, in
 /// metres: those of a good terrestrial scanner.
@@ -18,11 +18,11 @@ const PLAUSIBLE_EXTENTS: std::ops::RangeInclusive<f32> = 0.3..=2000.0;
 /// Options about the scan; flatten into the binary's own arguments.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ScanSource {
-    /// Scan (PLY, PCD, XYZ or CSV, also as .gz); a generated room if left out
+    /// Scan (PLY, PCD, XYZ or CSV, also as .gz) or mesh (PLY, STL, OBJ, DAE); a generated room if left out
     #[arg(long, value_name = "FILE")]
     pub scan: Option<PathBuf>,
     /// Metres in a unit of the scan's file, 0.001 for millimetres
-    #[arg(long, value_name = "M", default_value_t = 1.0, value_parser = positive)]
+    #[arg(long, value_name = "M", default_value_t = 1.0, value_parser = positive, requires = "scan")]
     pub scan_scale: f32,
     /// Direction against gravity in the frame of the scan; auto finds it in the scan
     #[arg(
@@ -49,15 +49,18 @@ pub fn positive(text: &str) -> Result<f32, String> {
 ///
 /// # Errors
 /// Those of reading the file and of building the cloud, with the path.
-pub fn load_scan(source: &ScanSource, seed: u64) -> anyhow::Result<PointCloud<'static>> {
+pub fn load_scan(source: &ScanSource, seed: u64) -> anyhow::Result<Located> {
     let Some(path) = &source.scan else {
         eprintln!("generating a room");
         let room = furnished_room(ROOM_SPACING, ROOM_NOISE, seed);
-        return Ok(load::scan_from_surface(room)?);
+        return Ok(Located {
+            cloud: load::scan_from_surface(room)?,
+            origin: DVec3::ZERO,
+        });
     };
     eprintln!("reading {}", path.display());
     let scan = load::scan_from_file(path, source.scan_scale)?;
-    let extent = scan.bounds().extents().max_element();
+    let extent = scan.cloud.bounds().extents().max_element();
     if !PLAUSIBLE_EXTENTS.contains(&extent) {
         eprintln!(
             "warning: the scan is {extent:.2} m in size; if its unit is another one, give --scan-scale (0.001 for millimetres)"

@@ -125,6 +125,8 @@ impl HeightMap {
         let camera = VirtualCamera::along(-up, pixel_size);
         let params = Params::for_radius(scan.mean_radius()).with_pixel_size(pixel_size);
         let image = tldi::build(scan, &Pose3::IDENTITY, &camera, &params);
+        // Where the image would be too large, its pixels are larger than asked for.
+        let pixel_size = image.camera.pixel_size_at(0.0);
         let [width, height] = image.size;
         let mut map = Self {
             depth: Vec::new(),
@@ -365,6 +367,29 @@ mod tests {
         )
         .unwrap_err();
         assert_eq!(error, NoSpot { diameter: 1.0 });
+    }
+
+    /// Two points far away make the image so large that its pixels are three times as wide: a strip of 90 cm still has
+    /// room for a body of 30 cm, which is eleven of the wanted pixels and five of the larger ones.
+    #[test]
+    fn a_wide_scan_has_places_as_large_as_asked_for() {
+        let mut points: Vec<Vec3> = (0..45 * 150)
+            .map(|k| Vec3::new((k % 45) as f32 * 0.02, (k / 45) as f32 * 0.02, 0.0))
+            .collect();
+        points.extend([-100.0, 100.0].map(|far| Vec3::new(far, far, 0.0)));
+        let scan = PointCloud::builder(points).radius(0.015).build().unwrap();
+        let demand = Demand {
+            count: 2,
+            body_radius: 0.15,
+            seed: 1,
+        };
+        for spot in find_spots(&scan, Vec3::Z, &demand).unwrap() {
+            let p = spot.surface;
+            assert!(
+                (0.15..0.75).contains(&p.x) && (0.15..2.85).contains(&p.y),
+                "{p}"
+            );
+        }
     }
 
     #[test]

@@ -179,6 +179,30 @@ fn what_is_wrong_is_said() {
     assert_refused(BINARY, &folder, &[case]);
 }
 
+/// A floor at 15 m counts where it is said to.
+#[test]
+fn the_range_can_be_set() {
+    let folder = folder("depth_range");
+    write_frames(&folder.join("frames"), &[false; 2]);
+    let intrinsics = "160 120 140 140 79.5 59.5 0.01\n";
+    fs::write(folder.join("frames/intrinsics.txt"), intrinsics).unwrap();
+    let options = [
+        "--frames", "frames", "--count", "0", "--hold", "0", "--up", "0,0,1",
+    ];
+    let ranged = |range| [&options[..], &["--range", range]].concat();
+    let cases: [(&[&str], i32, &str); 3] = [
+        (&options, 1, "between 0.3 and 8 m"),
+        (&ranged("1,14"), 1, "between 1 and 14 m"),
+        (&ranged("14,1"), 2, "the nearest and the farthest"),
+    ];
+    assert_refused(BINARY, &folder, &cases);
+    let report = report(&folder, &ranged("1,16"));
+    assert!(
+        number(&report["frames"][0]["points"]) > 10_000.0,
+        "{report}"
+    );
+}
+
 #[test]
 fn bodies_rest_on_real_frames() {
     let Some(frames) = data("kitchen_depth") else {

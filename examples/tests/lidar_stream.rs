@@ -6,6 +6,8 @@ use common::{assert_refused, folder, number, report, report_with_pictures, run};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
+use tldi::glamx::Vec3;
+use tldi_examples::lidar::SweepSource;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_lidar_stream");
 
@@ -87,6 +89,38 @@ fn a_folder_of_sweeps_is_read_with_its_poses() {
     }
     // The grid is exact; contacts scatter by a tenth of its radius.
     assert_on_ground(&report, 0.02);
+}
+
+/// Files that are numbered without zeros in front have the poses of their numbers.
+#[test]
+fn numbered_sweeps_have_their_poses() {
+    let folder = folder("lidar_numbered");
+    write_sweeps(&folder, 12);
+    for k in 0..12 {
+        fs::rename(
+            folder.join(format!("{k:06}.bin")),
+            folder.join(format!("{k}.bin")),
+        )
+        .unwrap();
+    }
+    let poses = fs::read_to_string(folder.join("poses.txt")).unwrap();
+    fs::write(
+        folder.join("poses.txt"),
+        format!("# camera to world\n{poses}"),
+    )
+    .unwrap();
+    let source = SweepSource::open(&folder).unwrap();
+    assert_eq!(source.len(), 12);
+    for k in 0..12 {
+        let sweep = source.sweep(k).unwrap();
+        assert_eq!(sweep.name, k.to_string());
+        // The grid's first point is the same place in the world.
+        let first = sweep.world_from_scanner * sweep.points[0];
+        assert!(
+            first.distance(Vec3::new(3.0, 1.5, -3.0)) < 1e-5,
+            "{k}: {first}"
+        );
+    }
 }
 
 #[test]

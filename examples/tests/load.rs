@@ -1,8 +1,11 @@
 //! Clouds made from other clouds.
 
+mod common;
+
+use std::fs;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
-use tldi_examples::load::{on_surfaces, resized, subset};
+use tldi_examples::load::{self, on_surfaces, resized, subset};
 
 #[test]
 fn a_resized_cloud_is_scaled_about_its_middle_and_so_are_its_radii() {
@@ -41,6 +44,170 @@ fn only_normals_with_a_side_count_as_such() {
             let normals = made.normals().expect("they are kept or estimated");
             assert!(normals.iter().all(|n| n.z.abs() > 0.999));
         }
+    }
+}
+
+/// A ball with outward normals, and with normals of any sign, as estimates are before they are oriented.
+#[test]
+fn normals_of_a_file_have_a_side_only_if_they_agree() {
+    let folder = common::folder("load_normals");
+    let write = |name: &str, sign: fn(f32) -> f32| {
+        let header = "ply\nformat ascii 1.0\nelement vertex 2000\nproperty float x\nproperty float y\n\
+            property float z\nproperty float nx\nproperty float ny\nproperty float nz\nend_header\n";
+        let mut text = header.to_owned();
+        for k in 0..2000 {
+            let z = 1.0 - (2 * k + 1) as f32 / 2000.0;
+            let (y, x) = (2.399_963 * k as f32).sin_cos();
+            let p = Vec3::new(x, y, 0.0) * (1.0 - z * z).sqrt() + Vec3::new(0.0, 0.0, z);
+            let n = p * sign(p.z);
+            text += &format!("{} {} {} {} {} {}\n", p.x, p.y, p.z, n.x, n.y, n.z);
+        }
+        let path = folder.join(name);
+        fs::write(&path, text).unwrap();
+        path
+    };
+    let outward = write("outward.ply", |_| 1.0);
+    let upward = write("upward.ply", f32::signum);
+    for (path, is_oriented) in [(&outward, true), (&upward, false)] {
+        for loaded in [load::body_from_file(path), load::scan_from_file(path, 1.0)] {
+            let cloud = loaded.unwrap().cloud;
+            assert_eq!(cloud.normals_oriented(), is_oriented, "{}", path.display());
+            let normals = cloud.normals().unwrap();
+            let along = |k: usize| cloud.point(k).dot(normals[k]).abs() > 0.999;
+            assert!((0..cloud.len()).all(along));
+        }
+    }
+}
+
+/// Corners of a cube of 2 m, as Blender saves it, and its sides, anticlockwise as seen from outside.
+const CORNERS: [[f32; 3]; 8] = [
+    [-1.0, -1.0, -1.0],
+    [1.0, -1.0, -1.0],
+    [-1.0, 1.0, -1.0],
+    [1.0, 1.0, -1.0],
+    [-1.0, -1.0, 1.0],
+    [1.0, -1.0, 1.0],
+    [-1.0, 1.0, 1.0],
+    [1.0, 1.0, 1.0],
+];
+const SIDES: [[usize; 4]; 6] = [
+    [0, 2, 3, 1],
+    [4, 5, 7, 6],
+    [0, 1, 5, 4],
+    [2, 6, 7, 3],
+    [0, 4, 6, 2],
+    [1, 3, 7, 5],
+];
+
+fn cube_as_ply() -> String {
+    let mut text = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n\
+        property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+        element face 6\nproperty list uchar uint vertex_indices\nend_header\n"
+        .to_owned();
+    for [x, y, z] in CORNERS {
+        let green = if z > 0.0 { 255 } else { 0 };
+        text += &format!("{x} {y} {z} 0 {green} 0\n");
+    }
+    for [a, b, c, d] in SIDES {
+        text += &format!("4 {a} {b} {c} {d}\n");
+    }
+    text
+}
+
+fn cube_as_stl() -> String {
+    let halves = SIDES.iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    let facets = halves.map(|corners| {
+        let vertex = |k: &usize| {
+            let [x, y, z] = CORNERS[*k];
+            format!("vertex {x} {y} {z}\n")
+        };
+        let vertices: String = corners.into_iter().map(vertex).collect();
+        format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
+    });
+    format!("solid\n{}endsolid\n", facets.collect::<String>())
+}
+
+fn cube_as_obj() -> String {
+    let corners = CORNERS.map(|[x, y, z]| format!("v {x} {y} {z}\n")).concat();
+    let side = |side: &[usize; 4]| format!("f {}\n", side.map(|k| (k + 1).to_string()).join(" "));
+    corners + &SIDES.iter().map(side).collect::<String>()
+}
+
+/// Every point is on the cube, its normal outward, and there are at least as many as squares of the spacing.
+fn assert_cube(cloud: &PointCloud<'_>, spacing: f32) {
+    assert!(cloud.normals_oriented());
+    let normals = cloud.normals().unwrap();
+    for (k, p) in cloud.points().iter().enumerate() {
+        assert!((p.abs().max_element() - 1.0).abs() < 1e-5, "{p}");
+        assert!(p.dot(normals[k]) > 0.99, "{p} {}", normals[k]);
+        assert!(cloud.radius(k) < 1.01 * spacing, "{p}");
+    }
+    let squares = 24.0 / (spacing * spacing);
+    assert!(cloud.len() as f32 > squares, "{}", cloud.len());
+}
+
+/// A body has 60 points along its side of 2 m, a scan 240. The upper corners are green, the lower ones black.
+#[test]
+fn a_mesh_of_large_faces_becomes_points_on_them() {
+    let folder = common::folder("load_cube");
+    for (name, text) in [
+        ("cube.ply", cube_as_ply()),
+        ("cube.stl", cube_as_stl()),
+        ("cube.obj", cube_as_obj()),
+    ] {
+        fs::write(folder.join(name), text).unwrap();
+        let body = load::body_from_file(&folder.join(name)).unwrap().cloud;
+        assert_cube(&body, 2.0 / 60.0);
+        assert_eq!(body.colors().is_some(), name == "cube.ply");
+        for (p, color) in body.points().iter().zip(body.colors().unwrap_or_default()) {
+            assert_eq!(color[1] == 255, p.z > 0.0, "{p}");
+        }
+    }
+    let scan = load::scan_from_file(&folder.join("cube.ply"), 1.0).unwrap();
+    assert_cube(&scan.cloud, 2.0 / 240.0);
+}
+
+/// A cloud with a single large face, of three of its 1000 points, stays a cloud.
+#[test]
+fn a_cloud_with_a_face_is_a_cloud() {
+    let path = common::folder("load_one_face").join("cloud.ply");
+    let mut text = "ply\nformat ascii 1.0\nelement vertex 1000\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar uint vertex_indices\nend_header\n"
+        .to_owned();
+    for k in 0..1000 {
+        text += &format!("{} {} {}\n", k % 10, k / 10 % 10, k / 100);
+    }
+    fs::write(&path, text + "3 0 9 990\n").unwrap();
+    assert_eq!(load::body_from_file(&path).unwrap().cloud.len(), 1000);
+}
+
+/// A sheet of 100 × 100 small squares keeps its corners: they show what it is.
+#[test]
+fn a_mesh_of_small_faces_keeps_its_corners() {
+    let folder = common::folder("load_sheet");
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\nelement face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+        101 * 101,
+        100 * 100
+    );
+    for k in 0..101 * 101 {
+        text += &format!("{} {} 0\n", k % 101, k / 101);
+    }
+    for k in 0..100 * 100 {
+        let corner = k / 100 * 101 + k % 100;
+        let (right, above) = (corner + 1, corner + 101);
+        text += &format!("4 {corner} {right} {} {above}\n", above + 1);
+    }
+    let path = folder.join("sheet.ply");
+    fs::write(&path, text).unwrap();
+    for loaded in [
+        load::body_from_file(&path),
+        load::scan_from_file(&path, 1.0),
+    ] {
+        let cloud = loaded.unwrap().cloud;
+        assert_eq!(cloud.len(), 101 * 101);
+        assert!(cloud.normals().unwrap().iter().all(|n| *n == Vec3::Z));
     }
 }
 

@@ -1,19 +1,34 @@
 //! The quadruped stands and walks on scans of rough ground. What it does is measured against the ground as it
 //! was generated.
 
+mod common;
+
 use std::path::Path;
 use tldi::glamx::Vec3;
 use tldi_examples::load;
 use tldi_examples::robot::{
-    Base, DT, Description, Motion, RobotScene, RobotSimulation, StandingReport, Walk, quadruped,
+    Base, DT, Description, MeshFolders, Motion, RobotScene, RobotSimulation, StandingReport, Walk,
+    quadruped,
 };
 use tldi_examples::terrain::{Ground, Terrain};
 use tldi_wgpu::BackendChoice;
 
+/// On a terrain stands the quadruped with its twelve joints, unless another robot is named.
+#[test]
+fn a_terrain_has_the_quadruped() {
+    let folder = common::folder("quadruped_alone");
+    for (options, joints) in [(&[][..], 12), (&["--robot", "arm"], 6)] {
+        let options = [&["--terrain", "ramp", "--steps", "1"], options].concat();
+        let report = common::report(env!("CARGO_BIN_EXE_robot_in_scan"), &folder, &options);
+        assert_eq!(report["driven_joints"], joints, "{options:?}");
+    }
+}
+
 /// Stands, walks and stands again, eight seconds in all.
 fn walk(ground: Ground, seed: u64) -> StandingReport {
     let terrain = Terrain::new(ground, seed);
-    let robot = Description::from_text(&quadruped(), Path::new("")).unwrap();
+    let robot =
+        Description::from_text(&quadruped(), &MeshFolders::new(Path::new(""), &[])).unwrap();
     let walk = Walk::of(&robot.kinematics).unwrap();
     let steps = (walk.seconds() / DT).ceil() as usize;
     let scene = RobotScene {

@@ -17,7 +17,7 @@ fn up_of_real_scans_is_found() {
         let Some(file) = common::data(name) else {
             continue;
         };
-        let scan = load::scan_from_file(&file, 1.0).unwrap();
+        let scan = load::scan_from_file(&file, 1.0).unwrap().cloud;
         let points: Vec<Vec3> = scan.points().to_vec();
         let found = detect_up(&points, scan.normals().unwrap());
         let angle = found.direction.angle_between(up).to_degrees();

@@ -162,6 +162,27 @@ fn a_car_drives() {
     assert!(!folder.join("out").exists(), "it was told to draw nothing");
 }
 
+/// A place on a map is one of the file: the robot stands there, to what a grid of 2.5 cm tells.
+#[test]
+fn a_place_counts_from_the_zero_of_the_file() {
+    let folder = folder("robot_map");
+    let [east, north, height] = [500_123.0, 4_649_000.0, 120.0];
+    let rows = (0..80).flat_map(|i| (0..80).map(move |j| [i, j].map(|k| 0.025 * f64::from(k))));
+    let lines = rows.map(|[x, y]| format!("{} {} {height}\n", east + x, north + y));
+    fs::write(folder.join("map.xyz"), lines.collect::<String>()).unwrap();
+    fs::write(folder.join("car.urdf"), car()).unwrap();
+    let options = [
+        "--urdf", "car.urdf", "--scan", "map.xyz", "--up", "0,0,1", "--steps", "1",
+    ];
+    let place = ["--place", "500124,4649001,120"];
+    let report = report(&folder, &[&options[..], &place].concat());
+    let base = |k: usize| number(&report["origin"][k]) + number(&report["base"][k]);
+    assert!((base(0) - east - 1.0).abs() < 0.05, "{report}");
+    assert!((base(1) - north - 1.0).abs() < 0.05, "{report}");
+    // The axles of the wheels are 8 cm above it.
+    assert!((base(2) - height - 0.08).abs() < 0.02, "{report}");
+}
+
 /// Links that overlap at their joints, at rest and stepping, without inertials: it stays on its feet.
 #[test]
 fn a_walker_does_not_explode() {
@@ -293,7 +314,7 @@ fn what_is_missing_is_named_and_the_rest_is_used() {
         let warnings = report["warnings"].to_string();
         assert!(warnings.contains("odd cannot mimic none"), "{warnings}");
         assert_eq!(
-            warnings.contains("lost.dae was not found"),
+            warnings.contains("not found (1): package://my_robot/meshes/lost.dae;"),
             links == 1,
             "{warnings}"
         );
@@ -344,9 +365,11 @@ fn what_is_wrong_is_said() {
     let report = common::report_with_pictures(BINARY, &folder, &options);
     assert_eq!(report["driven_joints"], 0);
     assert_pictures(&folder.join("out/robot_in_scan"), &["motion.png"]);
-    let cases: [(&[&str], i32, &str); 4] = [
+    let cases: [(&[&str], i32, &str); 6] = [
         (&["--backend", "fast"], 2, "is no backend"),
         (&["--scan-scale", "0"], 2, "greater than 0"),
+        (&["--scan-scale", "0.001"], 2, "--scan <FILE>"),
+        (&["--packages", "."], 2, "--urdf <FILE>"),
         (&["--urdf", "missing.urdf"], 1, "missing.urdf"),
         (
             &["--scan", "floor.ply", "--scan-scale", "0.001"],

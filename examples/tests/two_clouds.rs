@@ -7,6 +7,7 @@ use common::{
     write_ply,
 };
 use serde_json::Value;
+use std::fs;
 use std::path::Path;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_two_clouds");
@@ -101,6 +102,99 @@ fn a_velocity_tells_when_they_meet() {
     assert_eq!(away["impact"], Value::Null);
 }
 
+/// The surface of a box of 200 mm with its middle at `[x, y, z]`, in steps of 10 mm, as columns of text.
+fn write_box(path: &Path, [x, y, z]: [f64; 3]) {
+    let mut text = String::new();
+    let steps = || (-10..=10).map(|k| 10 * k);
+    for (i, j, k) in
+        steps().flat_map(|i| steps().flat_map(move |j| steps().map(move |k| (i, j, k))))
+    {
+        if [i, j, k].iter().any(|c: &i32| c.abs() == 100) {
+            let [i, j, k] = [i, j, k].map(f64::from);
+            text += &format!("{} {} {}\n", x + i, y + j, z + k);
+        }
+    }
+    fs::write(path, text).unwrap();
+}
+
+/// Two files have one zero, however far away it is: boxes around 5000 and 5300 are 100 apart, turned about zero by a
+/// quarter, too; and one near zero is set beside one on a map.
+#[test]
+fn coordinates_of_two_files_count_from_one_zero() {
+    let folder = folder("two_clouds_origins");
+    let far = [500_123.25, 4_649_000.0, 120.0];
+    for (a, b, pose, origin) in [
+        (
+            [5000.0, 0.0, 0.0],
+            [5300.0, 0.0, 0.0],
+            "0,0,0",
+            [5000.0, 0.0, 0.0],
+        ),
+        (
+            [0.0, 5000.0, 0.0],
+            [5300.0, 0.0, 0.0],
+            "0,0,0,0,0,90",
+            [0.0, 5000.0, 0.0],
+        ),
+        (
+            far,
+            [0.0; 3],
+            "500123.25,4649300,120",
+            [500_123.0, 4_649_000.0, 0.0],
+        ),
+    ] {
+        write_box(&folder.join("a.xyz"), a);
+        write_box(&folder.join("b.xyz"), b);
+        let options = [
+            "a.xyz",
+            "b.xyz",
+            "--no-pictures",
+            "--json",
+            "answer.json",
+            "--pose",
+            pose,
+        ];
+        let output = run(BINARY, &folder, &options);
+        assert!(output.status.success(), "{}", stderr(&output));
+        let answer = json(folder.join("answer.json"));
+        assert_eq!(answer["collides"], false, "{pose}: {answer}");
+        // A tenth of the points' spacing.
+        let gap = answer["gap"].as_f64().unwrap();
+        assert!((gap - 100.0).abs() < 1.0, "{pose}: {gap}");
+        // What was subtracted is the median, which is a coordinate near the middle of A.
+        for (said, middle) in vector(&answer["origin"]).iter().zip(origin) {
+            assert!((said - middle).abs() <= 100.0, "{pose}: {answer}");
+        }
+        let table = String::from_utf8_lossy(&output.stdout);
+        assert!(table.contains("places are relative to"), "{table}");
+    }
+}
+
+#[test]
+fn results_are_not_lost() {
+    let folder = folder("two_clouds_results");
+    write_spheres(&folder);
+    let ask = |options: &[&str]| run(BINARY, &folder, &[&["a.ply", "b.ply"], options].concat());
+    let output = ask(&["--no-pictures", "--json", "not/there/answer.json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert_eq!(json(folder.join("not/there/answer.json"))["collides"], true);
+    // Pictures that cannot be written leave the results.
+    let output = ask(&["--out", "a.ply/pictures", "--json", "second.json"]);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("contact pixels"));
+    assert_eq!(json(folder.join("second.json"))["collides"], true);
+    // What cannot be written is refused before anything is read.
+    for name in [".", "a.ply/answer.json"] {
+        let output = ask(&["--no-pictures", "--json", name]);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{name}: {said}");
+        assert!(
+            said.contains("cannot") && !said.contains("reading"),
+            "{name}: {said}"
+        );
+    }
+}
+
 #[test]
 fn without_files_there_is_something_to_see_and_it_is_the_same_twice() {
     let folder = folder("two_clouds_generated");
@@ -118,7 +212,7 @@ fn what_is_wrong_is_said() {
     let folder = folder("two_clouds_errors");
     write_spheres(&folder);
     write_ply(&folder.join("point.ply"), &[[1.0, 2.0, 3.0]; 4]);
-    let cases: [(&[&str], i32, &str); 7] = [
+    let cases: [(&[&str], i32, &str); 8] = [
         (&["a.ply", "b.ply", "--pose", "1,2"], 2, "three of degrees"),
         (
             &["a.ply", "b.ply", "--velocity", "fast"],
@@ -126,7 +220,12 @@ fn what_is_wrong_is_said() {
             "three numbers",
         ),
         (&["a.ply", "b.ply", "--backend", "fast"], 2, "is no backend"),
-        (&["a.ply", "b.ply", "--animate"], 1, "give a --velocity"),
+        (&["a.ply", "b.ply", "--animate"], 2, "--velocity <X,Y,Z>"),
+        (
+            &["--animate", "--velocity", "0,0,0"],
+            1,
+            "give a --velocity",
+        ),
         (&["a.ply"], 2, "<B>"),
         (&["a.ply", "missing.ply"], 1, "missing.ply"),
         (&["a.ply", "point.ply"], 1, "at one position"),

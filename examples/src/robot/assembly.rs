@@ -157,8 +157,6 @@ impl Assembled {
                 let axis = joint_axis(joint.kind);
                 let effort = joint.max_effort.unwrap_or(self.default_effort);
                 let data = &mut link.joint.data;
-                // An acceleration-based motor pushes as the link's own inertia asks, without the load
-                // that it carries: a robot that stands on its legs would kneel.
                 data.set_motor_model(axis, self.motor_model(joint.kind));
                 data.set_motor_max_force(axis, effort);
             }

@@ -1,7 +1,10 @@
 //! Reads a URDF: links, joints, and where its meshes lie.
 
-use super::geometry::{Mesh, mesh_of};
+use super::completed::completed;
+use super::geometry::{Problem, mesh_of};
 use super::kinematics::{JointKind, JointModel, Kinematics};
+use super::packages::MeshFolders;
+use crate::mesh::Mesh;
 use rapier3d_urdf::urdf_rs;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -36,8 +39,13 @@ pub enum DescriptionError {
         source: std::io::Error,
     },
     /// It is not URDF.
-    #[error("this is not a URDF that can be used ({0}): expand xacro files first")]
+    #[error("this is not a URDF that can be used: {0}")]
     Syntax(String),
+    /// It is made by xacro.
+    #[error(
+        "this is a xacro file, not a URDF: expand it first, as with `xacro FILE > robot.urdf` ({0})"
+    )]
+    Xacro(String),
     /// Two links or two joints have one name.
     #[error("the name {0} is given twice: names of links and of joints must be unique")]
     Twice(String),
@@ -61,33 +69,43 @@ pub enum DescriptionError {
 }
 
 impl Description {
-    /// Reads the file at `path`; meshes are looked for beside it, see [`from_text`](Self::from_text).
+    /// Reads the file at `path`; meshes are looked for beside it and in `packages`, see [`MeshFolders::new`].
     ///
     /// # Errors
     /// [`DescriptionError`].
-    pub fn from_file(path: &Path) -> Result<Self, DescriptionError> {
+    pub fn from_file(path: &Path, packages: &[PathBuf]) -> Result<Self, DescriptionError> {
         let text = std::fs::read_to_string(path).map_err(|source| DescriptionError::Io {
             path: path.to_owned(),
             source,
         })?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        Self::from_text(&text, folder)
+        Self::from_text(&text, &MeshFolders::new(folder, packages))
     }
 
-    /// Reads a URDF. Meshes are looked for in `folder`; those of `package://NAME/…` in it and the
-    /// folders above it, with and without the name. A link's collision geometry is used or, where it
-    /// has none, its visual one. What is missing is named in the warnings.
+    /// Reads a URDF. A link's collision geometry is used or, where it has none, its visual one. What is missing is named
+    /// in the warnings.
     ///
     /// # Errors
     /// [`DescriptionError`].
-    pub fn from_text(text: &str, folder: &Path) -> Result<Self, DescriptionError> {
-        let urdf = urdf_rs::read_from_string(text)
-            .map_err(|error| DescriptionError::Syntax(error.to_string()))?;
+    pub fn from_text(text: &str, folders: &MeshFolders) -> Result<Self, DescriptionError> {
+        let mut urdf = urdf_rs::read_from_string(&completed(text)).map_err(|error| {
+            let is_xacro = text.contains("xacro:") || text.contains("${");
+            let kind = if is_xacro {
+                DescriptionError::Xacro
+            } else {
+                DescriptionError::Syntax
+            };
+            kind(error.to_string())
+        })?;
         let mut warnings = Vec::new();
+        swap_limits(&mut urdf, &mut warnings);
         let kinematics = kinematics_of(&urdf, &mut warnings)?;
+        let mut missing = Vec::new();
         let meshes: Vec<Mesh> = (urdf.links.iter())
-            .map(|link| link_mesh(link, folder, &mut warnings))
+            .map(|link| link_mesh(link, folders, &mut missing, &mut warnings))
             .collect();
+        warnings.extend(folders.missing(&missing));
+        fill_inertia(&mut urdf, &meshes, &mut warnings);
         if meshes.iter().all(|mesh| mesh.faces.is_empty()) {
             return Err(DescriptionError::NoGeometry(warnings));
         }
@@ -110,15 +128,54 @@ pub(super) fn pose_of(origin: &urdf_rs::Pose) -> Pose3 {
     )
 }
 
-fn link_mesh(link: &urdf_rs::Link, folder: &Path, warnings: &mut Vec<String>) -> Mesh {
+/// Lower limits above upper ones are swapped.
+fn swap_limits(urdf: &mut urdf_rs::Robot, warnings: &mut Vec<String>) {
+    for joint in &mut urdf.joints {
+        let limit = &mut joint.limit;
+        if joint.joint_type != urdf_rs::JointType::Continuous && limit.lower > limit.upper {
+            warnings.push(format!("joint {}: its limits are swapped", joint.name));
+            std::mem::swap(&mut limit.lower, &mut limit.upper);
+        }
+    }
+}
+
+/// A mass without inertia would turn like nothing, or not at all: it gets that of a solid box around its link.
+fn fill_inertia(urdf: &mut urdf_rs::Robot, meshes: &[Mesh], warnings: &mut Vec<String>) {
+    for (link, mesh) in urdf.links.iter_mut().zip(meshes) {
+        let (mass, inertia) = (link.inertial.mass.value, &mut link.inertial.inertia);
+        let is_zero = [inertia.ixx, inertia.iyy, inertia.izz] == [0.0; 3];
+        if mass > 0.0 && is_zero && !mesh.faces.is_empty() {
+            warnings.push(format!(
+                "link {}: its mass has no inertia: that of a box around it is used",
+                link.name
+            ));
+            let [x, y, z] = mesh.bounds().extents().to_array().map(f64::from);
+            let moment = |a: f64, b: f64| mass / 12.0 * (a * a + b * b);
+            inertia.ixx = moment(y, z);
+            inertia.iyy = moment(x, z);
+            inertia.izz = moment(x, y);
+        }
+    }
+}
+
+fn link_mesh(
+    link: &urdf_rs::Link,
+    folders: &MeshFolders,
+    missing: &mut Vec<String>,
+    warnings: &mut Vec<String>,
+) -> Mesh {
     let collision = link.collision.iter().map(|c| (&c.geometry, &c.origin));
     let visual = link.visual.iter().map(|v| (&v.geometry, &v.origin));
     for parts in [collision.collect::<Vec<_>>(), visual.collect()] {
         let mut whole = Mesh::default();
         for (geometry, origin) in parts {
-            match mesh_of(geometry, folder) {
+            match mesh_of(geometry, folders, warnings) {
                 Ok(mesh) => whole.append(&mesh, &pose_of(origin)),
-                Err(problem) => warnings.push(format!("link {}: {problem}", link.name)),
+                Err(Problem::Missing(name)) if missing.contains(&name) => {}
+                Err(Problem::Missing(name)) => missing.push(name),
+                Err(Problem::Unusable(problem)) => {
+                    warnings.push(format!("link {}: {problem}", link.name));
+                }
             }
         }
         if !whole.faces.is_empty() {
@@ -200,9 +257,6 @@ fn joint_model(
     };
     if kind == JointKind::Continuous {
         limits = [f32::NEG_INFINITY, f32::INFINITY];
-    } else if limits[0] > limits[1] {
-        warnings.push(format!("joint {}: its limits are swapped", joint.name));
-        limits.swap(0, 1);
     }
     let origin = pose_of(&joint.origin);
     let numbers = [joint.limit.effort, joint.limit.velocity].map(|n| n as f32);

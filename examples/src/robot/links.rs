@@ -2,7 +2,7 @@
 
 use super::description::Description;
 use super::kinematics::Kinematics;
-use anyhow::Context;
+use anyhow::ensure;
 use rapier3d::geometry::{Group, InteractionGroups, InteractionTestMode};
 use rapier3d::parry::shape::TriMesh;
 use rapier3d_tldi::sample_shape;
@@ -54,12 +54,16 @@ impl Spacing {
     }
 }
 
-/// The clouds of the links that have a surface.
+/// The clouds of the links that have a surface, and what is wrong with those whose mesh cannot be sampled.
 ///
 /// # Errors
-/// Those of sampling its mesh, with the link.
-pub fn clouds_of_links(robot: &Description, spacing: Spacing) -> anyhow::Result<Vec<LinkCloud>> {
+/// If not even one can.
+pub fn clouds_of_links(
+    robot: &Description,
+    spacing: Spacing,
+) -> anyhow::Result<(Vec<LinkCloud>, Vec<String>)> {
     let mut clouds = Vec::new();
+    let mut warnings = Vec::new();
     for (link, mesh) in robot.meshes.iter().enumerate() {
         if mesh.faces.is_empty() {
             continue;
@@ -68,11 +72,14 @@ pub fn clouds_of_links(robot: &Description, spacing: Spacing) -> anyhow::Result<
         let distance = spacing.of(mesh.bounds().extents());
         let cloud = TriMesh::new(mesh.points.clone(), mesh.faces.clone())
             .map_err(anyhow::Error::from)
-            .and_then(|mesh| Ok(sample_shape(&mesh, distance)?))
-            .with_context(|| format!("link {name} cannot be made a cloud"))?;
-        clouds.push(LinkCloud { link, name, cloud });
+            .and_then(|mesh| Ok(sample_shape(&mesh, distance)?));
+        match cloud {
+            Ok(cloud) => clouds.push(LinkCloud { link, name, cloud }),
+            Err(error) => warnings.push(format!("link {name} cannot be made a cloud: {error}")),
+        }
     }
-    Ok(clouds)
+    ensure!(!clouds.is_empty(), "{}", warnings.join("; "));
+    Ok((clouds, warnings))
 }
 
 /// The pairs of clouds that must not collide with each other: neighbours along the joints, and

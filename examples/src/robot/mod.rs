@@ -1,6 +1,7 @@
 //! A robot from a URDF whose links are point clouds, in a scan.
 
 mod assembly;
+mod completed;
 mod description;
 mod geometry;
 mod kinematics;
@@ -8,6 +9,7 @@ mod links;
 mod loose_bodies;
 mod motion;
 mod own_camera;
+mod packages;
 mod placing;
 mod plan;
 mod quadruped;
@@ -21,6 +23,7 @@ pub use description::{BUILT_IN, Description, DescriptionError};
 pub use kinematics::{Aim, JointKind, JointModel, Kinematics};
 pub use links::{LinkCloud, Spacing, clouds_of_links};
 pub use motion::{Motion, Waypoint};
+pub use packages::MeshFolders;
 pub use placing::{NoPlace, Placement, Site, place};
 pub use plan::{Base, Tip};
 pub use quadruped::{Walk, quadruped};

@@ -182,12 +182,12 @@ fn foot(phase: f32) -> (f32, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::robot::Description;
+    use crate::robot::{Description, MeshFolders};
     use std::path::Path;
     use tldi::glamx::{Vec2, Vec3};
 
     fn robot() -> Description {
-        Description::from_text(&quadruped(), Path::new("")).unwrap()
+        Description::from_text(&quadruped(), &MeshFolders::new(Path::new(""), &[])).unwrap()
     }
 
     #[test]

@@ -116,10 +116,17 @@ impl RobotSimulation {
     /// Where there is no place, or a cloud cannot be made.
     pub fn new(scene: RobotScene, backend: Box<dyn Backend>) -> anyhow::Result<Self> {
         let RobotScene {
-            robot, up, seed, ..
+            mut robot,
+            up,
+            seed,
+            ..
         } = scene;
         let scan_radius = scene.scan.mean_radius();
-        let clouds = clouds_of_links(&robot, Spacing { scan_radius })?;
+        let (clouds, warnings) = clouds_of_links(&robot, Spacing { scan_radius })?;
+        for warning in &warnings {
+            eprintln!("warning: {warning}");
+        }
+        robot.warnings.extend(warnings);
         let build = Build::of(&robot.kinematics, &clouds, scene.base);
         let start = start_pose(&robot.kinematics, &build);
         let root_from_link = robot.kinematics.poses(&start);

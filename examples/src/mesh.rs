@@ -1,0 +1,246 @@
+//! Triangle meshes, and their files.
+
+use rapier3d_meshloader::mesh_loader;
+use std::panic;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+use tldi::glamx::{DVec3, Pose3, Vec3};
+use tldi_sources::{Format, ReadOptions};
+
+/// Triangles; corners anticlockwise when seen from outside.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Corners.
+    pub points: Vec<Vec3>,
+    /// Indices of corners, all in range.
+    pub faces: Vec<[u32; 3]>,
+}
+
+/// A file of which no mesh can be made.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("mesh {path} cannot be read: {reason}")]
+pub struct MeshError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong.
+    pub reason: String,
+}
+
+impl Mesh {
+    /// Adds another mesh, moved by `pose`.
+    pub fn append(&mut self, other: &Self, pose: &Pose3) {
+        let first = self.points.len() as u32;
+        self.points.extend(other.points.iter().map(|p| *pose * *p));
+        let shifted = other.faces.iter().map(|face| face.map(|i| first + i));
+        self.faces.extend(shifted);
+    }
+
+    /// Bounds of the finite corners.
+    pub fn bounds(&self) -> tldi::Aabb {
+        let corners = self.points.iter().copied().filter(|p| p.is_finite());
+        corners.fold(tldi::Aabb::EMPTY, tldi::Aabb::including)
+    }
+
+    /// The same, larger along each axis. A mirrored mesh winds the other way, so that its outside stays outside.
+    pub fn scaled(mut self, scale: Vec3) -> Self {
+        for point in &mut self.points {
+            *point *= scale;
+        }
+        if scale.x * scale.y * scale.z < 0.0 {
+            for face in &mut self.faces {
+                face.swap(1, 2);
+            }
+        }
+        self
+    }
+}
+
+/// Whether a file holds a mesh and nothing else, by its name. A PLY file may be a mesh or a cloud.
+pub fn is_mesh_file(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    ["stl", "obj", "dae"]
+        .iter()
+        .any(|known| extension.eq_ignore_ascii_case(known))
+}
+
+/// Reads STL, OBJ, DAE or PLY (also `.gz`), in the unit and from the zero of the file.
+///
+/// # Errors
+/// [`MeshError`], also where there are no faces.
+pub fn read_mesh(path: &Path) -> Result<Mesh, MeshError> {
+    let bad = |reason: String| MeshError {
+        path: path.to_owned(),
+        reason,
+    };
+    let mesh = if Format::from_extension(path) == Some(Format::Ply) {
+        let options = ReadOptions {
+            origin: Some(DVec3::ZERO),
+            ..ReadOptions::default()
+        };
+        let raw =
+            tldi_sources::read(path, &options).map_err(|error| bad(error.kind.to_string()))?;
+        Mesh {
+            points: raw.points,
+            faces: raw.faces,
+        }
+    } else {
+        let bytes = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
+        load(&with_named_solid(bytes), path).map_err(bad)?
+    };
+    if mesh.faces.is_empty() {
+        return Err(bad("it has no faces".to_owned()));
+    }
+    Ok(mesh)
+}
+
+/// What may be wrong with a mesh that was read, for people: nodes within nodes of COLLADA files, and nodes that are used from
+/// elsewhere, are not always put where they belong.
+pub fn doubt_about(path: &Path) -> Option<String> {
+    let extension = path.extension()?;
+    let bytes = (extension.eq_ignore_ascii_case("dae")).then(|| std::fs::read(path).ok())??;
+    has_placed_parts(&String::from_utf8_lossy(&bytes)).then(|| {
+        format!(
+            "mesh {} has nodes within nodes: its parts may be in wrong places; if so, save it as STL, OBJ or PLY",
+            path.display()
+        )
+    })
+}
+
+fn has_placed_parts(dae: &str) -> bool {
+    let mut depth = 0;
+    for tag in dae.split('<') {
+        let name = tag.split(|c: char| c.is_whitespace() || c == '/' || c == '>');
+        let is_empty = tag
+            .split('>')
+            .next()
+            .is_some_and(|head| head.ends_with('/'));
+        match name.into_iter().next() {
+            Some("instance_node") => return true,
+            Some("node") if !is_empty => depth += 1,
+            _ if tag.starts_with("/node>") => depth -= 1,
+            _ => {}
+        }
+        if depth > 1 {
+            return true;
+        }
+    }
+    false
+}
+
+fn load(bytes: &[u8], path: &Path) -> Result<Mesh, String> {
+    // Damaged files, and parts of COLLADA that it does not know, make the loader panic.
+    let loaded =
+        panic::catch_unwind(|| mesh_loader::Loader::default().load_from_slice(bytes, path));
+    let scene = match loaded {
+        Ok(Ok(scene)) => scene,
+        Ok(Err(error)) => return Err(error.to_string()),
+        Err(_) => {
+            return Err(
+                "it is damaged, or has parts that are not known: save it as STL, OBJ or PLY"
+                    .to_owned(),
+            );
+        }
+    };
+    let mut mesh = Mesh::default();
+    for part in scene.meshes {
+        let points: Vec<Vec3> = part.vertices.iter().map(|p| Vec3::from(*p)).collect();
+        let in_range = |face: &[u32; 3]| face.iter().all(|i| (*i as usize) < points.len());
+        let faces = part.faces.iter().copied().filter(in_range).collect();
+        mesh.append(&Mesh { points, faces }, &Pose3::IDENTITY);
+    }
+    Ok(mesh)
+}
+
+/// STL as text whose first line is a bare `solid` gets a name for its solid: the loader wants one.
+fn with_named_solid(mut bytes: Vec<u8>) -> Vec<u8> {
+    const SOLID: &[u8] = b"solid";
+    let text = bytes.trim_ascii_start();
+    let start = bytes.len() - text.len();
+    let is_bare = text.strip_prefix(SOLID).is_some_and(|rest| {
+        rest.first()
+            .is_some_and(|byte| matches!(byte, b'\n' | b'\r'))
+            && rest.trim_ascii_start().starts_with(b"facet")
+    });
+    if is_bare {
+        let end = start + SOLID.len();
+        bytes.splice(end..end, *b" unnamed");
+    }
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn read_text(name: &str, text: &[u8]) -> Result<Mesh, MeshError> {
+        let path = std::env::temp_dir().join(format!("tldi_mesh_{}_{name}", std::process::id()));
+        fs::write(&path, text).unwrap();
+        let mesh = read_mesh(&path);
+        fs::remove_file(&path).unwrap();
+        mesh
+    }
+
+    const FACET: &str = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
+
+    #[test]
+    fn a_solid_needs_no_name() {
+        for (k, line) in ["solid\n", "\n solid\r\n", "solid a\n"].iter().enumerate() {
+            let text = format!("{line}{FACET}endsolid\n");
+            let mesh = read_text(&format!("{k}.stl"), text.as_bytes()).unwrap();
+            assert_eq!(mesh.points, [Vec3::ZERO, Vec3::X, Vec3::Y], "{line}");
+        }
+    }
+
+    /// A mirrored triangle faces where its mirror image does.
+    #[test]
+    fn a_mirrored_mesh_keeps_its_outside() {
+        let mesh = read_text(
+            "mirror.stl",
+            format!("solid a\n{FACET}endsolid\n").as_bytes(),
+        )
+        .unwrap();
+        for (scale, up) in [
+            (Vec3::new(1.0, -1.0, 1.0), 1.0),
+            (Vec3::new(-1.0, -1.0, 2.0), 1.0),
+            (Vec3::new(1.0, 1.0, -1.0), -1.0),
+        ] {
+            let scaled = mesh.clone().scaled(scale);
+            let [a, b, c] = scaled.faces[0].map(|i| scaled.points[i as usize]);
+            assert_eq!((b - a).cross(c - a).z.signum(), up, "{scale}");
+        }
+    }
+
+    #[test]
+    fn nodes_within_nodes_are_told() {
+        for (dae, is_told) in [
+            (
+                "<node id=\"a\"><instance_geometry/></node><node><matrix/></node>",
+                false,
+            ),
+            ("<node/><node name='b'/><nodes><node></node></nodes>", false),
+            ("<node><node><instance_geometry/></node></node>", true),
+            ("<node><instance_node url=\"#a\"/></node>", true),
+        ] {
+            assert_eq!(has_placed_parts(dae), is_told, "{dae}");
+        }
+    }
+
+    /// COLLADA with an index that no position has: the loader panics at it.
+    #[test]
+    fn a_panic_of_the_loader_is_an_error() {
+        let dae = r##"<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="9">0 0 0 1 0 0 0 1 0</float_array><technique_common>
+<accessor source="#a" count="3" stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 9</p></triangles>
+</mesh></geometry></library_geometries></COLLADA>"##;
+        let error = read_text("broken.dae", dae.as_bytes()).unwrap_err();
+        assert!(
+            error.to_string().contains("broken.dae cannot be read"),
+            "{error}"
+        );
+        assert!(error.reason.contains("damaged"), "{error}");
+    }
+}

@@ -1,0 +1,188 @@
+//! URDF files as they are found: packages elsewhere, parts left out, meshes that are broken.
+
+mod common;
+
+use common::{folder, stderr};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use tldi::glamx::Vec3;
+use tldi_examples::robot::{Description, MeshFolders, Spacing, clouds_of_links};
+
+const BASE: &str = r#"<link name="base"><collision><geometry><box size="0.2 0.2 0.1"/></geometry></collision></link>"#;
+
+/// A base, and a link on it for each mesh.
+fn robot(meshes: &[&str]) -> String {
+    let link = |(k, mesh): (usize, &&str)| {
+        format!(
+            r#"<link name="l{k}"><visual><geometry><mesh filename="{mesh}"/></geometry></visual></link>
+            <joint name="j{k}" type="fixed"><parent link="base"/><child link="l{k}"/></joint>"#
+        )
+    };
+    let links: String = meshes.iter().enumerate().map(link).collect();
+    format!(r#"<robot name="r">{BASE}{links}</robot>"#)
+}
+
+/// A PLY file of one triangle.
+fn triangle(corners: [[f32; 3]; 3]) -> String {
+    let lines = corners.map(|[x, y, z]| format!("{x} {y} {z}\n")).concat();
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+     element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        .to_owned()
+        + &lines
+        + "3 0 1 2\n"
+}
+
+const CORNERS: [[f32; 3]; 3] = [[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]];
+
+/// A robot in `robots`, and its package below `ws/share`.
+fn write_package(folder: &Path, mesh: &str) -> PathBuf {
+    let package = folder.join("ws/share/my_arm");
+    fs::create_dir_all(package.join("meshes")).unwrap();
+    fs::create_dir_all(folder.join("robots")).unwrap();
+    fs::write(package.join("meshes/part.ply"), triangle(CORNERS)).unwrap();
+    let urdf = folder.join("robots/arm.urdf");
+    fs::write(&urdf, robot(&[mesh])).unwrap();
+    urdf
+}
+
+#[test]
+fn packages_are_found_where_they_are_said_to_be() {
+    let folder = folder("urdf_packages");
+    let urdf = write_package(&folder, "package://my_arm/meshes/part.ply");
+    let faces = |packages: &[&str]| {
+        let packages: Vec<PathBuf> = packages.iter().map(|name| folder.join(name)).collect();
+        let robot = Description::from_file(&urdf, &packages).unwrap();
+        robot.meshes[1].faces.len()
+    };
+    assert_eq!(faces(&[]), 0);
+    assert_eq!(faces(&["ws"]), 0);
+    assert_eq!(faces(&["nowhere", "ws/share"]), 1);
+    assert_eq!(faces(&["ws/share/my_arm"]), 1);
+    // What is wrong with the robot is said before the scan is read.
+    let said = |variable: &str, value: &str| {
+        let output = Command::new(env!("CARGO_BIN_EXE_robot_in_scan"))
+            .args(["--urdf", "arm.urdf", "--scan", "missing.ply"])
+            .current_dir(folder.join("robots"))
+            .env(variable, value)
+            .output()
+            .unwrap();
+        stderr(&output)
+    };
+    let lost = said("ROS_PACKAGE_PATH", "");
+    let place = folder.join("robots").canonicalize().unwrap();
+    let place = place.to_str().unwrap();
+    assert!(
+        lost.contains("not found (1)") && lost.contains(place),
+        "{lost}"
+    );
+    assert!(lost.contains("--packages"), "{lost}");
+    for (variable, value) in [
+        ("ROS_PACKAGE_PATH", "../nowhere:../ws/share"),
+        ("AMENT_PREFIX_PATH", "../ws"),
+    ] {
+        let said = said(variable, value);
+        assert!(!said.contains("not found (1)"), "{variable}: {said}");
+    }
+}
+
+#[test]
+fn three_of_many_missing_meshes_are_named() {
+    let names = ["a.stl", "b.stl", "c.stl", "d.stl", "a.stl"];
+    let folders = MeshFolders::new(Path::new(""), &[]);
+    let robot = Description::from_text(&robot(&names), &folders).unwrap();
+    assert_eq!(robot.warnings.len(), 1, "{:?}", robot.warnings);
+    let warning = &robot.warnings[0];
+    assert!(
+        warning.contains("(4): a.stl, b.stl, c.stl, …;"),
+        "{warning}"
+    );
+}
+
+/// An empty geometry, limits without a velocity and the wrong way round, and a mass without inertia.
+#[test]
+fn what_a_urdf_leaves_out_does_not_end_it() {
+    let text = format!(
+        r#"<robot name="r">{BASE}
+          <link name="arm">
+            <inertial><mass value="1.2"/></inertial>
+            <visual><geometry></geometry></visual>
+            <visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>
+          </link>
+          <joint name="j" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+            <limit lower="1" upper="-2" effort="5"/></joint>
+        </robot>"#
+    );
+    let folders = MeshFolders::new(Path::new(""), &[]);
+    let robot = Description::from_text(&text, &folders).unwrap();
+    let joint = &robot.kinematics.joints[0];
+    assert_eq!((joint.limits, joint.max_speed), ([-2.0, 1.0], None));
+    // What the engine reads, too.
+    let limit = &robot.urdf.joints[0].limit;
+    assert_eq!((limit.lower, limit.upper), (-2.0, 1.0));
+    // Of a solid box: m / 12 (a² + b²).
+    let inertia = &robot.urdf.links[1].inertial.inertia;
+    for (found, expected) in [
+        (inertia.ixx, 0.013),
+        (inertia.iyy, 0.01),
+        (inertia.izz, 0.005),
+    ] {
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    }
+    let warnings = robot.warnings.join("\n");
+    assert!(
+        warnings.contains("swapped") && warnings.contains("no inertia"),
+        "{warnings}"
+    );
+    assert_eq!(robot.warnings.len(), 2, "{warnings}");
+}
+
+#[test]
+fn xacro_is_named_only_where_it_is() {
+    let folders = MeshFolders::new(Path::new(""), &[]);
+    let error = |text: &str| match Description::from_text(text, &folders) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("{text} is no URDF"),
+    };
+    let sized = |size: &str| {
+        format!(
+            r#"<robot name="r"><link name="a"><visual><geometry><box size="{size}"/></geometry></visual></link></robot>"#
+        )
+    };
+    assert!(error(&sized("${w} 1 1")).contains("xacro FILE"));
+    assert!(error("<robot><xacro:arm/>").contains("xacro FILE"));
+    for plain in [sized("1 1"), "<robot".to_owned()] {
+        let said = error(&plain);
+        assert!(
+            said.contains("not a URDF") && !said.contains("xacro"),
+            "{said}"
+        );
+    }
+}
+
+/// A mesh without area cannot be sampled: the other links are.
+#[test]
+fn a_link_that_cannot_be_sampled_is_left_out() {
+    let folder = folder("urdf_flat");
+    fs::write(folder.join("good.ply"), triangle(CORNERS)).unwrap();
+    fs::write(folder.join("flat.ply"), triangle([[0.1; 3]; 3])).unwrap();
+    let folders = MeshFolders::new(&folder, &[]);
+    let robot = Description::from_text(&robot(&["flat.ply", "good.ply"]), &folders).unwrap();
+    let spacing = Spacing { scan_radius: 0.01 };
+    let (clouds, warnings) = clouds_of_links(&robot, spacing).unwrap();
+    let names: Vec<&str> = clouds.iter().map(|link| link.name.as_str()).collect();
+    assert_eq!(names, ["base", "l1"]);
+    assert!(
+        clouds[1]
+            .cloud
+            .bounds()
+            .extents()
+            .distance(Vec3::new(0.1, 0.1, 0.0))
+            < 0.01
+    );
+    assert!(
+        warnings[0].contains("link l0 cannot be made a cloud"),
+        "{warnings:?}"
+    );
+    assert_eq!(warnings.len(), 1);
+}
