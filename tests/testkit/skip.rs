@@ -44,7 +44,7 @@ pub fn test_data(checkout: &str, name: &str) -> Option<PathBuf> {
         return Some(path);
     }
     skip(
-        &format!("{name} is not in the test data folder (set TLDI_DATA)"),
+        &format!("{name} is not in the folder of test data that TLDI_DATA names"),
         REQUIRE_DATA,
     );
     None
