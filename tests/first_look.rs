@@ -10,7 +10,8 @@ use tldi_tests::{
 const R: f32 = 0.01;
 
 /// Spheres 5 to 30 radii deep, up to three quarters of the smaller one's radius, with and without normals, in any
-/// direction. (Deeper, one case in forty is 40 % off: the zone's normals point everywhere and a view sees it askew.)
+/// direction. (Deeper, one case in forty is 40 % off, as `docs/limits.md` says: the zone's normals point everywhere and a view
+/// sees it askew.)
 #[test]
 fn spheres_are_as_deep_as_they_are() {
     let mut rng = fastrand::Rng::with_seed(31);
@@ -89,15 +90,13 @@ fn what_lies_between_two_sheets_does_not_collide() {
         let both = both.expect("the points are finite");
         let between = sampled_plane(0.6, R, &mut rng).bare_cloud(R);
         for tilt in [0.0, 0.4, 0.8, 1.3, 1.8] {
-            // Its edge is 30 radii from the middle.
+            // Its edge is 30 radii from the middle. Where that is too little for the tilt, it stands upright.
             let angle = (tilt * gap / 0.3).clamp(0.0, 1.0).asin();
             let turn = Quat::from_axis_angle(Vec3::Z, angle);
             let pose = Pose3::from_parts(Vec3::ZERO, turn);
             let result = compare_clouds(&both, &between, pose, R);
-            let expected = tilt > 1.0 && gap < 0.15;
-            if tilt < 1.0 || expected {
-                assert_eq!(result.collides, expected, "{apart} r apart, tilt {tilt}");
-            }
+            let expected = tilt > 1.0;
+            assert_eq!(result.collides, expected, "{apart} r apart, tilt {tilt}");
         }
     }
 }

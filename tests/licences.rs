@@ -88,8 +88,8 @@ fn dependencies_are_licensed() {
     };
     let mut output = run(&["--features", FEATURES]);
     if !output.status.success() {
-        eprintln!(
-            "SKIPPED: optional dependencies are not downloaded, only those of the default features are asked"
+        tldi_tests::say_skipped(
+            "optional dependencies are not downloaded, only those of the default features are asked",
         );
         output = run(&[]);
     }

@@ -1,6 +1,7 @@
 //! Any points and settings: a sound cloud or a typed error.
 
 use crate::check;
+use crate::shares::Shares;
 use crate::spec::{CloudSpec, cloud};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -8,9 +9,21 @@ use tldi::{PointCloud, Radii};
 
 #[test]
 fn builders_give_clouds_or_errors() {
+    let shares = Shares::default();
     check(&cloud(-6..=6i32, true), |spec| {
-        is_sound(&spec, &spec.build())
+        let built = spec.build();
+        shares.note("any points and settings", built.is_ok());
+        is_sound(&spec, &built)
     });
+    check(&cloud(-6..=6i32, false), |spec| {
+        let built = spec.build();
+        shares.note("usual points and settings", built.is_ok());
+        is_sound(&spec, &built)
+    });
+    shares.assert_at_least(&[
+        ("any points and settings", 0.38),
+        ("usual points and settings", 0.96),
+    ]);
 }
 
 fn is_sound(
@@ -51,13 +64,16 @@ fn is_sound(
 #[test]
 fn new_points_are_taken_or_refused() {
     let cases = (cloud(-6..=6i32, false), cloud(-6..=6i32, true));
+    let shares = Shares::default();
     check(&cases, |(before, after)| {
         let Ok(mut cloud) = before.build() else {
             return Ok(());
         };
         let old: Vec<_> = cloud.points().to_vec();
         let given = after.points();
-        match cloud.set_points(&given, None) {
+        let taken = cloud.set_points(&given, None);
+        shares.note("new points", taken.is_ok());
+        match taken {
             Ok(()) => {
                 prop_assert!(cloud.len() <= given.len() && !old.is_empty());
                 prop_assert!(cloud.points().iter().all(|p| p.is_finite()));
@@ -71,4 +87,5 @@ fn new_points_are_taken_or_refused() {
         prop_assert!(radius > 0.0 && radius.is_finite());
         Ok(())
     });
+    shares.assert_at_least(&[("new points", 0.45)]);
 }

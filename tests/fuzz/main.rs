@@ -5,6 +5,8 @@
 //! - `FUZZ_CASE_SECONDS` ends the run, with the case, where one takes more processor time, and tells what the slowest
 //!   took. For `--test-threads=1`, and not for `cargo test`: time depends on the machine.
 //!
+//! Each property also tells how many cases got an answer (`shares.rs`): refusals alone would pass it.
+//!
 //! Readers have theirs in `crates/tldi-sources/tests/hostile_generated.rs`. What ran, and what was found:
 //! `docs/robustness.md`.
 
@@ -12,6 +14,7 @@ mod casts;
 mod clouds;
 mod pairs;
 mod shapes;
+mod shares;
 mod spec;
 mod worlds;
 

@@ -2,6 +2,7 @@
 
 use crate::check;
 use crate::shapes::shape;
+use crate::shares::Shares;
 use crate::spec::{any_number, cloud, pose};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
@@ -73,11 +74,16 @@ impl ParamSpec {
     }
 }
 
-fn compare(query: PairQuery) -> Result<(), TestCaseError> {
+fn compare(query: PairQuery, shares: &Shares) -> Result<(), TestCaseError> {
     let mut results = Vec::new();
     let mut backend = CpuBackend::new();
-    match backend.compare(&[query], &mut results) {
-        Ok(()) => is_sound(&results[0]),
+    let compared = backend.compare(&[query], &mut results);
+    shares.note("compared", compared.is_ok());
+    match compared {
+        Ok(()) => {
+            shares.note("in contact", !results[0].patches.is_empty());
+            is_sound(&results[0])
+        }
         Err(error) => {
             prop_assert!(!error.to_string().is_empty());
             Ok(())
@@ -99,12 +105,15 @@ fn clouds_meet_clouds() {
             [any_number(), any_number(), any_number()],
         )
     });
+    let shares = Shares::default();
     check(&cases, |((a, b), pose, params, policy, motion)| {
         let (Ok(cloud_a), Ok(cloud_b)) = (a.build(), b.build()) else {
+            shares.note("built", false);
             return Ok(());
         };
+        shares.note("built", true);
         let coarsest = cloud_a.mean_radius().max(cloud_b.mean_radius());
-        compare(PairQuery {
+        let query = PairQuery {
             a: Surface::Cloud(&cloud_a),
             b: Surface::Cloud(&cloud_b),
             a_from_b: pose.at(a.scale().max(b.scale())),
@@ -114,8 +123,10 @@ fn clouds_meet_clouds() {
                 last_axis: None,
             },
             params: params.of(coarsest),
-        })
+        };
+        compare(query, &shares)
     });
+    shares.assert_at_least(&[("built", 0.95), ("compared", 0.46), ("in contact", 0.37)]);
 }
 
 #[test]
@@ -128,12 +139,15 @@ fn clouds_meet_shapes() {
         policy(),
         any::<bool>(),
     );
+    let shares = Shares::default();
     check(
         &cases,
         |(spec, shape, pose, params, policy, cloud_first)| {
             let (Ok(cloud), Some(shape)) = (spec.build(), shape.build(spec.scale())) else {
+                shares.note("built", false);
                 return Ok(());
             };
+            shares.note("built", true);
             if shape.as_compound().is_some() {
                 return Ok(()); // the pipeline takes it apart
             }
@@ -143,7 +157,7 @@ fn clouds_meet_shapes() {
                 true => [cloud_side, shape_side],
                 false => [shape_side, cloud_side],
             };
-            compare(PairQuery {
+            let query = PairQuery {
                 a,
                 b,
                 a_from_b: pose.at(spec.scale()),
@@ -153,9 +167,11 @@ fn clouds_meet_shapes() {
                     last_axis: None,
                 },
                 params: params.of(cloud.mean_radius()),
-            })
+            };
+            compare(query, &shares)
         },
     );
+    shares.assert_at_least(&[("built", 0.94), ("compared", 0.89), ("in contact", 0.16)]);
 }
 
 /// Along any motion: nowhere, or at a finite place within it.
@@ -166,6 +182,7 @@ fn impacts_are_on_the_way() {
         (cloud(-6..=6i32, false), cloud(Just(0), false), shape()),
         (pose(), params(), motion, any::<[bool; 2]>()),
     );
+    let shares = Shares::default();
     check(
         &cases,
         |((a, mut b, shape), (pose, params, motion, flags))| {
@@ -173,8 +190,10 @@ fn impacts_are_on_the_way() {
             let (Ok(cloud_a), Ok(cloud_b), Some(shape)) =
                 (a.build(), b.build(), shape.build(a.scale()))
             else {
+                shares.note("built", false);
                 return Ok(());
             };
+            shares.note("built", true);
             let exact = ExactShape(&*shape.0);
             let motion = a.scale() * Vec3::from_array(motion);
             let query = ImpactQuery {
@@ -190,7 +209,10 @@ fn impacts_are_on_the_way() {
                 penetration: None,
                 params: params.of(cloud_b.mean_radius()),
             };
-            match CpuBackend::new().impact(&query) {
+            let answer = CpuBackend::new().impact(&query);
+            shares.note("answered", answer.is_ok());
+            shares.note("met", matches!(answer, Ok(Some(_))));
+            match answer {
                 Ok(None) => {}
                 Ok(Some(impact)) => {
                     prop_assert!(impact.distance >= 0.0 && impact.distance <= motion.length());
@@ -201,4 +223,5 @@ fn impacts_are_on_the_way() {
             Ok(())
         },
     );
+    shares.assert_at_least(&[("built", 0.93), ("answered", 0.37), ("met", 0.05)]);
 }

@@ -2,6 +2,7 @@
 
 use crate::check;
 use crate::shapes::{ShapeSpec, shape};
+use crate::shares::Shares;
 use crate::spec::{CloudSpec, PoseSpec, cloud, pose};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -50,6 +51,7 @@ fn body() -> impl Strategy<Value = Body> {
 #[test]
 fn worlds_go_on() {
     let cases = (-6..=6i32, vec(body(), 2..5));
+    let shares = Shares::default();
     check(&cases, |(exponent, mut bodies)| {
         let size = 10f32.powi(exponent);
         let mut world = PhysicsWorld::default();
@@ -102,16 +104,22 @@ fn worlds_go_on() {
         for (_, body) in world.bodies.iter_mut() {
             body.recompute_mass_properties_from_colliders(&world.colliders);
             if !body.angvel_with_gyroscopic_forces(dt).is_finite() {
+                shares.note("stepped", false);
                 return Ok(());
             }
         }
+        shares.note("stepped", true);
+        let mut touches = false;
         for step in 0..STEPS {
             for (collider, body) in &inserted {
                 if let Some((at, spec)) = &body.points_at
                     && *at == step
                 {
                     // Refused or taken; a shape has no points.
-                    let _ = tldi.set_points(&mut world, *collider, &spec.points(), None);
+                    let taken = tldi.set_points(&mut world, *collider, &spec.points(), None);
+                    if body.cloud.is_some() {
+                        shares.note("new points", taken.is_ok());
+                    }
                 }
             }
             match tldi.step(&mut world) {
@@ -121,12 +129,19 @@ fn worlds_go_on() {
             }
             let contacts = tldi.contacts(&world.narrow_phase, &world.colliders);
             for contact in contacts {
+                touches = true;
                 prop_assert!(contact.point.is_finite() && contact.depth.is_finite());
             }
             for (_, body) in world.bodies.iter() {
                 prop_assert!(body.translation().is_finite(), "step {}", step);
             }
         }
+        shares.note("in contact", touches);
         Ok(())
     });
+    shares.assert_at_least(&[
+        ("stepped", 0.98),
+        ("new points", 0.45),
+        ("in contact", 0.19),
+    ]);
 }

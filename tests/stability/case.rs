@@ -115,8 +115,17 @@ pub(crate) enum Stop {
 pub(crate) struct Verdict {
     /// Measured values; units are in the names.
     pub(crate) metrics: BTreeMap<String, f64>,
-    /// Broken rules, each with its number.
-    pub(crate) failures: Vec<String>,
+    /// Broken rules.
+    pub(crate) failures: Vec<Failure>,
+}
+
+/// A broken rule.
+#[derive(Clone, Debug)]
+pub(crate) struct Failure {
+    /// The metric that broke it, or what else was asked.
+    pub(crate) metric: String,
+    /// What was found and what was asked, with numbers.
+    pub(crate) text: String,
 }
 
 impl Verdict {
@@ -126,7 +135,7 @@ impl Verdict {
         if value.is_finite() {
             self.metrics.insert(name.to_owned(), rounded(value));
         } else {
-            self.failures.push(format!("{name} is {value}"));
+            self.fail(name, format!("{name} is {value}"));
         }
         value
     }
@@ -135,7 +144,7 @@ impl Verdict {
     pub(crate) fn at_most(&mut self, name: &str, value: impl Into<f64>, limit: f64) {
         let value = self.note(name, value);
         if value > limit {
-            self.failures.push(format!("{name} {value:.4} > {limit}"));
+            self.fail(name, format!("{name} {value:.4} > {limit}"));
         }
     }
 
@@ -143,7 +152,7 @@ impl Verdict {
     pub(crate) fn at_least(&mut self, name: &str, value: impl Into<f64>, limit: f64) {
         let value = self.note(name, value);
         if value < limit {
-            self.failures.push(format!("{name} {value:.4} < {limit}"));
+            self.fail(name, format!("{name} {value:.4} < {limit}"));
         }
     }
 
@@ -157,17 +166,21 @@ impl Verdict {
     ) {
         let value = self.note(name, value);
         if (value - expected).abs() > tolerance {
-            self.failures.push(format!(
-                "{name} {value:.4} is not {expected:.4} ± {tolerance:.2e}"
-            ));
+            let text = format!("{name} {value:.4} is not {expected:.4} ± {tolerance:.2e}");
+            self.fail(name, text);
         }
     }
 
-    /// Something that must hold.
-    pub(crate) fn require(&mut self, holds: bool, otherwise: impl FnOnce() -> String) {
+    /// Something that must hold. `name` is that of the metric that tells how far it does not, if there is one.
+    pub(crate) fn require(&mut self, name: &str, holds: bool, otherwise: impl FnOnce() -> String) {
         if !holds {
-            self.failures.push(otherwise());
+            self.fail(name, otherwise());
         }
+    }
+
+    fn fail(&mut self, metric: &str, text: String) {
+        let metric = metric.to_owned();
+        self.failures.push(Failure { metric, text });
     }
 }
 

@@ -66,14 +66,15 @@ fn run_one(case: &Case, setup: &Setup) -> Row {
     let (passed, verdict, reason) = match outcome {
         Ok(verdict) if verdict.failures.is_empty() => (Some(true), verdict, None),
         Ok(verdict) => {
-            let reason = verdict.failures.join("; ");
+            let texts: Vec<&str> = verdict.failures.iter().map(|f| f.text.as_str()).collect();
+            let reason = texts.join("; ");
             (Some(false), verdict, Some(reason))
         }
         Err(Stop::Unfit(why)) => (None, Verdict::default(), Some(format!("n/a: {why}"))),
         Err(Stop::Failed(error)) => (Some(false), Verdict::default(), Some(error)),
     };
     let is_ours = setup.method == Method::Tldi && passed == Some(false);
-    let known = is_ours.then(|| known_cause(case.scene, &case.name, &verdict.metrics));
+    let known = is_ours.then(|| known_cause(case.scene, &case.name, &verdict));
     Row {
         scene: case.scene,
         case: case.name.clone(),

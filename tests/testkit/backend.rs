@@ -1,5 +1,6 @@
 //! The backend that tests run on.
 
+use crate::skip::{REQUIRE_GPU, skip};
 use std::sync::Mutex;
 use tldi::{Backend, PairQuery, PairResult};
 use tldi_wgpu::{AdapterChoice, BackendChoice, Gpu, WgpuBackend};
@@ -38,17 +39,9 @@ pub fn compare_on(backend: &mut dyn Backend, batch: &[PairQuery<'_>]) -> Vec<Pai
 ///
 /// # Panics
 /// There, if the variable `TLDI_REQUIRE_GPU` is set.
-#[allow(
-    clippy::print_stderr,
-    reason = "a test that is skipped for want of a GPU must say so"
-)]
 pub fn gpu_backend() -> Option<WgpuBackend> {
-    match Gpu::of_process(AdapterChoice::Any).and_then(WgpuBackend::new) {
-        Ok(backend) => Some(backend),
-        Err(error) if std::env::var_os("TLDI_REQUIRE_GPU").is_some() => panic!("{error}"),
-        Err(error) => {
-            eprintln!("SKIPPED: {error} (set TLDI_REQUIRE_GPU to make this a failure)");
-            None
-        }
-    }
+    let opened = Gpu::of_process(AdapterChoice::Any).and_then(WgpuBackend::new);
+    opened
+        .map_err(|error| skip(&error.to_string(), REQUIRE_GPU))
+        .ok()
 }

@@ -1,26 +1,15 @@
 //! Real scans and models, where they are at hand.
 
+use crate::skip::test_data;
 use std::path::PathBuf;
 use tldi::PointCloud;
 
-/// The path of a file of the test data, or `None` (said loudly) where the data is absent. The
-/// folder is named by the environment variable `TLDI_DATA`, else it is `shared/data` beside the
-/// checkout.
-#[allow(
-    clippy::print_stderr,
-    reason = "a test that is skipped for want of data must say so"
-)]
+/// The path of a file of the test data, or `None` (said loudly) where it is absent: see [`test_data`].
+///
+/// # Panics
+/// There, if the variable `TLDI_REQUIRE_DATA` is set.
 pub fn data_file(name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("TLDI_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
-        PathBuf::from,
-    );
-    let path = folder.join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("SKIPPED: {name} is not in the test data folder (set TLDI_DATA)");
-    None
+    test_data(concat!(env!("CARGO_MANIFEST_DIR"), "/.."), name)
 }
 
 /// A cloud of the test data with radii from 7 neighbours, scaled so that its largest extent is

@@ -13,6 +13,7 @@ mod policy;
 mod random;
 mod shapes;
 mod sheets;
+mod skip;
 mod way_out;
 
 pub use accuracy::{
@@ -34,4 +35,5 @@ pub use shapes::{
     Samples, sampled_box, sampled_plane, sampled_ramp, sampled_sphere, sampled_torus,
 };
 pub use sheets::{Sheet, standard_normal};
+pub use skip::{REQUIRE_DATA, REQUIRE_GPU, say_skipped, skip, test_data};
 pub use way_out::WayOut;

@@ -1,6 +1,6 @@
 //! Times and work of frames of new points.
 
-use crate::table::{Table, numbers};
+use crate::table::{Table, is_rounded, numbers};
 use crate::{done, number, page, stored};
 use serde_json::Value;
 
@@ -133,6 +133,31 @@ fn frames_of_the_bumpy_ball() {
             },
         );
     }
+    done(wrong);
+}
+
+/// The page that tells users what a pair costs has the same figures.
+#[test]
+fn frames_on_the_page_of_choices() {
+    let page = page("docs/choosing.md");
+    let mut wrong = Vec::new();
+    let rows = stored("frames/frames_generated.json");
+    Table::new(&page, "Two clouds of new points in every frame").check(
+        &mut wrong,
+        |_| true,
+        |name, k| {
+            let points = numbers(name)[0].parse().expect("points");
+            Some(vec![frame(&rows, Some(points), "tldi (cpu)", 1, k)[0]])
+        },
+    );
+    // "0.4 to 5 ms for two clouds of 10,000 to a million points that overlap": slight and deep.
+    let of = |points, k| frame(&rows, Some(points), "tldi (cpu)", 1, k)[0];
+    let row = page
+        .lines()
+        .find(|line| line.starts_with("| [What does it"));
+    let shown = numbers(row.expect("a short answer"));
+    assert!(is_rounded(&shown[0], of(10_000, 1)), "{shown:?}");
+    assert!(is_rounded(&shown[1], of(1_000_000, 1)), "{shown:?}");
     done(wrong);
 }
 

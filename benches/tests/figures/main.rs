@@ -1,8 +1,9 @@
-//! The figures of the README and of `docs/benchmarks.md` are those of the stored results, rounded to the digits shown.
+//! The figures of the README and of the pages of `docs` are those of the stored results, rounded to the digits shown.
 
 mod accuracy;
 mod budgets;
 mod frames;
+mod gpu_day;
 mod readme;
 mod table;
 
@@ -17,12 +18,16 @@ fn page(name: &str) -> String {
     std::fs::read_to_string(top().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-/// Rows of a stored file under `benches/results`.
-fn stored(name: &str) -> Vec<Value> {
+/// A stored file under `benches/results`.
+fn stored_file(name: &str) -> Value {
     let path = top().join("benches/results").join(name);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{name}: {e}"));
-    let file: Value = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{name}: {e}"));
-    file["rows"].as_array().expect("rows").clone()
+    serde_json::from_str(&text).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+/// Rows of a stored file under `benches/results`.
+fn stored(name: &str) -> Vec<Value> {
+    stored_file(name)["rows"].as_array().expect("rows").clone()
 }
 
 fn number(row: &Value, key: &str) -> f64 {

@@ -117,7 +117,7 @@ fn in_each_other(
         Some(apart) => {
             verdict.note("parting_along_x_m", apart.x);
             verdict.note("parting_sideways_m", apart.with_x(0.0).length());
-            verdict.require(apart.x > apart.with_x(0.0).length(), || {
+            verdict.require("parted", apart.x > apart.with_x(0.0).length(), || {
                 format!("they part sideways: {apart:.3}")
             });
         }
@@ -126,7 +126,9 @@ fn in_each_other(
                 .position(&placed[1])
                 .distance(arena.position(&placed[0]));
             verdict.note("distance_m", apart);
-            verdict.require(false, || format!("still in each other, {apart:.3} m apart"));
+            verdict.require("parted", false, || {
+                format!("still in each other, {apart:.3} m apart")
+            });
         }
     }
     verdict.at_most("fastest_m_s", fastest, 2.0);

@@ -165,7 +165,8 @@ fn turn(
             }
         }
     }
-    verdict.require(missing.is_empty(), || {
+    verdict.note("missing_contacts", missing.len() as f64);
+    verdict.require("missing_contacts", missing.is_empty(), || {
         format!("a sheet has no contact at {missing:?} degrees")
     });
     verdict.at_most("worst_gap_error_mean_radii", worst_gap, gap_bound);

@@ -139,7 +139,7 @@ fn fall(
     let has_fallen = height < -1.0;
     let must_fall = ratio > 1.0;
     verdict.note("fell", f64::from(u8::from(has_fallen)));
-    verdict.require(has_fallen == must_fall, || {
+    verdict.require("fell", has_fallen == must_fall, || {
         let outcome = if has_fallen { "fell through" } else { "stayed" };
         format!("{outcome}, height {height:.3} m")
     });

@@ -150,7 +150,7 @@ fn fixed_samples(
     let end = *arena.body(&placed).position();
     match asleep_after {
         Some(seconds) => verdict.at_most("asleep_after_s", seconds, SETTLE_SECONDS.into()),
-        None => verdict.require(false, || "never asleep".into()),
+        None => verdict.require("asleep_after_s", false, || "never asleep".into()),
     }
     verdict.note("last_awake_s", last_awake);
     let drift = end.translation.distance(settled.translation) / SPACING;
@@ -198,7 +198,9 @@ fn new_samples(setup: &Setup, verdict: &mut Verdict, body: Body, seed: u64) -> R
         let at = arena.position(&placed);
         if at.x.abs().max(at.z.abs()) > 0.5 * body.floor_size() {
             let seconds = verdict.note("left_after_s", step as f32 * DT);
-            verdict.require(false, || format!("left the plane after {seconds:.1} s"));
+            verdict.require("left_after_s", false, || {
+                format!("left the plane after {seconds:.1} s")
+            });
             break;
         }
     }

@@ -124,7 +124,7 @@ fn fall(setup: &Setup, verdict: &mut Verdict, change: Change, seed: u64) -> Resu
     verdict.at_most("tilt_deg", up.angle_between(Vec3::Y).to_degrees(), 0.1);
     match asleep_after {
         Some(seconds) => verdict.at_most("asleep_after_s", seconds, 2.0),
-        None => verdict.require(false, || "never asleep".into()),
+        None => verdict.require("asleep_after_s", false, || "never asleep".into()),
     }
     Ok(())
 }

@@ -74,7 +74,7 @@ fn drop_all(
         "passed_share",
         failures.len() as f64 / f64::from(hits.max(1)),
     );
-    verdict.require(failures.is_empty(), || {
+    verdict.require("passed_share", failures.is_empty(), || {
         let named = &failures[..failures.len().min(NAMED_FAILURES)];
         format!(
             "{} of {hits} passed through: {}",

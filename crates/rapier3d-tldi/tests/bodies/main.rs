@@ -4,6 +4,7 @@
 mod common;
 
 mod ccd;
+mod hooks;
 mod pipeline;
 mod refusals;
 mod resting;

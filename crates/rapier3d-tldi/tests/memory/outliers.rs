@@ -77,7 +77,9 @@ fn rest(floor: Floor, direction: Vector, distance: f32) -> Result<(f32, usize, u
     let mut result = Ok(());
     let (bytes, ()) = most_held(|| {
         for _ in 0..STEPS {
-            result = tldi.step(&mut world).map(|_| ());
+            if result.is_ok() {
+                result = tldi.step(&mut world).map(|_| ());
+            }
         }
     });
     result?;

@@ -4,3 +4,10 @@ mod exact;
 mod mass;
 mod sampling;
 mod shape;
+#[allow(
+    dead_code,
+    unreachable_pub,
+    reason = "a part of another package, of which this one uses a part"
+)]
+#[path = "../../../../tests/testkit/skip.rs"]
+mod skip;

@@ -1,5 +1,6 @@
 //! Mass properties of clouds against closed formulas and the exact integrals over meshes.
 
+use crate::skip::test_data;
 use rapier3d::glamx::Vec3;
 use rapier3d::prelude::{Cuboid, MassProperties, Shape, SharedShape};
 use rapier3d_tldi::{MassModel, PointCloud, PointCloudShape, unit_mass_properties};
@@ -325,18 +326,16 @@ fn read_ply(path: &std::path::Path) -> Option<(Vec<Vec3>, Vec<[u32; 3]>)> {
 
 #[test]
 fn scanned_bodies_weigh_like_their_meshes() {
-    let folder = std::env::var_os("TLDI_DATA").map_or_else(
-        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        std::path::PathBuf::from,
-    );
     for name in [
         "stanford/bunny_watertight.ply.gz",
         "stanford/armadillo_86k.ply.gz",
     ] {
-        let Some((points, triangles)) = read_ply(&folder.join(name)) else {
-            eprintln!("SKIPPED: no {name} in TLDI_DATA");
+        let checkout = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+        let Some(path) = test_data(checkout, name) else {
             continue;
         };
+        let read = read_ply(&path);
+        let (points, triangles) = read.unwrap_or_else(|| panic!("{name} cannot be read"));
         // Metres, so that the mesh's integrals keep their digits.
         let extent = points
             .iter()

@@ -1,0 +1,267 @@
+//! A user's physics hooks and event handler, where clouds take part: rapier asks and tells them as it does for its own
+//! shapes, while surfaces deform and while they do not.
+
+use crate::common::worlds::{HALF, TestResult, attached, dynamic_at, insert_floor};
+use crate::common::{cloud, cube, square};
+use rapier3d::prelude::*;
+use rapier3d_tldi::prelude::*;
+use std::sync::Mutex;
+use std::sync::mpsc::channel;
+
+/// Half the edges of the floor, metres.
+const FLOOR: f32 = 1.6;
+
+/// Of a deforming floor, m/s.
+const SLIDE: Vector = Vector::new(0.3, 0.0, -0.2);
+
+/// What the hooks do, and what they saw.
+struct UserHooks {
+    /// The body and its floor, in either order.
+    pair: [ColliderHandle; 2],
+    /// Whether the pair may touch.
+    lets: bool,
+    /// What is added to the velocity of each contact, m/s.
+    belt: Vector,
+    /// Velocities of contacts, as they were given to the hook, of a floor that is the first collider.
+    seen: Mutex<Vec<Vector>>,
+}
+
+impl UserHooks {
+    fn new(pair: [ColliderHandle; 2], lets: bool) -> Self {
+        Self {
+            pair,
+            lets,
+            belt: Vector::ZERO,
+            seen: Mutex::default(),
+        }
+    }
+
+    /// Whether the hook is asked about the pair.
+    fn is_meant(&self, collider1: ColliderHandle, collider2: ColliderHandle) -> bool {
+        let [a, b] = self.pair;
+        [collider1, collider2] == [a, b] || [collider1, collider2] == [b, a]
+    }
+}
+
+impl PhysicsHooks for UserHooks {
+    fn filter_contact_pair(&self, context: &PairFilterContext<'_>) -> Option<SolverFlags> {
+        assert!(self.is_meant(context.collider1, context.collider2));
+        self.lets.then_some(SolverFlags::COMPUTE_RIGID_IMPULSES)
+    }
+
+    fn filter_intersection_pair(&self, context: &PairFilterContext<'_>) -> bool {
+        assert!(self.is_meant(context.collider1, context.collider2));
+        self.lets
+    }
+
+    fn modify_solver_contacts(&self, context: &mut ContactModificationContext<'_>) {
+        assert!(self.is_meant(context.collider1, context.collider2));
+        // Velocities of contacts are those of the first body's surface.
+        let sign = if context.collider1 == self.pair[1] {
+            1.0
+        } else {
+            -1.0
+        };
+        let rigid = context.rigid_mut().expect("no soft body is there");
+        if !self.lets {
+            rigid.solver_contacts.clear();
+        }
+        let mut seen = self.seen.lock().expect("no hook panicked");
+        for contact in rigid.solver_contacts.iter_mut() {
+            seen.push(sign * contact.tangent_velocity);
+            contact.tangent_velocity += sign * self.belt;
+        }
+    }
+}
+
+/// A world with a floor and a cube of clouds that lies on it, both with these hooks.
+fn cube_on_floor(
+    hooks: ActiveHooks,
+) -> (
+    PhysicsWorld,
+    TldiPipeline,
+    RigidBodyHandle,
+    [ColliderHandle; 2],
+) {
+    let (mut world, tldi) = attached();
+    let floor = insert_floor(&mut world, FLOOR);
+    let collider = tldi.collider(cloud(&cube(HALF))).active_hooks(hooks);
+    let (body, cube) = world.insert(dynamic_at(HALF), collider);
+    (world, tldi, body, [cube, floor])
+}
+
+/// Steps for a second, with the floor sliding if it deforms.
+fn run(
+    world: &mut PhysicsWorld,
+    tldi: &mut TldiPipeline,
+    floor: ColliderHandle,
+    deforms: bool,
+    hooks: &dyn PhysicsHooks,
+) -> TestResult {
+    let step = world.integration_parameters.dt * SLIDE;
+    for k in 1..=60 {
+        if deforms {
+            let points: Vec<Vector> = square(FLOOR).iter().map(|p| *p + k as f32 * step).collect();
+            tldi.deform(world, floor, &points, None)?;
+        }
+        tldi.step_with_events(world, hooks, &())?;
+    }
+    Ok(())
+}
+
+/// The body falls through what the hook filters out, and lies on what it lets.
+#[test]
+fn filtered_pairs_do_not_touch() -> TestResult {
+    for deforms in [false, true] {
+        for lets in [false, true] {
+            let (mut world, mut tldi, body, pair) =
+                cube_on_floor(ActiveHooks::FILTER_CONTACT_PAIRS);
+            run(
+                &mut world,
+                &mut tldi,
+                pair[1],
+                deforms,
+                &UserHooks::new(pair, lets),
+            )?;
+            let height = world.bodies[body].translation().y - HALF;
+            // A second of free fall: 4.9 m.
+            let falls = height < -4.5;
+            let lies = height.abs() < 0.02;
+            assert!(
+                if lets { lies } else { falls },
+                "{deforms} {lets}: {height} m"
+            );
+        }
+    }
+    Ok(())
+}
+
+/// A sensor on the floor sees the body only if the hook lets it.
+#[test]
+fn filtered_sensors_do_not_see() -> TestResult {
+    for deforms in [false, true] {
+        for lets in [false, true] {
+            let (mut world, mut tldi, _, pair) =
+                cube_on_floor(ActiveHooks::FILTER_INTERSECTION_PAIR);
+            world.colliders[pair[0]].set_sensor(true);
+            let body = world.colliders[pair[0]].parent().expect("it has a body");
+            world.bodies[body].set_gravity_scale(0.0, true);
+            world.bodies[body].set_translation(Vector::Y * 0.5 * HALF, true);
+            run(
+                &mut world,
+                &mut tldi,
+                pair[1],
+                deforms,
+                &UserHooks::new(pair, lets),
+            )?;
+            let sees = world.narrow_phase.intersection_pair(pair[0], pair[1]);
+            assert_eq!(sees.unwrap_or(false), lets, "deforms: {deforms}");
+        }
+    }
+    Ok(())
+}
+
+/// The hook is asked last: it sees the velocity of a deforming floor, and what it adds counts beside it. A conveyor belt in
+/// the hook carries the body on a floor at rest as well.
+#[test]
+fn modified_contacts_reach_the_solver() -> TestResult {
+    for deforms in [false, true] {
+        let (mut world, mut tldi, body, pair) = cube_on_floor(ActiveHooks::MODIFY_SOLVER_CONTACTS);
+        let mut hooks = UserHooks::new(pair, true);
+        hooks.belt = Vector::X * 0.5;
+        run(&mut world, &mut tldi, pair[1], deforms, &hooks)?;
+        let surface = if deforms { SLIDE } else { Vector::ZERO };
+        let seen = hooks.seen.into_inner()?;
+        assert!(seen.len() >= 60, "{} contacts", seen.len());
+        for velocity in seen {
+            // All points of the floor have one velocity: their mean is that, but for rounding of positions in f32, 1e-7 m in
+            // a sixtieth of a second.
+            assert!(
+                (velocity - surface).length() < 1e-4,
+                "{velocity} of {surface}"
+            );
+        }
+        // Friction of 0.5 brings it to the speed within 0.2 s.
+        let speed = world.bodies[body].linvel();
+        let expected = surface + hooks.belt;
+        assert!(
+            (speed - expected).length() < 0.05,
+            "{deforms}: {speed} of {expected}"
+        );
+    }
+    Ok(())
+}
+
+/// A hook that takes the contacts away lets the body fall, and is asked although only the user wants it.
+#[test]
+fn cleared_contacts_hold_nothing() -> TestResult {
+    for deforms in [false, true] {
+        let (mut world, mut tldi, body, pair) = cube_on_floor(ActiveHooks::MODIFY_SOLVER_CONTACTS);
+        run(
+            &mut world,
+            &mut tldi,
+            pair[1],
+            deforms,
+            &UserHooks::new(pair, false),
+        )?;
+        let height = world.bodies[body].translation().y - HALF;
+        assert!(height < -4.5, "{deforms}: {height} m");
+    }
+    Ok(())
+}
+
+/// A contact begins once, its force is the weight, and it ends once: when the body is lifted, and when its collider goes.
+#[test]
+fn contacts_begin_push_and_end() -> TestResult {
+    for removes in [false, true] {
+        let (mut world, mut tldi, body, [cube, floor]) = cube_on_floor(ActiveHooks::empty());
+        let (events, forces) = (
+            ActiveEvents::COLLISION_EVENTS,
+            ActiveEvents::CONTACT_FORCE_EVENTS,
+        );
+        world.colliders[cube].set_active_events(events | forces);
+        world.bodies[body].set_translation(Vector::Y * (HALF + 0.05), true);
+        let weight = 9.81 * world.bodies[body].mass();
+        let (collision_sender, collisions) = channel();
+        let (force_sender, forces) = channel();
+        let (tear_sender, _tears) = channel();
+        let handler = ChannelEventCollector::new(collision_sender, force_sender, tear_sender);
+        // It falls by 5 cm and lies still, but is not asleep.
+        for _ in 0..40 {
+            tldi.step_with_events(&mut world, &(), &handler)?;
+        }
+        let is_pair = |one, other| [one, other] == [cube, floor] || [one, other] == [floor, cube];
+        let begun: Vec<CollisionEvent> = collisions.try_iter().collect();
+        assert!(
+            matches!(begun[..], [CollisionEvent::Started(one, other, flags)]
+            if is_pair(one, other) && flags.is_empty()),
+            "{begun:?}"
+        );
+        let last: ContactForceEvent = forces.try_iter().last().expect("forces");
+        assert!(is_pair(last.collider1, last.collider2));
+        let force = last.total_force_magnitude;
+        assert!(
+            (force / weight - 1.0).abs() < 0.05,
+            "{force} N of {weight} N"
+        );
+
+        let expected = if removes {
+            world.remove_collider(cube);
+            CollisionEventFlags::REMOVED
+        } else {
+            world.bodies[body].set_translation(Vector::Y * 2.0, true);
+            CollisionEventFlags::empty()
+        };
+        for _ in 0..10 {
+            tldi.step_with_events(&mut world, &(), &handler)?;
+        }
+        let ended: Vec<CollisionEvent> = collisions.try_iter().collect();
+        assert!(
+            matches!(ended[..], [CollisionEvent::Stopped(one, other, flags)]
+            if is_pair(one, other) && flags == expected),
+            "{removes}: {ended:?}"
+        );
+        assert_eq!(forces.try_iter().count(), 0, "nothing touches any more");
+    }
+    Ok(())
+}
