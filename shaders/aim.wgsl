@@ -28,6 +28,7 @@ var<workgroup> axis: vec3f;
 var<workgroup> is_done: bool;
 // Another direction has nearly as much of the normals: the axis turns to a face.
 var<workgroup> is_turning: bool;
+var<workgroup> proposed: vec3f;
 // No normals: the axis is what it is.
 var<workgroup> is_forced: bool;
 // The last axis is asked about in place of the proposed one.
@@ -291,6 +292,7 @@ fn propose(pair: u32, turn: u32) {
     }
     axis = eigenvector(covariance, true);
     is_turning = policy != COVARIANCE && is_one_of_alike(of_normals);
+    proposed = axis;
 }
 
 fn times(m: Symmetric, v: vec3f) -> vec3f {
@@ -320,12 +322,9 @@ fn is_one_of_alike(covariance: Symmetric) -> bool {
     return dot(other, times(covariance, other)) >= ALIKE * along;
 }
 
-// One step of the axis towards the face that it is nearest to.
-fn turn_to_face(pair: u32, turn: u32) {
-    let hint = unit_or(pairs[pair].toward_b, vec3f());
-    let weight = select(0.0, HINT_WEIGHT * pairs[pair].plainness, turn == 0u);
-    let along = dot(hint, axis);
-    var sum = weight * along * along * along * hint;
+// One step of the axis towards the face that it is nearest to; after the last one back, if there are no faces.
+fn turn_to_face(pair: u32, step: u32) {
+    var sum = vec3f();
     for (var s = 0u; s < 2u; s++) {
         let of_side = vec3f(
             f32(atomicLoad(&turned_sum[3u * s])),
@@ -334,7 +333,11 @@ fn turn_to_face(pair: u32, turn: u32) {
         );
         sum += of_side / (STEPS * f32(max(sample_count(2u * pair + s), 1u)));
     }
+    let flatness = dot(sum, axis) / dot(axis, times(zone_covariance(pair), axis));
     axis = unit_or(sum, axis);
+    if step + 1u == TURNS && !(flatness >= FLAT) {
+        axis = proposed;
+    }
 }
 
 // Keeps the last axis, if the proposed one is close to it.
@@ -498,7 +501,7 @@ fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lan
             }
             workgroupBarrier();
             if lane == 0u && !is_done && is_turning {
-                turn_to_face(pair, turn);
+                turn_to_face(pair, step);
             }
         }
         workgroupBarrier();

@@ -40,6 +40,7 @@ override HINT_WEIGHT: f32;
 override MEMORY_WEIGHT: f32;
 override ALIKE: f32;
 override TURNS: u32;
+override FLAT: f32;
 override AXIS_HYSTERESIS: f32;
 override PLAINLY: f32;
 override CROSSING: f32;

@@ -3,7 +3,6 @@
 use super::Scanner;
 use anyhow::{Context, bail, ensure};
 use rapier3d_tldi::{CloudRecipe, RadiusRule, SeenPoints};
-use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
 use tldi::{CloudError, PointCloud};
@@ -143,10 +142,7 @@ impl SweepSource {
                 files.push(path);
             }
         }
-        files.sort_by(|a, b| {
-            let names = [a, b].map(|path| path.to_string_lossy());
-            in_counting_order(&names[0], &names[1]).then_with(|| a.cmp(b))
-        });
+        files.sort_by(tldi_sources::numbered_order);
         let camera_from_scanner = if folder.join("calib.txt").is_file() {
             let text = read_text("calib.txt")?;
             let line = (text.lines()).find_map(|line| line.strip_prefix("Tr:"));
@@ -220,32 +216,6 @@ impl SweepSource {
     }
 }
 
-/// The order of two names by their letters, and by the value of the numbers in them.
-fn in_counting_order(a: &str, b: &str) -> Ordering {
-    let (mut a, mut b) = (a, b);
-    loop {
-        let [m, n] = [a, b].map(|text| {
-            let rest = text.trim_start_matches(|c: char| c.is_ascii_digit());
-            text.len() - rest.len()
-        });
-        if m > 0 && n > 0 {
-            let [x, y] = [&a[..m], &b[..n]].map(|digits| digits.trim_start_matches('0'));
-            let order = x.len().cmp(&y.len()).then_with(|| x.cmp(y));
-            if order.is_ne() {
-                return order;
-            }
-            (a, b) = (&a[m..], &b[n..]);
-        } else {
-            match (a.chars().next(), b.chars().next()) {
-                (Some(c), Some(d)) if c == d => {
-                    (a, b) = (&a[c.len_utf8()..], &b[c.len_utf8()..]);
-                }
-                (c, d) => return c.cmp(&d),
-            }
-        }
-    }
-}
-
 /// A pose from the upper three rows of its matrix.
 fn pose(text: &str) -> anyhow::Result<Pose3> {
     let numbers = (text.split_whitespace())
@@ -274,34 +244,4 @@ fn pose(text: &str) -> anyhow::Result<Pose3> {
         column(3),
         Quat::from_mat3(&rotation).normalize(),
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_in_counting_order() {
-        let names = [
-            "",
-            "1.bin",
-            "2.bin",
-            "10.bin",
-            "010a",
-            "99999999999999999999998",
-            "99999999999999999999999",
-            "a",
-            "a1b2",
-            "a1b10",
-            "ä1",
-            "ä02",
-            "ä10",
-        ];
-        for (k, a) in names.iter().enumerate() {
-            for (l, b) in names.iter().enumerate() {
-                assert_eq!(in_counting_order(a, b), k.cmp(&l), "{a} {b}");
-            }
-        }
-        assert_eq!(in_counting_order("007", "7"), Ordering::Equal);
-    }
 }

@@ -218,10 +218,13 @@ impl SurfaceMotions {
 }
 
 /// Mean of the values of the points near `point`, weighted by nearness; of the nearest where none
-/// is within two radii.
+/// is within two radii. Zero if the cloud has got other points since the values were recorded.
 fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector {
     let reach = 2.0 * cloud.mean_radius();
     let points = cloud.points();
+    if points.len() != values.len() {
+        return Vector::ZERO;
+    }
     let (mut sum, mut total) = (Vector::ZERO, 0.0);
     let mut nearest = (f32::INFINITY, Vector::ZERO);
     for (block, bounds) in cloud.blocks().iter().enumerate() {

@@ -91,7 +91,9 @@ impl CandidateSearch {
             let margin = Vector::splat(slack + collider.contact_skin() + soft_ccd);
             let bounds = collider.shape().compute_aabb(&pose_of(collider, bodies));
             let (min, max) = (bounds.mins - margin, bounds.maxs + margin);
-            if min.is_nan() || max.is_nan() {
+            let is_moving_sanely =
+                parent.is_none_or(|body| body.linvel().is_finite() && body.angvel().is_finite());
+            if min.is_nan() || max.is_nan() || !is_moving_sanely {
                 continue; // rapier quarantines it
             }
             self.proxies.push(Proxy {

@@ -249,3 +249,19 @@ fn several_worlds_and_runs_agree_to_the_bit() -> TestResult {
     }
     Ok(())
 }
+
+/// A body whose velocity is not a number is rapier's to disable. The world goes on, and others still rest.
+#[test]
+fn a_velocity_that_is_no_number_stops_one_body() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    insert_floor(&mut world, 0.8);
+    let (broken, _) = world.insert(dynamic_at(HALF + 0.02), tldi.collider(cloud(&cube(HALF))));
+    let beside = RigidBodyBuilder::dynamic().translation(Vector::new(0.4, HALF, 0.0));
+    let (body, _) = world.insert(beside, tldi.collider(cloud(&cube(HALF))));
+    world.bodies[broken].set_linvel(Vector::splat(f32::NAN), true);
+    for _ in 0..60 {
+        tldi.step(&mut world)?;
+    }
+    assert!((world.bodies[body].translation().y - HALF).abs() < REST_TOLERANCE);
+    Ok(())
+}

@@ -72,8 +72,12 @@ const ALIKE: f32 = 0.7;
 /// between two. With four, one of 160 contacts in corners is missed.
 const TURNS: usize = 8;
 
+/// Least mean of (n·v)⁴, as a share of that of (n·v)², of faces across v. It is 1 of flat ones and 0.6 of normals in all
+/// directions, as around two balls that are deep in each other, whose axis then stays as it is.
+const FLAT: f32 = 0.7;
+
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 9] = [
+pub(crate) const CONSTANTS: [(&str, f64); 10] = [
     ("WELL_SEEN", WELL_SEEN as f64),
     ("SUPPORTED", SUPPORTED as f64),
     ("LEAST_SHARE", LEAST_SHARE as f64),
@@ -83,6 +87,7 @@ pub(crate) const CONSTANTS: [(&str, f64); 9] = [
     ("AXIS_HYSTERESIS", AXIS_HYSTERESIS as f64),
     ("ALIKE", ALIKE as f64),
     ("TURNS", TURNS as f64),
+    ("FLAT", FLAT as f64),
 ];
 
 /// Fills `axes`, unit vectors from `b` towards `a`; at least one. Empty normals on either side give
@@ -138,17 +143,15 @@ fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec
         let left = |n: Vec3| unseen(&n).then(|| rest(n));
         let of_normals = zone_covariance(sides, &left);
         let mut covariance = of_normals;
-        let (hint, mut hint_weight) = (approach.direction(), 0.0);
         if views == 0 {
-            hint_weight = HINT_WEIGHT * approach.plainness();
-            covariance += hint_weight * outer(hint);
+            covariance += HINT_WEIGHT * approach.plainness() * outer(approach.direction());
             covariance += MEMORY_WEIGHT * outer(approach.last_axis.unwrap_or(Vec3::ZERO));
         }
         let Some(mut axis) = top_eigenvector(&covariance) else {
             break;
         };
         if is_one_of_alike(&of_normals, axis) {
-            axis = turned_to_face(sides, axis, (hint, hint_weight), &left);
+            axis = turned_to_face(sides, axis, &of_normals, &left);
         }
         if views > 0 {
             let supports = |n: &Vec3| axis.dot(*n).abs() >= SUPPORTED;
@@ -186,21 +189,25 @@ fn is_one_of_alike(covariance: &Mat3, axis: Vec3) -> bool {
 }
 
 /// The axis turned to the face that it is nearest to: towards the next maximum of the mean of (n·v)⁴ over the normals of
-/// both sides, each as `map` makes it, and of the hint with its weight. Where there are no faces, the hint decides.
+/// both sides, each as `map` makes it. The axis itself, if there are no faces: `covariance` is the mean of n nᵀ.
 fn turned_to_face(
     sides: &[ZoneNormals; 2],
     axis: Vec3,
-    (hint, hint_weight): (Vec3, f32),
+    covariance: &Mat3,
     map: &dyn Fn(Vec3) -> Option<Vec3>,
 ) -> Vec3 {
-    (0..TURNS).fold(axis, |axis, _| {
-        let pull = |v: Vec3| v.dot(axis).powi(3) * v;
+    let (mut turned, mut flatness) = (axis, 0.0);
+    for _ in 0..TURNS {
         let [a, b] = sides.each_ref().map(|side| {
             let kept = side.normals.iter().filter_map(|n| map(*n));
-            kept.map(pull).sum::<Vec3>() / side.normals.len().max(1) as f32
+            let pulls = kept.map(|n| n.dot(turned).powi(3) * n);
+            pulls.sum::<Vec3>() / side.normals.len().max(1) as f32
         });
-        (a + b + hint_weight * pull(hint)).normalize_or(axis)
-    })
+        let pull = a + b;
+        flatness = pull.dot(turned) / turned.dot(*covariance * turned);
+        turned = pull.normalize_or(turned);
+    }
+    if flatness >= FLAT { turned } else { axis }
 }
 
 /// The axis or its opposite, such that it points from `b` towards `a`; and whether anything told.
