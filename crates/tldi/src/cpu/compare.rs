@@ -1,7 +1,7 @@
 //! Stage `compare`: two images of one camera, pixel by pixel.
 //!
 //! `crossings` tells whether the surfaces cross. Contact pixels pair a layer through which rays leave the second body with
-//! one through which they enter the first.
+//! one through which they enter the first; and the other way round where the normals of both tell what is outside.
 
 use super::crossings::{Crossings, best_seen};
 use super::fold::ViewFold;

@@ -6,8 +6,8 @@
 //! slide, spin or rest. Up to two more axes follow if the surfaces also meet on faces that the
 //! first axis sees edge-on, as in a corner or a groove.
 //!
-//! The sign of the axis says on which side of `a` the body `b` lies. The motion, the bounds, the
-//! last axis and the outsides of the surfaces decide it.
+//! The sign of the axis says on which side of `a` the body `b` lies. The last axis, the near points, the
+//! motion, the bounds and the outsides of the surfaces decide it.
 
 use crate::AXIS_HYSTERESIS;
 use crate::cloud::point_normals::least_variance_axis;
