@@ -113,6 +113,6 @@ fn a_warm_backend_allocates_nothing() {
         );
         // Which points are near, and how many views and pixels they need, changes with the pose: the same frames again.
         round();
-        assert_eq!(allocations(|| round()), 0);
+        assert_eq!(allocations(&mut round), 0);
     });
 }
