@@ -291,7 +291,9 @@ fn propose(pair: u32, turn: u32) {
         return;
     }
     axis = eigenvector(covariance, true);
-    is_turning = policy != COVARIANCE && is_one_of_alike(of_normals);
+    // Between faces an axis sees no contact well, but more of where surfaces cross.
+    let turns = policy != COVARIANCE && policy != ALL_DIRECTIONS;
+    is_turning = turns && is_one_of_alike(of_normals);
     proposed = axis;
 }
 

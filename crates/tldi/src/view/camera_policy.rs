@@ -114,7 +114,7 @@ pub(crate) fn aim(
             let axis = axis.try_normalize().unwrap_or(Vec3::Z);
             axes.push(oriented(axis, &sides, approach).0);
         }
-        None => aim_at_zone(&sides, approach, axes),
+        None => aim_at_zone(&sides, approach, policy, axes),
     }
     if axes.is_empty() {
         let fallback = approach.last_axis.unwrap_or(-approach.toward_b());
@@ -133,7 +133,14 @@ pub(crate) fn further_axes(axes: &[Vec3]) -> ArrayVec<Vec3, MAX_VIEWS> {
     further
 }
 
-fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec3>) {
+fn aim_at_zone(
+    sides: &[ZoneNormals; 2],
+    approach: &Approach,
+    policy: CameraPolicy,
+    axes: &mut Vec<Vec3>,
+) {
+    // Between faces an axis sees no contact well, but more of where surfaces cross.
+    let turns = policy != CameraPolicy::AllDirections;
     let mut seen: [Vec3; MAX_VIEWS] = [Vec3::ZERO; MAX_VIEWS];
     let mut views = 0;
     while views < MAX_VIEWS {
@@ -150,7 +157,7 @@ fn aim_at_zone(sides: &[ZoneNormals; 2], approach: &Approach, axes: &mut Vec<Vec
         let Some(mut axis) = top_eigenvector(&covariance) else {
             break;
         };
-        if is_one_of_alike(&of_normals, axis) {
+        if turns && is_one_of_alike(&of_normals, axis) {
             axis = turned_to_face(sides, axis, &of_normals, &left);
         }
         if views > 0 {
