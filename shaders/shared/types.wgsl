@@ -38,9 +38,6 @@ override LEAST_SHARE: f32;
 override CONCLUSIVE: f32;
 override HINT_WEIGHT: f32;
 override MEMORY_WEIGHT: f32;
-override ALIKE: f32;
-override TURNS: u32;
-override FLAT: f32;
 override AXIS_HYSTERESIS: f32;
 override PLAINLY: f32;
 override CROSSING: f32;
@@ -129,14 +126,6 @@ struct Side {
     padding_a: u32,
     padding_b: u32,
     padding_c: u32,
-}
-
-// One of the near points of a side, in the frame of `a`.
-struct Sample {
-    normal: vec3f,
-    padding_a: u32,
-    point: vec3f,
-    padding_b: u32,
 }
 
 struct Pair {
@@ -301,12 +290,15 @@ const ENTRIES: u32 = 7u;
 const FRAGMENTS_WRAPPED: u32 = 8u;
 
 // Words of a side in the arena.
-const SIDE_WORDS: u32 = 8u;
+const SIDE_WORDS: u32 = 16u;
 const KEPT_COUNT: u32 = 0u;
 const NEAR_COUNT: u32 = 1u;
 const RADIUS_LOW: u32 = 2u;
 const RADIUS_HIGH: u32 = 3u;
 const SAMPLE_COUNT: u32 = 4u;
+// Σ of the near points' places in the overlap, lower and upper halves, for each axis.
+const NEAR_LOW: u32 = 5u;
+const NEAR_HIGH: u32 = 8u;
 
 // Words of a view in the arena: greatest and least coordinates of what is seen of each side, as
 // ordered numbers (the least ones negated), and the touching tiles' bounds likewise.
@@ -315,6 +307,9 @@ const TOUCHED: u32 = 12u;
 
 // Steps of the sum of radii, in shares of the largest: 2^20.
 const RADIUS_STEPS: f32 = 1048576.0;
+
+// Steps of a place in the overlap, in shares of its extent.
+const PLACE_STEPS: f32 = 65535.0;
 
 // Words of a pair in what is read back, and of a contact.
 const PAIR_WORDS: u32 = 16u;

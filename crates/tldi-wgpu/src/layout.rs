@@ -19,8 +19,7 @@ pub(crate) const TILE_BYTES: u64 = 3 * 4;
 /// The begins and ends of both sides.
 pub(crate) const PIXEL_BYTES: u64 = 4 * 4;
 pub(crate) const SAMPLE_SLOTS: u64 = 1024;
-pub(crate) const SAMPLE_BYTES: u64 = 32;
-pub(crate) const SIDE_WORDS: u32 = 8;
+pub(crate) const SIDE_WORDS: u32 = 16;
 pub(crate) const VIEW_WORDS: u32 = 16;
 pub(crate) const PAIR_WORDS: u32 = 16;
 pub(crate) const CONTACT_WORDS: u32 = 12;
@@ -433,7 +432,6 @@ mod tests {
         for (name, bytes) in [
             ("Survivor", SURVIVOR_BYTES),
             ("Entry", ENTRY_BYTES),
-            ("Sample", SAMPLE_BYTES),
             ("Plane", PLANE_BYTES),
             ("View", VIEW_BYTES),
             ("Splat", SPLAT_BYTES),

@@ -1,7 +1,7 @@
 //! Stage `compare`: two images of one camera, pixel by pixel.
 //!
 //! `crossings` tells whether the surfaces cross. Contact pixels pair a layer through which rays leave the second body with
-//! one through which they enter the first; and the other way round where the normals of both tell what is outside.
+//! one through which they enter the first.
 
 use super::crossings::{Crossings, best_seen};
 use super::fold::ViewFold;
@@ -33,9 +33,6 @@ pub(crate) struct Seen<'a> {
     pub(crate) middles: Middles,
     /// Whether the outward normals of `a`, and of `b`, say that the view looks at it from behind.
     pub(crate) from_behind: [bool; 2],
-    /// Whether normals tell the outsides of both. Then contacts on the other side of `a` are looked for, too: the layers
-    /// say which of them can touch.
-    pub(crate) tells_facing: bool,
     /// Of the columns and rows of both images, if they are folded.
     pub(crate) fold: Option<&'a ViewFold>,
 }
@@ -86,27 +83,15 @@ pub(crate) fn compare(
                 frame_from_view: &frame_from_view,
                 view: seen.view,
                 others: &others,
+                middles: &seen.middles,
             };
-            let [behind_a, behind_b] = seen.from_behind;
-            let front = Column::new(lb, Facing::Exit, behind_b, seen.middles.b);
-            let back = Column::new(la, Facing::Entry, behind_a, seen.middles.a);
-            contact_pixels([front, back], Side::Main, &at, params, result);
-            if seen.tells_facing {
-                let front = Column::new(la, Facing::Exit, false, seen.middles.a);
-                let back = Column::new(lb, Facing::Entry, false, seen.middles.b);
-                contact_pixels([front, back], Side::Other, &at, params, result);
-            }
+            let columns = [
+                Column::new(la, Facing::Entry, seen.from_behind[0]),
+                Column::new(lb, Facing::Exit, seen.from_behind[1]),
+            ];
+            contact_pixels(columns, &at, params, result);
         }
     }
-}
-
-/// On which side of `a` a view looks for `b`.
-#[derive(Clone, Copy, PartialEq)]
-enum Side {
-    /// Where the axis says. Rays leave `b` and enter `a`.
-    Main,
-    /// On the opposite one, as in a slot. Rays leave `a` and enter `b`.
-    Other,
 }
 
 /// Where a pixel is.
@@ -117,6 +102,7 @@ struct PixelView<'a> {
     view: usize,
     /// Axes of the other views, in the frame of this one.
     others: &'a [Vec3],
+    middles: &'a Middles,
 }
 
 /// A surface's layers in one pixel.
@@ -125,19 +111,13 @@ struct Column<'a> {
     layers: &'a [Layer],
     /// A sheet seen from behind: what its layers face says nothing.
     is_turned: bool,
-    /// Depth of the middle of the body, see [`Middles`].
-    middle: Option<f32>,
 }
 
 impl<'a> Column<'a> {
     /// `met` is what the layers face that the other surface can meet.
-    fn new(layers: &'a [Layer], met: Facing, from_behind: bool, middle: Option<f32>) -> Self {
+    fn new(layers: &'a [Layer], met: Facing, from_behind: bool) -> Self {
         let is_turned = from_behind && layers.iter().all(|layer| layer.facing != met);
-        Self {
-            layers,
-            is_turned,
-            middle,
-        }
+        Self { layers, is_turned }
     }
 
     fn facing(&self, layer: &Layer) -> Facing {
@@ -162,37 +142,23 @@ impl<'a> Column<'a> {
     }
 }
 
-/// Contacts in a pixel, where the ray leaves the body in `front` and enters the one in `back`.
-fn contact_pixels(
-    [front, back]: [Column; 2],
-    side: Side,
-    at: &PixelView,
-    params: &Params,
-    result: &mut PairResult,
-) {
-    for (kf, exit) in front.layers.iter().enumerate() {
-        if front.facing(exit) == Facing::Entry || is_edge_on(exit) {
+fn contact_pixels([a, b]: [Column; 2], at: &PixelView, params: &Params, result: &mut PairResult) {
+    for (kb, exit) in b.layers.iter().enumerate() {
+        if b.facing(exit) == Facing::Entry || is_edge_on(exit) {
             continue;
         }
-        let entered = entered_at(&front.up_to(kf), params);
-        // What `front` has left behind altogether it does not touch.
-        let entry = (back.layers.iter().enumerate())
-            .filter(|(_, layer)| back.facing(layer) != Facing::Exit && !is_edge_on(layer))
-            .map(|(kb, layer)| (layer, left_at(&back.from(kb), params)))
-            .filter(|(_, left)| entered <= *left)
-            .find(|(layer, left)| {
-                let depth = exit.depth - layer.depth;
-                match side {
-                    Side::Main => depth <= params.thickness || opposed(layer, exit),
-                    // The least way out counts.
-                    Side::Other => depth <= params.thickness && entered + depth <= *left,
-                }
-            });
-        let Some((entry, _)) = entry else { continue };
-        // Outward normals in the view frame: the ray leaves the front body and enters the other.
-        let normal_back = facing_camera(entry.normal, -1.0);
-        let normal_front = facing_camera(exit.normal, 1.0);
-        let normal = (normal_back - normal_front).normalize_or(-Vec3::Z);
+        let entered = entered_at(&b.up_to(kb), at.middles.b, params);
+        // What b has left behind altogether it does not touch.
+        let entry = (a.layers.iter().enumerate())
+            .filter(|(_, la)| a.facing(la) != Facing::Exit && !is_edge_on(la))
+            .filter(|(ka, _)| entered <= left_at(&a.from(*ka), at.middles.a, params))
+            .map(|(_, la)| la)
+            .find(|la| exit.depth - la.depth <= params.thickness || opposed(la, exit));
+        let Some(entry) = entry else { continue };
+        // Outward normals in the view frame: the camera sees a from outside, b from inside.
+        let normal_a = facing_camera(entry.normal, -1.0);
+        let normal_b = facing_camera(exit.normal, 1.0);
+        let normal = (normal_a - normal_b).normalize_or(-Vec3::Z);
         let along_view = entry.depth - exit.depth;
         let gap = along_view * normal.z.abs();
         if !best_seen(normal, at.others) {
@@ -204,20 +170,13 @@ fn contact_pixels(
         }
         let in_frame = |v: Vec3| at.frame_from_view.rotation * v;
         let [u, v] = at.pixel.map(|c| c as f32 + 0.5);
-        let point = |layer: &Layer| *at.frame_from_view * at.camera.view_at(u, v, layer.depth);
-        let of_back = (point(entry), share_of(entry, -1.0) * in_frame(normal_back));
-        let of_front = (point(exit), share_of(exit, 1.0) * in_frame(normal_front));
-        let ((point_a, normal_a), (point_b, normal_b)) = match side {
-            Side::Main => (of_back, of_front),
-            Side::Other => (of_front, of_back),
-        };
         result.contacts.push(ContactPixel {
             pixel: at.pixel,
             view: at.view as u32,
-            point_a,
-            point_b,
-            normal_a,
-            normal_b,
+            point_a: *at.frame_from_view * at.camera.view_at(u, v, entry.depth),
+            point_b: *at.frame_from_view * at.camera.view_at(u, v, exit.depth),
+            normal_a: share_of(entry, -1.0) * in_frame(normal_a),
+            normal_b: share_of(exit, 1.0) * in_frame(normal_b),
             gap,
         });
     }
@@ -245,7 +204,7 @@ fn opposed(entry: &Layer, exit: &Layer) -> bool {
 /// Depth at which the ray entered the part of a body that it leaves through the last of `layers`:
 /// unbounded where its normal says that there is an inside but the entry was culled. A ray that
 /// leaves a body twice in a row has missed a layer and tells no more than that the surface is there.
-fn entered_at(column: &Column, params: &Params) -> f32 {
+fn entered_at(column: &Column, middle: Option<f32>, params: &Params) -> f32 {
     let Some((exit, before)) = column.layers.split_last() else {
         return f32::INFINITY;
     };
@@ -255,12 +214,12 @@ fn entered_at(column: &Column, params: &Params) -> f32 {
         (Facing::Exit, None) => f32::NEG_INFINITY,
         (Facing::Exit, Some(l)) if l.facing != Facing::Entry => thin,
         (_, Some(l)) => l.depth,
-        (_, None) => thin.min(column.middle.unwrap_or(f32::INFINITY)),
+        (_, None) => thin.min(middle.unwrap_or(f32::INFINITY)),
     }
 }
 
 /// Depth at which the ray leaves the part of a body that it enters through the first of `layers`.
-fn left_at(column: &Column, params: &Params) -> f32 {
+fn left_at(column: &Column, middle: Option<f32>, params: &Params) -> f32 {
     let Some((entry, behind)) = column.layers.split_first() else {
         return f32::NEG_INFINITY;
     };
@@ -270,7 +229,7 @@ fn left_at(column: &Column, params: &Params) -> f32 {
         (Facing::Entry, None) => f32::INFINITY,
         (Facing::Entry, Some(l)) if l.facing != Facing::Exit => thin,
         (_, Some(l)) => l.depth,
-        (_, None) => thin.max(column.middle.unwrap_or(f32::NEG_INFINITY)),
+        (_, None) => thin.max(middle.unwrap_or(f32::NEG_INFINITY)),
     }
 }
 
@@ -396,16 +355,15 @@ mod tests {
             Column {
                 layers,
                 is_turned: false,
-                middle: None,
             }
         }
-        let entered = |layers: &[Layer]| entered_at(&column(layers), &params);
+        let entered = |layers: &[Layer]| entered_at(&column(layers), None, &params);
         assert_eq!(entered(&[entry(1.0), exit(9.0)]), 1.0);
         assert_eq!(entered(&[exit(9.0)]), f32::NEG_INFINITY);
         // The entry belongs to the first exit.
         assert_eq!(entered(&[entry(1.0), exit(3.0), exit(9.0)]), 7.0);
         assert_eq!(entered(&[unknown(1.0), unknown(9.0)]), 1.0);
-        let left = |layers: &[Layer]| left_at(&column(layers), &params);
+        let left = |layers: &[Layer]| left_at(&column(layers), None, &params);
         assert_eq!(left(&[entry(1.0), exit(9.0)]), 9.0);
         assert_eq!(left(&[entry(1.0)]), f32::INFINITY);
         assert_eq!(left(&[entry(1.0), entry(5.0), exit(9.0)]), 3.0);

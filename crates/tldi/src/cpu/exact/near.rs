@@ -8,7 +8,7 @@
 use crate::cpu::exact::placed::{CellDistances, Placed};
 use crate::cpu::fold::is_coarse;
 use crate::cpu::normals;
-use crate::cpu::side::{NearSamples, Side};
+use crate::cpu::side::Side;
 use crate::cpu::zone::ZoneGrid;
 use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
 use crate::stage::stage;
@@ -20,7 +20,7 @@ const ENOUGH: usize = 32;
 
 impl Side {
     /// Finds the culled points within `reach` metres of an exact surface or inside it, coarser ones farther away, or
-    /// an even selection of them; its points nearest to them go to `of_surface`. `false` where none is
+    /// an even selection of them; its normals at the nearest points go to `surface_normals`. `false` where none is
     /// near.
     pub(crate) fn near_exact(
         &mut self,
@@ -28,16 +28,16 @@ impl Side {
         frame_from_cloud: &Pose3,
         exact: &Placed,
         reach: f32,
-        of_surface: &mut NearSamples,
+        surface_normals: &mut Vec<Vec3>,
     ) -> bool {
         let _stage = stage!("zone");
         self.near.clear();
         let support = self.support_radius(cloud);
         self.in_near_cells(exact, reach, support);
         let step = self.kept.len().div_ceil(AIM_SAMPLES) as u32;
-        self.select_near(exact, reach, step, of_surface);
+        self.select_near(exact, reach, step, surface_normals);
         if step > 1 && self.near.len() < ENOUGH {
-            self.select_near(exact, reach, 1, of_surface);
+            self.select_near(exact, reach, 1, surface_normals);
         }
         if self.near.is_empty() {
             return false;
@@ -46,7 +46,6 @@ impl Side {
             self.sample_normals(cloud, frame_from_cloud);
         } else {
             let _stage = stage!("aim");
-            self.near_samples.clear();
             // Neighbours are not among the samples.
             let around = self.neighborhood(cloud);
             let of_support = &self.support;
@@ -57,9 +56,8 @@ impl Side {
                 &around,
                 &mut self.normals,
                 &mut self.kept,
-                &mut self.near_samples.normals,
+                &mut self.near_normals,
             );
-            self.place_samples();
         }
         true
     }
@@ -116,21 +114,25 @@ impl Side {
     }
 
     /// Fills `near` with those of about every `step`-th of the points in `kept` that are near.
-    fn select_near(&mut self, exact: &Placed, reach: f32, step: u32, of_surface: &mut NearSamples) {
+    fn select_near(
+        &mut self,
+        exact: &Placed,
+        reach: f32,
+        step: u32,
+        surface_normals: &mut Vec<Vec3>,
+    ) {
         self.near.clear();
-        of_surface.clear();
+        surface_normals.clear();
         self.deepest = 0.0;
         for &i in &self.kept {
             if !is_aim_sample(self.points.index[i as usize], step) {
                 continue;
             }
-            let point = self.points.point(i as usize);
-            let (distance, normal) = exact.project(point);
+            let (distance, normal) = exact.project(self.points.point(i as usize));
             self.deepest = self.deepest.max(-distance);
             if distance <= reach + self.points.further(i as usize) {
                 self.near.push(i);
-                of_surface.normals.push(normal);
-                of_surface.points.push(point - distance * normal);
+                surface_normals.push(normal);
             }
         }
     }
@@ -241,10 +243,10 @@ mod tests {
         let cloud = PointCloud::builder(&points).radii(radii);
         let cloud = cloud.build().expect("a valid cloud");
         let mut side = side_of(&cloud);
-        let mut samples = NearSamples::default();
+        let mut normals = Vec::new();
         let (exact, frame) = (here(&Ball), Pose3::IDENTITY);
         let mean = cloud.mean_radius();
-        assert!(side.near_exact(&cloud, &frame, &exact, mean, &mut samples));
+        assert!(side.near_exact(&cloud, &frame, &exact, mean, &mut normals));
         for (k, &height) in heights.iter().enumerate() {
             let reach = radius(k).max(mean);
             if (height - reach).abs() > 1e-3 * reach {
@@ -320,14 +322,12 @@ mod tests {
         }
         let cloud = cloud_of(&points);
         let mut side = side_of(&cloud);
-        let mut samples = NearSamples::default();
+        let mut normals = Vec::new();
         let exact = here(&Ball);
-        assert!(side.near_exact(&cloud, &Pose3::IDENTITY, &exact, REACH, &mut samples));
+        assert!(side.near_exact(&cloud, &Pose3::IDENTITY, &exact, REACH, &mut normals));
         assert_eq!(side.near, near.map(|i| i as u32));
-        for (k, i) in near.into_iter().enumerate() {
-            let outward = points[i].normalize();
-            assert!(samples.normals[k].dot(outward) > 0.999);
-            assert!(samples.points[k].distance(outward) < 1e-5);
+        for (i, normal) in near.into_iter().zip(normals) {
+            assert!(normal.dot(points[i].normalize()) > 0.999);
         }
     }
 
