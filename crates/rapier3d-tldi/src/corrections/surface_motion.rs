@@ -35,6 +35,8 @@ pub(crate) struct SurfaceMotions {
 /// Of a cloud that deformed.
 struct SurfaceMotion {
     collider: ColliderHandle,
+    /// Of the points whose velocities these are. The collider may get others without a word to the pipeline.
+    revision: u64,
     /// Of each point, in the collider's frame, m/s.
     velocities: Vec<Vector>,
 }
@@ -84,20 +86,21 @@ impl SurfaceMotions {
         snapshot
     }
 
-    /// Records that the points `before` moved to those of `cloud` within `dt` seconds.
+    /// Records that the points `before` moved to those of `shape` within `dt` seconds.
     pub(crate) fn record(
         &mut self,
         collider: ColliderHandle,
         mut before: Vec<Vector>,
-        cloud: &PointCloud<'_>,
+        shape: &PointCloudShape,
         dt: f32,
     ) {
-        for (old, new) in before.iter_mut().zip(cloud.points()) {
+        for (old, new) in before.iter_mut().zip(shape.cloud().points()) {
             *old = (new - *old) / dt;
         }
         self.forget(collider);
         self.motions.push(SurfaceMotion {
             collider,
+            revision: shape.revision(),
             velocities: before,
         });
     }
@@ -203,6 +206,9 @@ impl SurfaceMotions {
         let pose = found.position();
         let local = pose.inverse_transform_point(point);
         if let Some(motion) = self.motions.iter().find(|m| m.collider == collider) {
+            if motion.revision != shape.revision() {
+                return Vector::ZERO;
+            }
             return pose.rotation * mean_near(shape.cloud(), &motion.velocities, local);
         }
         let sampled = (self.sampled.iter()).find(|m| m.collider == collider && m.is_moving());
@@ -218,13 +224,10 @@ impl SurfaceMotions {
 }
 
 /// Mean of the values of the points near `point`, weighted by nearness; of the nearest where none
-/// is within two radii. Zero if the cloud has got other points since the values were recorded.
+/// is within two radii.
 fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector {
     let reach = 2.0 * cloud.mean_radius();
     let points = cloud.points();
-    if points.len() != values.len() {
-        return Vector::ZERO;
-    }
     let (mut sum, mut total) = (Vector::ZERO, 0.0);
     let mut nearest = (f32::INFINITY, Vector::ZERO);
     for (block, bounds) in cloud.blocks().iter().enumerate() {

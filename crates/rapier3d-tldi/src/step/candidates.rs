@@ -91,9 +91,9 @@ impl CandidateSearch {
             let margin = Vector::splat(slack + collider.contact_skin() + soft_ccd);
             let bounds = collider.shape().compute_aabb(&pose_of(collider, bodies));
             let (min, max) = (bounds.mins - margin, bounds.maxs + margin);
-            let is_moving_sanely =
+            let has_speed =
                 parent.is_none_or(|body| body.linvel().is_finite() && body.angvel().is_finite());
-            if min.is_nan() || max.is_nan() || !is_moving_sanely {
+            if min.is_nan() || max.is_nan() || !has_speed {
                 continue; // rapier quarantines it
             }
             self.proxies.push(Proxy {

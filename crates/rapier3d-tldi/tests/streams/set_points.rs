@@ -265,6 +265,26 @@ fn a_surface_that_jumps_does_not_throw() -> TestResult {
     Ok(())
 }
 
+/// Velocities are those of the points that a deforming surface has: a shape that takes its place in the same frame, with as
+/// many points or with fewer, has none.
+#[test]
+fn another_shape_has_no_motion() -> TestResult {
+    for size in [1.6, 0.8] {
+        let (mut world, mut tldi) = attached();
+        let floor = insert_floor(&mut world, 1.6);
+        let (body, _) = world.insert(dynamic_at(HALF), tldi.collider(cloud(&cube(HALF))));
+        let slid: Vec<Vector> = square(1.6).iter().map(|p| *p + 0.1 * Vector::X).collect();
+        tldi.deform(&mut world, floor, &slid, None)?;
+        let shape = PointCloudShape::new(cloud(&square(size)));
+        world.colliders[floor].set_shape(SharedShape::new(shape));
+        tldi.step(&mut world)?;
+        // 0.1 m in a step are 6 m/s.
+        let speed = world.bodies[body].linvel().length();
+        assert!(speed < 0.01, "{size}: {speed}");
+    }
+    Ok(())
+}
+
 /// A surface comes to rest when it is not moved any more, and other points are no motion.
 #[test]
 fn motion_lasts_for_a_step() -> TestResult {

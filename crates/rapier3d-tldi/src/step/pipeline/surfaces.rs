@@ -296,7 +296,7 @@ impl TldiPipeline {
         let after = cloud_of(colliders, collider)?.clone();
         // Without a time there is no velocity, and dropped points leave none to compare with.
         if dt > 0.0 && after.cloud().len() == before.len() {
-            self.motions.record(collider, before, after.cloud(), dt);
+            self.motions.record(collider, before, &after, dt);
             if let Some(collider) = colliders.get_mut(collider) {
                 let hooks = collider.active_hooks() | ActiveHooks::MODIFY_SOLVER_CONTACTS;
                 collider.set_active_hooks(hooks);
