@@ -2,6 +2,7 @@
 
 mod common;
 
+use common::{CORNERS, SIDES, cube_as_stl};
 use std::fs;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
@@ -79,26 +80,6 @@ fn normals_of_a_file_have_a_side_only_if_they_agree() {
     }
 }
 
-/// Corners of a cube of 2 m, as Blender saves it, and its sides, anticlockwise as seen from outside.
-const CORNERS: [[f32; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-    [1.0, 1.0, 1.0],
-];
-const SIDES: [[usize; 4]; 6] = [
-    [0, 2, 3, 1],
-    [4, 5, 7, 6],
-    [0, 1, 5, 4],
-    [2, 6, 7, 3],
-    [0, 4, 6, 2],
-    [1, 3, 7, 5],
-];
-
 fn cube_as_ply() -> String {
     let mut text = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n\
         property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
@@ -112,19 +93,6 @@ fn cube_as_ply() -> String {
         text += &format!("4 {a} {b} {c} {d}\n");
     }
     text
-}
-
-fn cube_as_stl() -> String {
-    let halves = SIDES.iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
-    let facets = halves.map(|corners| {
-        let vertex = |k: &usize| {
-            let [x, y, z] = CORNERS[*k];
-            format!("vertex {x} {y} {z}\n")
-        };
-        let vertices: String = corners.into_iter().map(vertex).collect();
-        format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
-    });
-    format!("solid\n{}endsolid\n", facets.collect::<String>())
 }
 
 fn cube_as_obj() -> String {

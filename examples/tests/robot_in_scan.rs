@@ -3,8 +3,8 @@
 mod common;
 
 use common::{
-    PICTURES, TIMES, assert_keys, assert_pictures, assert_refused, data, folder, json, number, run,
-    seeded_report, stderr, write_ply,
+    PICTURES, TIMES, assert_keys, assert_pictures, assert_refused, cube_as_stl, data, folder, json,
+    number, run, seeded_report, stderr, write_ply,
 };
 use serde_json::Value;
 use std::fs;
@@ -260,7 +260,7 @@ fn what_is_missing_is_named_and_the_rest_is_used() {
         format!(
             r#"<robot name="arm">
               <link name="base"><collision><geometry><box size="0.2 0.2 0.1"/></geometry></collision></link>
-              <link name="boom"><visual><origin xyz="0 0 0.3"/><geometry><mesh filename="{mesh}" scale="0.1 0.1 0.5"/></geometry></visual></link>
+              <link name="boom"><visual><origin xyz="0 0 0.3"/><geometry><mesh filename="{mesh}" scale="0.05 0.05 0.25"/></geometry></visual></link>
               <link name="frame"/>
               <joint name="lift" type="revolute"><parent link="base"/><child link="boom"/><origin xyz="0 0 0.1"/>
                 <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="50" velocity="1"/></joint>
@@ -271,30 +271,9 @@ fn what_is_missing_is_named_and_the_rest_is_used() {
             </robot>"#
         )
     };
-    let cube = "solid cube\n".to_owned()
-        + &[
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ]
-        .iter()
-        .flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]])
-        .map(|corners| {
-            let vertex = |k: &&i32| {
-                let bit = |n: i32| f64::from(*k >> n & 1) - 0.5;
-                format!("vertex {} {} {}\n", bit(0), bit(1), bit(2))
-            };
-            let vertices: String = corners.iter().map(vertex).collect();
-            format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
-        })
-        .collect::<String>()
-        + "endsolid cube\n";
     fs::create_dir_all(folder.join("my_robot/meshes")).unwrap();
     fs::create_dir_all(folder.join("my_robot/urdf")).unwrap();
-    fs::write(folder.join("my_robot/meshes/cube.stl"), cube).unwrap();
+    fs::write(folder.join("my_robot/meshes/cube.stl"), cube_as_stl()).unwrap();
     let options = [
         "--urdf",
         "my_robot/urdf/arm.urdf",

@@ -33,6 +33,12 @@ fn random_normal(rng: &mut Rng) -> Vec3 {
     Vec3::new(number(), number(), number() + 1e-3).normalize()
 }
 
+fn random_colors(rng: &mut Rng, count: usize) -> Vec<[u8; 3]> {
+    (0..count)
+        .map(|_| [rng.u8(..), rng.u8(..), rng.u8(..)])
+        .collect()
+}
+
 fn written(v: Vec3, decimals: usize) -> String {
     format!("{:.decimals$} {:.decimals$} {:.decimals$}", v.x, v.y, v.z)
 }
@@ -41,9 +47,7 @@ fn written(v: Vec3, decimals: usize) -> String {
 #[test]
 fn xyzrgb_files_have_colors() {
     let mut rng = Rng::with_seed(1);
-    let colors: Vec<[u8; 3]> = (0..200)
-        .map(|_| [rng.u8(..), rng.u8(..), rng.u8(..)])
-        .collect();
+    let colors = random_colors(&mut rng, 200);
     let file = lines(200, |i| {
         let [r, g, b] = colors[i].map(|c| f64::from(c) / 255.0);
         format!("{r:.10} {g:.10} {b:.10}")
@@ -133,9 +137,7 @@ fn six_columns_are_normals_by_their_length() {
 #[test]
 fn six_columns_are_colors_by_their_whole_numbers() {
     let mut rng = Rng::with_seed(4);
-    let colors: Vec<[u8; 3]> = (0..200)
-        .map(|_| [rng.u8(..), rng.u8(..), rng.u8(..)])
-        .collect();
+    let colors = random_colors(&mut rng, 200);
     let file = lines(200, |i| {
         let [r, g, b] = colors[i];
         format!("{r} {g} {b}")

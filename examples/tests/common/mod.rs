@@ -29,6 +29,40 @@ pub(crate) fn write_ply(path: &Path, points: &[[f32; 3]]) {
     fs::write(path, text).unwrap();
 }
 
+/// Corners of a cube of 2 m about the origin, as Blender saves it, and its sides, anticlockwise as seen from outside.
+pub(crate) const CORNERS: [[f32; 3]; 8] = [
+    [-1.0, -1.0, -1.0],
+    [1.0, -1.0, -1.0],
+    [-1.0, 1.0, -1.0],
+    [1.0, 1.0, -1.0],
+    [-1.0, -1.0, 1.0],
+    [1.0, -1.0, 1.0],
+    [-1.0, 1.0, 1.0],
+    [1.0, 1.0, 1.0],
+];
+pub(crate) const SIDES: [[usize; 4]; 6] = [
+    [0, 2, 3, 1],
+    [4, 5, 7, 6],
+    [0, 1, 5, 4],
+    [2, 6, 7, 3],
+    [0, 4, 6, 2],
+    [1, 3, 7, 5],
+];
+
+/// The cube as ASCII STL, whose solid has no name.
+pub(crate) fn cube_as_stl() -> String {
+    let halves = SIDES.iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    let facets = halves.map(|corners| {
+        let vertex = |k: &usize| {
+            let [x, y, z] = CORNERS[*k];
+            format!("vertex {x} {y} {z}\n")
+        };
+        let vertices: String = corners.into_iter().map(vertex).collect();
+        format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
+    });
+    format!("solid\n{}endsolid\n", facets.collect::<String>())
+}
+
 /// The pictures of a run.
 pub(crate) const PICTURES: [&str; 3] = ["initial.png", "mid.png", "final.png"];
 

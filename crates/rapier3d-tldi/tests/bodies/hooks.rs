@@ -8,7 +8,7 @@ use rapier3d_tldi::prelude::*;
 use std::sync::Mutex;
 use std::sync::mpsc::channel;
 
-/// Half the edges of the floor, metres.
+/// Half the edges of the floor, metres: the cube of 0.4 m slides by less than a metre on it.
 const FLOOR: f32 = 1.6;
 
 /// Of a deforming floor, m/s.
@@ -74,64 +74,73 @@ impl PhysicsHooks for UserHooks {
     }
 }
 
-/// A world with a floor and a cube of clouds that lies on it, both with these hooks.
-fn cube_on_floor(
-    hooks: ActiveHooks,
-) -> (
-    PhysicsWorld,
-    TldiPipeline,
-    RigidBodyHandle,
-    [ColliderHandle; 2],
-) {
-    let (mut world, tldi) = attached();
-    let floor = insert_floor(&mut world, FLOOR);
-    let collider = tldi.collider(cloud(&cube(HALF))).active_hooks(hooks);
-    let (body, cube) = world.insert(dynamic_at(HALF), collider);
-    (world, tldi, body, [cube, floor])
+/// A cube that lies on a floor, both clouds.
+struct CubeOnFloor {
+    world: PhysicsWorld,
+    tldi: TldiPipeline,
+    body: RigidBodyHandle,
+    /// The cube and the floor.
+    pair: [ColliderHandle; 2],
 }
 
-/// Steps for a second, with the floor sliding if it deforms.
-fn run(
-    world: &mut PhysicsWorld,
-    tldi: &mut TldiPipeline,
-    floor: ColliderHandle,
-    deforms: bool,
-    hooks: &dyn PhysicsHooks,
-) -> TestResult {
-    let step = world.integration_parameters.dt * SLIDE;
-    for k in 1..=60 {
-        if deforms {
-            let points: Vec<Vector> = square(FLOOR).iter().map(|p| *p + k as f32 * step).collect();
-            tldi.deform(world, floor, &points, None)?;
+impl CubeOnFloor {
+    /// The cube has these hooks.
+    fn new(hooks: ActiveHooks) -> Self {
+        let (mut world, tldi) = attached();
+        let floor = insert_floor(&mut world, FLOOR);
+        let collider = tldi.collider(cloud(&cube(HALF))).active_hooks(hooks);
+        let (body, cube) = world.insert(dynamic_at(HALF), collider);
+        Self {
+            world,
+            tldi,
+            body,
+            pair: [cube, floor],
         }
-        tldi.step_with_events(world, hooks, &())?;
     }
-    Ok(())
+
+    /// Steps for a second, with the floor sliding if it deforms.
+    fn run(&mut self, deforms: bool, hooks: &dyn PhysicsHooks) -> TestResult {
+        let Self { world, tldi, .. } = self;
+        let step = world.integration_parameters.dt * SLIDE;
+        for k in 1..=60 {
+            if deforms {
+                let points: Vec<Vector> =
+                    square(FLOOR).iter().map(|p| *p + k as f32 * step).collect();
+                tldi.deform(world, self.pair[1], &points, None)?;
+            }
+            tldi.step_with_events(world, hooks, &())?;
+        }
+        Ok(())
+    }
+
+    /// [`run`](Self::run) with hooks that let the pair touch or do not.
+    fn run_letting(&mut self, lets: bool, deforms: bool) -> TestResult {
+        self.run(deforms, &UserHooks::new(self.pair, lets))
+    }
+
+    /// Of the body above where it lies, metres.
+    fn height(&self) -> f32 {
+        self.world.bodies[self.body].translation().y - HALF
+    }
 }
+
+/// All ways to deform or not, and to let or not.
+const CASES: [[bool; 2]; 4] = [[false, false], [false, true], [true, false], [true, true]];
 
 /// The body falls through what the hook filters out, and lies on what it lets.
 #[test]
 fn filtered_pairs_do_not_touch() -> TestResult {
-    for deforms in [false, true] {
-        for lets in [false, true] {
-            let (mut world, mut tldi, body, pair) =
-                cube_on_floor(ActiveHooks::FILTER_CONTACT_PAIRS);
-            run(
-                &mut world,
-                &mut tldi,
-                pair[1],
-                deforms,
-                &UserHooks::new(pair, lets),
-            )?;
-            let height = world.bodies[body].translation().y - HALF;
-            // A second of free fall: 4.9 m.
-            let falls = height < -4.5;
-            let lies = height.abs() < 0.02;
-            assert!(
-                if lets { lies } else { falls },
-                "{deforms} {lets}: {height} m"
-            );
-        }
+    for [deforms, lets] in CASES {
+        let mut scene = CubeOnFloor::new(ActiveHooks::FILTER_CONTACT_PAIRS);
+        scene.run_letting(lets, deforms)?;
+        let height = scene.height();
+        // A second of free fall: 4.9 m.
+        let falls = height < -4.5;
+        let lies = height.abs() < 0.02;
+        assert!(
+            if lets { lies } else { falls },
+            "{deforms} {lets}: {height} m"
+        );
     }
     Ok(())
 }
@@ -139,24 +148,16 @@ fn filtered_pairs_do_not_touch() -> TestResult {
 /// A sensor on the floor sees the body only if the hook lets it.
 #[test]
 fn filtered_sensors_do_not_see() -> TestResult {
-    for deforms in [false, true] {
-        for lets in [false, true] {
-            let (mut world, mut tldi, _, pair) =
-                cube_on_floor(ActiveHooks::FILTER_INTERSECTION_PAIR);
-            world.colliders[pair[0]].set_sensor(true);
-            let body = world.colliders[pair[0]].parent().expect("it has a body");
-            world.bodies[body].set_gravity_scale(0.0, true);
-            world.bodies[body].set_translation(Vector::Y * 0.5 * HALF, true);
-            run(
-                &mut world,
-                &mut tldi,
-                pair[1],
-                deforms,
-                &UserHooks::new(pair, lets),
-            )?;
-            let sees = world.narrow_phase.intersection_pair(pair[0], pair[1]);
-            assert_eq!(sees.unwrap_or(false), lets, "deforms: {deforms}");
-        }
+    for [deforms, lets] in CASES {
+        let mut scene = CubeOnFloor::new(ActiveHooks::FILTER_INTERSECTION_PAIR);
+        let [cube, floor] = scene.pair;
+        scene.world.colliders[cube].set_sensor(true);
+        let body = &mut scene.world.bodies[scene.body];
+        body.set_gravity_scale(0.0, true);
+        body.set_translation(Vector::Y * 0.5 * HALF, true);
+        scene.run_letting(lets, deforms)?;
+        let sees = scene.world.narrow_phase.intersection_pair(cube, floor);
+        assert_eq!(sees.unwrap_or(false), lets, "deforms: {deforms}");
     }
     Ok(())
 }
@@ -166,10 +167,10 @@ fn filtered_sensors_do_not_see() -> TestResult {
 #[test]
 fn modified_contacts_reach_the_solver() -> TestResult {
     for deforms in [false, true] {
-        let (mut world, mut tldi, body, pair) = cube_on_floor(ActiveHooks::MODIFY_SOLVER_CONTACTS);
-        let mut hooks = UserHooks::new(pair, true);
+        let mut scene = CubeOnFloor::new(ActiveHooks::MODIFY_SOLVER_CONTACTS);
+        let mut hooks = UserHooks::new(scene.pair, true);
         hooks.belt = Vector::X * 0.5;
-        run(&mut world, &mut tldi, pair[1], deforms, &hooks)?;
+        scene.run(deforms, &hooks)?;
         let surface = if deforms { SLIDE } else { Vector::ZERO };
         let seen = hooks.seen.into_inner()?;
         assert!(seen.len() >= 60, "{} contacts", seen.len());
@@ -182,7 +183,7 @@ fn modified_contacts_reach_the_solver() -> TestResult {
             );
         }
         // Friction of 0.5 brings it to the speed within 0.2 s.
-        let speed = world.bodies[body].linvel();
+        let speed = scene.world.bodies[scene.body].linvel();
         let expected = surface + hooks.belt;
         assert!(
             (speed - expected).length() < 0.05,
@@ -196,15 +197,9 @@ fn modified_contacts_reach_the_solver() -> TestResult {
 #[test]
 fn cleared_contacts_hold_nothing() -> TestResult {
     for deforms in [false, true] {
-        let (mut world, mut tldi, body, pair) = cube_on_floor(ActiveHooks::MODIFY_SOLVER_CONTACTS);
-        run(
-            &mut world,
-            &mut tldi,
-            pair[1],
-            deforms,
-            &UserHooks::new(pair, false),
-        )?;
-        let height = world.bodies[body].translation().y - HALF;
+        let mut scene = CubeOnFloor::new(ActiveHooks::MODIFY_SOLVER_CONTACTS);
+        scene.run_letting(false, deforms)?;
+        let height = scene.height();
         assert!(height < -4.5, "{deforms}: {height} m");
     }
     Ok(())
@@ -214,7 +209,12 @@ fn cleared_contacts_hold_nothing() -> TestResult {
 #[test]
 fn contacts_begin_push_and_end() -> TestResult {
     for removes in [false, true] {
-        let (mut world, mut tldi, body, [cube, floor]) = cube_on_floor(ActiveHooks::empty());
+        let CubeOnFloor {
+            mut world,
+            mut tldi,
+            body,
+            pair: [cube, floor],
+        } = CubeOnFloor::new(ActiveHooks::empty());
         let (events, forces) = (
             ActiveEvents::COLLISION_EVENTS,
             ActiveEvents::CONTACT_FORCE_EVENTS,
