@@ -7,9 +7,10 @@ use tldi::{KdTree, PointCloud};
 use tldi_sources::RawCloud;
 
 /// Edge of a face, in spacings of the points that are wanted, from which on the face counts as large. Corners twice or three
-/// times as far apart as wanted still show what the surface is; those of a cube do not.
+/// times as far apart as wanted still show what the surface is; those of a cube do not. Half or twice: no test changes.
 const LONG_EDGE: f32 = 4.0;
-/// Share of the surface that must be in large faces: less of it closes the holes of a scan, where nothing was seen.
+/// Share of the surface that must be in large faces: less of it closes the holes of a scan, where nothing was seen. Half
+/// or twice: no test changes.
 const LARGE_SHARE: f64 = 0.1;
 
 /// Whether the points are the corners of faces, of which many have edges that are long compared with `spacing`. A cloud

@@ -16,7 +16,8 @@ use tldi_sources::{RawCloud, ReadOptions};
 const SCAN_NORMAL_NEIGHBORS: usize = 24;
 /// Neighbours for the normals of a body that brings none.
 const BODY_NORMAL_NEIGHBORS: usize = 16;
-/// Points that a mesh has along its longest side, as a scan and as a body. A room of 5 m gets a point every 2 cm.
+/// Points that a mesh has along its longest side, as a scan and as a body: a room of 5 m gets a point every 2 cm, a box of
+/// 20 cm every 3 mm. The number of points grows with the square: 350,000 on the walls of a cube, 22,000 on a body of that shape.
 const SCAN_ACROSS: f32 = 240.0;
 const BODY_ACROSS: f32 = 60.0;
 /// Extents in metres that a body from a file is believed to have in earnest.

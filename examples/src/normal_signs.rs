@@ -4,14 +4,15 @@ use rayon::prelude::*;
 use tldi::glamx::Vec3;
 use tldi::{KdTree, PointCloud};
 
-/// Neighbours that a normal is compared with: some of them lie along the surface, whatever its noise.
+/// Neighbours that a normal is compared with: some of them lie along the surface, whatever its noise. Half or twice: no test
+/// changes.
 const NEIGHBORS: usize = 8;
 /// Share of normals that must be turned, from which on they are taken for normals without a side. Where signs come from
 /// a solver of eigenvalues, it is about a half of a closed surface. A sheet that is far thinner than its points are apart
-/// looks like one surface with both signs: a flag or an ear may be that much of a body.
+/// looks like one surface with both signs: a flag or an ear may be that much of a body. Half or twice: no test changes.
 const TURNED_SHARE: f64 = 0.05;
 /// Least improvement by turning them: what contradicts the turned normals, as a share of what contradicts those of the file.
-/// If signs of the file are right, but a neighbour misled, turning makes it worse.
+/// If signs of the file are right, but a neighbour misled, turning makes it worse. Half or twice: no test changes.
 const REST_SHARE: f64 = 0.5;
 
 /// Two points, and what they say about their normals.

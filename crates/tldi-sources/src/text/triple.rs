@@ -3,7 +3,8 @@
 use std::ops::Range;
 use tldi::glamx::Vec3;
 
-/// How far the length of a normal may be from 1: two decimals of each component.
+/// How far the length of a normal may be from 1: each component may be rounded to two decimals. With half of it such normals
+/// are refused; twice of it takes more colours from 0 to 1 for normals.
 const LENGTH_TOLERANCE: f64 = 0.01;
 
 /// Colours, normals, or neither.
