@@ -4,7 +4,7 @@
 @group(0) @binding(1) var<storage, read> pairs: array<Pair>;
 @group(0) @binding(7) var<storage, read_write> views: array<View>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
-@group(0) @binding(10) var<storage, read_write> samples: array<vec4f>;
+@group(0) @binding(10) var<storage, read_write> samples: array<Sample>;
 @group(0) @binding(14) var<storage, read_write> found: array<atomic<u32>>;
 
 const LANES: u32 = 64u;
@@ -13,13 +13,22 @@ const STEPS: f32 = 1048576.0;
 
 // Σ n nᵀ (xx, yy, zz, xy, xz, yz) of each side.
 var<workgroup> moments: array<atomic<i32>, 12>;
-// Of each side: normals not seen by earlier views, those that face the axis, Σ n·axis over these.
+// Of each side: normals not seen by earlier views, Σ (n·axis)³ n over these, Σ n·axis over those that face the axis or
+// its opposite.
 var<workgroup> unseen_count: array<atomic<u32>, 2>;
-var<workgroup> facing_count: array<atomic<u32>, 2>;
+var<workgroup> turned_sum: array<atomic<i32>, 6>;
 var<workgroup> facing_sum: array<atomic<i32>, 2>;
+// Of each side the points that face the axis, its opposite, and neither: how many, Σ of their places along the axis from
+// the least corner of the overlap, in shares of its diagonal, and Σ of the squares of these.
+var<workgroup> place_count: array<atomic<u32>, 6>;
+var<workgroup> place_sum: array<atomic<i32>, 6>;
+var<workgroup> place_squares: array<atomic<i32>, 6>;
 
 var<workgroup> axis: vec3f;
 var<workgroup> is_done: bool;
+// Another direction has nearly as much of the normals: the axis turns to a face.
+var<workgroup> is_turning: bool;
+var<workgroup> proposed: vec3f;
 // No normals: the axis is what it is.
 var<workgroup> is_forced: bool;
 // The last axis is asked about in place of the proposed one.
@@ -76,14 +85,81 @@ fn with_outer(m: Symmetric, weight: f32, v: vec3f) -> Symmetric {
     );
 }
 
+// Bits of the classes of points in the sums of places.
+const FACES_AXIS: u32 = 1u;
+const FACES_OPPOSITE: u32 = 2u;
+const FACES: u32 = 3u;
+const ALL: u32 = 7u;
+
+fn facing_count(s: u32) -> f32 {
+    return f32(atomicLoad(&place_count[3u * s]) + atomicLoad(&place_count[3u * s + 1u]));
+}
+
 // Mean of n·axis over the normals that face it or its opposite, if they tell the outside.
 fn mean_along(pair: u32, s: u32) -> f32 {
     let side = 2u * pair + s;
-    let count = f32(atomicLoad(&facing_count[s]));
+    let count = facing_count(s);
     if (pairs[pair].sides[s].flags & ORIENTED) == 0u || count < LEAST_SHARE * f32(sample_count(side)) {
         return 0.0;
     }
     return f32(atomicLoad(&facing_sum[s])) / STEPS / max(count, 1.0);
+}
+
+fn overlap_diagonal(pair: u32) -> f32 {
+    return max(length(pairs[pair].overlap_max - pairs[pair].overlap_min), 1.0e-30);
+}
+
+// Where points of a side are along the axis from the least corner of the overlap, metres.
+struct PlaceAlong {
+    mean: f32,
+    scatter: f32,
+    // Whether these points are enough.
+    exists: bool,
+}
+
+fn place_along(pair: u32, s: u32, classes: u32) -> PlaceAlong {
+    var count = 0.0;
+    var sum = 0.0;
+    var squares = 0.0;
+    for (var c = 0u; c < 3u; c++) {
+        if (classes & (1u << c)) != 0u {
+            count += f32(atomicLoad(&place_count[3u * s + c]));
+            sum += f32(atomicLoad(&place_sum[3u * s + c]));
+            squares += f32(atomicLoad(&place_squares[3u * s + c]));
+        }
+    }
+    let scale = 1.0 / (STEPS * max(count, 1.0));
+    let mean = scale * sum;
+    let diagonal = overlap_diagonal(pair);
+    return PlaceAlong(
+        diagonal * mean,
+        diagonal * sqrt(max(scale * squares - mean * mean, 0.0)),
+        count > 0.0 && count >= LEAST_SHARE * f32(sample_count(2u * pair + s)),
+    );
+}
+
+// Of the points that face the axis (`sign` 1) or its opposite (-1); of all, if the outside is not known.
+fn facing_place(pair: u32, s: u32, sign: f32) -> PlaceAlong {
+    let is_oriented = (pairs[pair].sides[s].flags & ORIENTED) != 0u;
+    let facing = select(FACES_OPPOSITE, FACES_AXIS, sign > 0.0);
+    return place_along(pair, s, select(ALL, facing, is_oriented));
+}
+
+// Whether the axis points from `b` towards `a` (1) or the other way (-1), as far as the near points tell; or 0.
+fn side_by_places(pair: u32) -> i32 {
+    let a_ahead = facing_place(pair, 0u, -1.0);
+    let b_ahead = facing_place(pair, 1u, 1.0);
+    let a_back = facing_place(pair, 0u, 1.0);
+    let b_back = facing_place(pair, 1u, -1.0);
+    let is_ahead = a_ahead.exists && b_ahead.exists;
+    let is_back = a_back.exists && b_back.exists;
+    if is_ahead && is_back {
+        let further = 0.5 * (a_ahead.mean - b_ahead.mean + a_back.mean - b_back.mean);
+        let scatter = max(a_ahead.scatter + b_ahead.scatter, a_back.scatter + b_back.scatter);
+        return select(0, select(-1, 1, further > 0.0), abs(further) > scatter);
+    }
+    let are_oriented = (pairs[pair].sides[0].flags & pairs[pair].sides[1].flags & ORIENTED) != 0u;
+    return select(0, i32(is_ahead) - i32(is_back), are_oriented);
 }
 
 // 1: true, -1: false, 0: inconclusive.
@@ -91,29 +167,27 @@ fn conclusive(sign: f32) -> i32 {
     return select(0, select(-1, 1, sign > 0.0), abs(sign) >= CONCLUSIVE);
 }
 
-// Mean of the near points of the larger surface, if that may be a sheet; w is 1 then.
-fn sheet_of(pair: u32) -> vec4f {
-    let side = 2u * pair + (1u - pairs[pair].body_is_b);
-    if (pairs[pair].sides[side % 2u].flags & ORIENTED) != 0u {
-        return vec4f();
-    }
-    let state = batch.sides_at + side * SIDE_WORDS;
-    let low = pairs[pair].overlap_min;
-    let extents = pairs[pair].overlap_max - low;
-    let count = f32(max(atomicLoad(&work[state + NEAR_COUNT]), 1u));
-    var mean = vec3f();
-    for (var k = 0u; k < 3u; k++) {
-        let upper = f32(atomicLoad(&work[state + NEAR_HIGH + k]));
-        let lower = f32(atomicLoad(&work[state + NEAR_LOW + k]));
-        mean[k] = (upper * 65536.0 + lower) / count / PLACE_STEPS;
-    }
-    return vec4f(low + mean * extents, 1.0);
+// Where along the axis the larger surface faces it or its opposite, if that may be a sheet.
+struct Sheet {
+    along: f32,
+    exists: bool,
+}
+
+fn sheet_of(pair: u32) -> Sheet {
+    let s = 1u - pairs[pair].body_is_b;
+    let faces = place_along(pair, s, FACES);
+    let all = place_along(pair, s, ALL);
+    let along = select(all.mean, faces.mean, faces.exists);
+    return Sheet(
+        dot(pairs[pair].overlap_min, axis) + along,
+        (pairs[pair].sides[s].flags & ORIENTED) == 0u,
+    );
 }
 
 // How far along the axis `b`, off by `offset`, is from `a`, from the sheet to the body's middle or the
 // opposite, in half extents of the body.
-fn share_along(pair: u32, sheet: vec4f, offset: vec3f) -> f32 {
-    let toward_body = pairs[pair].body_middle - sheet.xyz;
+fn share_along(pair: u32, sheet: Sheet, offset: vec3f) -> f32 {
+    let toward_body = dot(pairs[pair].body_middle, axis) - sheet.along;
     let toward_b = select(-toward_body, toward_body, pairs[pair].body_is_b != 0u);
     let in_body = vec3f(
         dot(pairs[pair].body_from_a_x, axis),
@@ -121,12 +195,12 @@ fn share_along(pair: u32, sheet: vec4f, offset: vec3f) -> f32 {
         dot(pairs[pair].body_from_a_z, axis),
     );
     let half = dot(pairs[pair].body_half_extents, abs(in_body));
-    return dot(toward_b + offset, axis) / max(half, 1e-30);
+    return (toward_b + dot(offset, axis)) / max(half, 1e-30);
 }
 
 // Whether `b`, off by `offset`, is plainly on the side of `a` that the axis points away from (1), or
 // on the other (-1): by where it lies at the sheet, or by where the bounds meet.
-fn side_of(pair: u32, sheet: vec4f, offset: vec3f) -> i32 {
+fn side_of(pair: u32, sheet: Sheet, offset: vec3f) -> i32 {
     var along = dot(pairs[pair].lies + offset, axis);
     let in_larger = vec3f(
         dot(pairs[pair].larger_from_a_x, axis),
@@ -134,7 +208,7 @@ fn side_of(pair: u32, sheet: vec4f, offset: vec3f) -> i32 {
         dot(pairs[pair].larger_from_a_z, axis),
     );
     var most = dot(pairs[pair].half_extents, abs(in_larger));
-    if sheet.w > 0.0 {
+    if sheet.exists {
         along = share_along(pair, sheet, offset);
         most = PLAINLY;
     }
@@ -152,21 +226,19 @@ fn orientation(pair: u32) -> i32 {
     if pairs[pair].has_last != 0u {
         by_memory = conclusive(dot(axis, pairs[pair].last_axis));
     }
-    // What was remembered may plainly not be.
-    let contradicted = sheet.w > 0.0 && now == -by_memory && before != by_memory;
-    by_memory = select(by_memory, 0, contradicted);
+    let by_places = side_by_places(pair);
+    by_memory = select(by_memory, 0, by_places == -by_memory);
     let of_a = mean_along(pair, 0u);
     let of_b = mean_along(pair, 1u);
-    let by_both = select(0, conclusive(of_b), conclusive(of_b) == conclusive(-of_a));
     let is_crossing = abs(dot(motion, axis)) >= CROSSING * length(motion);
     let by_place = select(now, before, is_crossing && before != 0);
     // The bounds of a sheet that is not level in its own frame hold a body on either side of it.
     var by_position = -dot(axis, unit_or(pairs[pair].toward_b, vec3f()));
-    if sheet.w > 0.0 {
+    if sheet.exists {
         by_position = -share_along(pair, sheet, -motion);
     }
     var told = by_memory;
-    told = select(by_both, told, told != 0);
+    told = select(by_places, told, told != 0);
     told = select(by_place, told, told != 0);
     told = select(conclusive(of_b - of_a), told, told != 0);
     told = select(conclusive(by_position), told, told != 0);
@@ -190,14 +262,16 @@ fn propose(pair: u32, turn: u32) {
         let e = pairs[pair].half_extents;
         let is_x = e.x <= e.y && e.x <= e.z;
         let is_y = !is_x && e.y <= e.z;
-        axis = vec3f(f32(is_x), f32(is_y), f32(!is_x && !is_y));
+        axis = select(pairs[pair].larger_from_a_z, pairs[pair].larger_from_a_y, is_y);
+        axis = select(axis, pairs[pair].larger_from_a_x, is_x);
         return;
     }
     if policy == LAST_NORMAL && has_last {
         axis = unit_or(pairs[pair].last_axis, up);
         return;
     }
-    var covariance = zone_covariance(pair);
+    let of_normals = zone_covariance(pair);
+    var covariance = of_normals;
     if policy != COVARIANCE && turn == 0u {
         let direction = unit_or(pairs[pair].toward_b, vec3f());
         covariance = with_outer(covariance, HINT_WEIGHT * pairs[pair].plainness, direction);
@@ -217,7 +291,62 @@ fn propose(pair: u32, turn: u32) {
         return;
     }
     axis = eigenvector(covariance, true);
-    if policy != COVARIANCE && turn == 0u && has_last
+    // Between faces an axis sees no contact well, but more of where surfaces cross.
+    let turns = policy != COVARIANCE && policy != ALL_DIRECTIONS;
+    is_turning = turns && is_one_of_alike(of_normals);
+    proposed = axis;
+}
+
+fn times(m: Symmetric, v: vec3f) -> vec3f {
+    return m.diagonal * v + vec3f(
+        m.rest.x * v.y + m.rest.y * v.z,
+        m.rest.x * v.x + m.rest.z * v.z,
+        m.rest.y * v.x + m.rest.z * v.y,
+    );
+}
+
+// Whether another direction across the axis has nearly as much of the normals' covariance.
+fn is_one_of_alike(covariance: Symmetric) -> bool {
+    let w = times(covariance, axis);
+    let along = dot(axis, w);
+    let crossed = vec3f(
+        axis.x * w.y + axis.y * w.x,
+        axis.x * w.z + axis.z * w.x,
+        axis.y * w.z + axis.z * w.y,
+    );
+    var across = Symmetric(covariance.diagonal - 2.0 * axis * w, covariance.rest - crossed);
+    across = with_outer(across, along, axis);
+    let d = across.diagonal;
+    if !(d.x + d.y + d.z > 0.0) {
+        return false;
+    }
+    let other = eigenvector(across, true);
+    return dot(other, times(covariance, other)) >= ALIKE * along;
+}
+
+// One step of the axis towards the face that it is nearest to; after the last one back, if there are no faces.
+fn turn_to_face(pair: u32, step: u32) {
+    var sum = vec3f();
+    for (var s = 0u; s < 2u; s++) {
+        let of_side = vec3f(
+            f32(atomicLoad(&turned_sum[3u * s])),
+            f32(atomicLoad(&turned_sum[3u * s + 1u])),
+            f32(atomicLoad(&turned_sum[3u * s + 2u])),
+        );
+        sum += of_side / (STEPS * f32(max(sample_count(2u * pair + s), 1u)));
+    }
+    let flatness = dot(sum, axis) / dot(axis, times(zone_covariance(pair), axis));
+    axis = unit_or(sum, axis);
+    if step + 1u == TURNS && !(flatness >= FLAT) {
+        axis = proposed;
+    }
+}
+
+// Keeps the last axis, if the proposed one is close to it.
+fn keep_last(pair: u32, turn: u32) {
+    let policy = pairs[pair].policy;
+    let is_zone = policy == CONTACT_ZONE || policy == ALL_DIRECTIONS;
+    if is_zone && turn == 0u && !is_forced && pairs[pair].has_last != 0u
         && abs(dot(axis, pairs[pair].last_axis)) >= cos(AXIS_HYSTERESIS) {
         axis = pairs[pair].last_axis;
     }
@@ -230,8 +359,8 @@ fn is_worthwhile(pair: u32) -> bool {
     let left_a = f32(atomicLoad(&unseen_count[0])) / a;
     let left_b = f32(atomicLoad(&unseen_count[1])) / b;
     return max(left_a, left_b) >= LEAST_SHARE
-        && f32(atomicLoad(&facing_count[0])) / a >= LEAST_SHARE
-        && f32(atomicLoad(&facing_count[1])) / b >= LEAST_SHARE;
+        && facing_count(0u) / a >= LEAST_SHARE
+        && facing_count(1u) / b >= LEAST_SHARE;
 }
 
 // Takes the proposed view, if it tells something.
@@ -276,10 +405,16 @@ fn push_view(pair: u32, sign: f32) {
     }
     for (var s = 0u; s < 2u; s++) {
         let facts = &pairs[pair].sides[s];
-        let middle = dot(view.view_z.xyz, (*facts).middle) + view.view_z.w;
-        view.middles[s] = middle;
-        if ((*facts).flags & HAS_MIDDLE) != 0u {
-            view.flags |= MIDDLE_KNOWN << s;
+        if ((*facts).flags & IS_BODY) != 0u {
+            let x = (*facts).frame_from_cloud_x;
+            let y = (*facts).frame_from_cloud_y;
+            let z = (*facts).frame_from_cloud_z;
+            let depth = view.view_z.x * x + view.view_z.y * y + view.view_z.z * z;
+            let middle = dot(depth.xyz, (*facts).middle) + depth.w + view.view_z.w;
+            let half_depth = dot(abs(depth.xyz), (*facts).half_extents);
+            view.near[s] = middle - half_depth;
+            view.far[s] = middle + half_depth;
+            view.flags |= BODY << s;
         }
         let along = sign * mean_along(pair, s);
         if select(along, -along, s == 1u) >= CONCLUSIVE {
@@ -313,6 +448,7 @@ fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lan
         is_done = near_a == 0u || near_b == 0u || !exists;
         is_forced = false;
         is_again = false;
+        is_turning = false;
         view_count = 0u;
     }
     for (var turn = 0u; turn < MAX_VIEWS; turn++) {
@@ -329,7 +465,7 @@ fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lan
                 let side = 2u * pair + s;
                 let count = sample_count(side);
                 for (var k = lane; k < count; k += LANES) {
-                    let normal = samples[side * SAMPLE_SLOTS + k].xyz;
+                    let normal = samples[side * SAMPLE_SLOTS + k].normal;
                     if is_unseen(normal) {
                         let n = rest_of(normal);
                         let d = vec3i(round_to_steps(n * n));
@@ -345,26 +481,71 @@ fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lan
         }
         workgroupBarrier();
         if lane == 0u && !is_done {
+            is_turning = false;
             propose(pair, turn);
+        }
+        for (var step = 0u; step < TURNS; step++) {
+            workgroupBarrier();
+            if lane < 6u {
+                atomicStore(&turned_sum[lane], 0);
+            }
+            workgroupBarrier();
+            if !is_done && is_turning {
+                for (var s = 0u; s < 2u; s++) {
+                    let side = 2u * pair + s;
+                    let count = sample_count(side);
+                    for (var k = lane; k < count; k += LANES) {
+                        let normal = samples[side * SAMPLE_SLOTS + k].normal;
+                        if is_unseen(normal) {
+                            let n = rest_of(normal);
+                            let along = dot(n, axis);
+                            let t = vec3i(round_to_steps(along * along * along * n));
+                            for (var c = 0u; c < 3u; c++) {
+                                atomicAdd(&turned_sum[3u * s + c], t[c]);
+                            }
+                        }
+                    }
+                }
+            }
+            workgroupBarrier();
+            if lane == 0u && !is_done && is_turning {
+                turn_to_face(pair, step);
+            }
+        }
+        workgroupBarrier();
+        if lane == 0u && !is_done {
+            keep_last(pair, turn);
         }
         for (var attempt = 0u; attempt < 2u; attempt++) {
             workgroupBarrier();
             let is_asked = !is_done && (attempt == 0u || is_again);
             if lane < 2u {
-                atomicStore(&facing_count[lane], 0u);
                 atomicStore(&facing_sum[lane], 0);
+            }
+            if lane < 6u {
+                atomicStore(&place_count[lane], 0u);
+                atomicStore(&place_sum[lane], 0);
+                atomicStore(&place_squares[lane], 0);
             }
             workgroupBarrier();
             if is_asked {
+                let low = pairs[pair].overlap_min;
+                let diagonal = overlap_diagonal(pair);
                 for (var s = 0u; s < 2u; s++) {
                     let side = 2u * pair + s;
                     let count = sample_count(side);
                     for (var k = lane; k < count; k += LANES) {
-                        let along = dot(samples[side * SAMPLE_SLOTS + k].xyz, axis);
-                        if abs(along) >= SUPPORTED {
-                            atomicAdd(&facing_count[s], 1u);
+                        let sample = samples[side * SAMPLE_SLOTS + k];
+                        let along = dot(sample.normal, axis);
+                        let is_facing = abs(along) >= SUPPORTED;
+                        if is_facing {
                             atomicAdd(&facing_sum[s], i32(round(along * STEPS)));
                         }
+                        let at = 3u * s + select(2u, select(1u, 0u, along > 0.0), is_facing);
+                        let place = clamp(dot(sample.point - low, axis) / diagonal, -1.0, 1.0);
+                        atomicAdd(&place_count[at], 1u);
+                        atomicAdd(&place_sum[at], i32(round(place * STEPS)));
+                        atomicAdd(&place_squares[at], i32(round(place * place * STEPS)));
                     }
                 }
             }

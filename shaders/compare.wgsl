@@ -12,6 +12,10 @@ struct Column {
     end: u32,
     // A sheet seen from behind: what its layers face says nothing.
     is_turned: bool,
+    // Depths between which a body lies, where its size says that it is one.
+    is_body: bool,
+    near: f32,
+    far: f32,
 }
 
 // What all pixels of a view share.
@@ -20,8 +24,6 @@ struct Look {
     // Axes of the other views, in the frame of this one.
     others: array<vec3f, 2>,
     other_count: u32,
-    middle_a: f32,
-    middle_b: f32,
 }
 
 fn column(s: u32, pixel: u32) -> Column {
@@ -29,6 +31,9 @@ fn column(s: u32, pixel: u32) -> Column {
         atomicLoad(&work[begin_at(s, pixel)]),
         atomicLoad(&work[end_at(s, pixel)]),
         false,
+        false,
+        -INFINITE,
+        INFINITE,
     );
 }
 
@@ -172,7 +177,7 @@ fn opposed(entry: vec3f, leaving: vec3f) -> bool {
 }
 
 // Depth at which the ray entered the part of a body that it leaves through layer `last`.
-fn entered_at(c: Column, last: u32, middle: f32, thickness: f32) -> f32 {
+fn entered_at(c: Column, last: u32, thickness: f32) -> f32 {
     let thin = layers[last].depth - thickness;
     for (var k = last; k > c.begin; k--) {
         let before = k - 1u;
@@ -182,11 +187,12 @@ fn entered_at(c: Column, last: u32, middle: f32, thickness: f32) -> f32 {
         let is_odd = facing_of(c, last) == EXIT && layers[before].facing != ENTRY;
         return select(layers[before].depth, thin, is_odd);
     }
-    return select(min(thin, middle), -INFINITE, facing_of(c, last) == EXIT);
+    let middle = select(thin, 0.5 * (c.near + c.far), c.is_body);
+    return min(thin, select(middle, c.near, facing_of(c, last) == EXIT));
 }
 
 // Depth at which the ray leaves the part of a body that it enters through layer `first`.
-fn left_at(c: Column, first: u32, middle: f32, thickness: f32) -> f32 {
+fn left_at(c: Column, first: u32, thickness: f32) -> f32 {
     let thin = layers[first].depth + thickness;
     for (var behind = first + 1u; behind < c.end; behind++) {
         if is_edge_on(layers[behind].normal) {
@@ -195,41 +201,57 @@ fn left_at(c: Column, first: u32, middle: f32, thickness: f32) -> f32 {
         let is_odd = facing_of(c, first) == ENTRY && layers[behind].facing != EXIT;
         return select(layers[behind].depth, thin, is_odd);
     }
-    return select(max(thin, middle), INFINITE, facing_of(c, first) == ENTRY);
+    let middle = select(thin, 0.5 * (c.near + c.far), c.is_body);
+    return max(thin, select(middle, c.far, facing_of(c, first) == ENTRY));
 }
 
-// The layer of `a` that meets layer `kb` of `b`, or NONE.
-fn met_by(look: ptr<function, Look>, a: Column, b: Column, kb: u32) -> u32 {
+// The layer of the body at the back that meets layer `kf` of the one in front, or NONE. On the other side of `a`, the
+// least way out counts.
+fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_other_side: bool) -> u32 {
     let thickness = (*look).params.thickness;
-    let entered = entered_at(b, kb, (*look).middle_b, thickness);
-    for (var ka = a.begin; ka < a.end; ka++) {
-        if facing_of(a, ka) == EXIT || is_edge_on(layers[ka].normal)
-            || entered > left_at(a, ka, (*look).middle_a, thickness) {
+    let entered = entered_at(front, kf, thickness);
+    for (var kb = back.begin; kb < back.end; kb++) {
+        let left = left_at(back, kb, thickness);
+        if facing_of(back, kb) == EXIT || is_edge_on(layers[kb].normal) || entered > left {
             continue;
         }
-        if layers[kb].depth - layers[ka].depth <= thickness
-            || opposed(layers[ka].normal, layers[kb].normal) {
-            return ka;
+        let depth = layers[kf].depth - layers[kb].depth;
+        let is_met = select(
+            depth <= thickness || opposed(layers[kb].normal, layers[kf].normal),
+            depth <= thickness && entered + depth <= left,
+            is_other_side,
+        );
+        if is_met {
+            return kb;
         }
     }
     return NONE;
 }
 
-fn contact_pixels(look: ptr<function, Look>, a: Column, b: Column, view: u32, pixel: vec2i) {
+// Contacts in a pixel, where the ray leaves the body in front and enters the one at the back. The body in front is `b`,
+// or `a` on the other side of it, as in a slot.
+fn contact_pixels(
+    look: ptr<function, Look>,
+    front: Column,
+    back: Column,
+    is_other_side: bool,
+    view: u32,
+    pixel: vec2i,
+) {
     let pair = view / MAX_VIEWS;
-    for (var kb = b.begin; kb < b.end; kb++) {
-        if facing_of(b, kb) == ENTRY || is_edge_on(layers[kb].normal) {
+    for (var kf = front.begin; kf < front.end; kf++) {
+        if facing_of(front, kf) == ENTRY || is_edge_on(layers[kf].normal) {
             continue;
         }
-        let ka = met_by(look, a, b, kb);
-        if ka == NONE {
+        let kb = met_by(look, front, back, kf, is_other_side);
+        if kb == NONE {
             continue;
         }
-        // Outward unit normals in the view frame: the camera sees a from outside, b from inside.
-        let normal_a = facing_camera(layers[ka].normal, -1.0);
-        let normal_b = facing_camera(layers[kb].normal, 1.0);
-        let normal = unit_or(normal_a - normal_b, vec3f(0.0, 0.0, -1.0));
-        let gap = (layers[ka].depth - layers[kb].depth) * abs(normal.z);
+        // Outward unit normals in the view frame: the ray leaves the body in front and enters the other.
+        let normal_back = facing_camera(layers[kb].normal, -1.0);
+        let normal_front = facing_camera(layers[kf].normal, 1.0);
+        let normal = unit_or(normal_back - normal_front, vec3f(0.0, 0.0, -1.0));
+        let gap = (layers[kb].depth - layers[kf].depth) * abs(normal.z);
         if !is_best_seen(look, normal) {
             continue;
         }
@@ -242,14 +264,18 @@ fn contact_pixels(look: ptr<function, Look>, a: Column, b: Column, view: u32, pi
             continue;
         }
         let at = batch.pairs * PAIR_WORDS + slot * CONTACT_WORDS;
+        let ka = select(kb, kf, is_other_side);
+        let of_b = select(kf, kb, is_other_side);
         atomicStore(&found[at], view);
         atomicStore(&found[at + 1u], u32(pixel.x));
         atomicStore(&found[at + 2u], u32(pixel.y));
         atomicStore(&found[at + 3u], bitcast<u32>(layers[ka].depth));
-        atomicStore(&found[at + 4u], bitcast<u32>(layers[kb].depth));
+        atomicStore(&found[at + 4u], bitcast<u32>(layers[of_b].depth));
         atomicStore(&found[at + 5u], bitcast<u32>(gap));
-        let shortened_a = share_of(ka, -1.0) * normal_a;
-        let shortened_b = share_of(kb, 1.0) * normal_b;
+        let shortened_back = share_of(kb, -1.0) * normal_back;
+        let shortened_front = share_of(kf, 1.0) * normal_front;
+        let shortened_a = select(shortened_back, shortened_front, is_other_side);
+        let shortened_b = select(shortened_front, shortened_back, is_other_side);
         for (var k = 0u; k < 3u; k++) {
             atomicStore(&found[at + 6u + k], bitcast<u32>(shortened_a[k]));
             atomicStore(&found[at + 9u + k], bitcast<u32>(shortened_b[k]));
@@ -257,12 +283,20 @@ fn contact_pixels(look: ptr<function, Look>, a: Column, b: Column, view: u32, pi
     }
 }
 
+// The column with what is known of its body.
+fn with_body(c: Column, s: u32, view: u32) -> Column {
+    let is_body = (views[view].flags & (BODY << s)) != 0u;
+    let near = select(-INFINITE, views[view].near[s], is_body);
+    let far = select(INFINITE, views[view].far[s], is_body);
+    return Column(c.begin, c.end, c.is_turned, is_body, near, far);
+}
+
 fn turned_from(c: Column, met: i32, from_behind: bool) -> Column {
     var is_turned = from_behind;
     for (var k = c.begin; k < c.end; k++) {
         is_turned = is_turned && layers[k].facing != met;
     }
-    return Column(c.begin, c.end, is_turned);
+    return Column(c.begin, c.end, is_turned, c.is_body, c.near, c.far);
 }
 
 @compute @workgroup_size(256)
@@ -277,8 +311,8 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     if in_image >= views[view].pixel_count {
         return;
     }
-    let a = column(0u, k);
-    let b = column(1u, k);
+    var a = column(0u, k);
+    var b = column(1u, k);
     if a.begin == a.end || b.begin == b.end {
         return;
     }
@@ -286,8 +320,6 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     var look: Look;
     look.params = pairs[pair].params;
     let flags = views[view].flags;
-    look.middle_a = select(-INFINITE, views[view].middles.x, (flags & MIDDLE_KNOWN) != 0u);
-    look.middle_b = select(INFINITE, views[view].middles.y, (flags & (MIDDLE_KNOWN << 1u)) != 0u);
     for (var v = 0u; v < MAX_VIEWS; v++) {
         let other = pair * MAX_VIEWS + v;
         if other != view && views[other].exists != MISSING {
@@ -317,7 +349,14 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     if (flags & IS_FURTHER) != 0u {
         return;
     }
+    a = with_body(a, 0u, view);
+    b = with_body(b, 1u, view);
     let turned_a = turned_from(a, ENTRY, (flags & FROM_BEHIND) != 0u);
     let turned_b = turned_from(b, EXIT, (flags & (FROM_BEHIND << 1u)) != 0u);
-    contact_pixels(&look, turned_a, turned_b, view, views[view].rect_origin + vec2i(pixel));
+    let at = views[view].rect_origin + vec2i(pixel);
+    contact_pixels(&look, turned_b, turned_a, false, view, at);
+    let facts = &pairs[pair].sides;
+    if ((*facts)[0].flags & (*facts)[1].flags & ORIENTED) != 0u {
+        contact_pixels(&look, a, b, true, view, at);
+    }
 }

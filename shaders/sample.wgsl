@@ -5,7 +5,7 @@
 @group(0) @binding(6) var<storage, read_write> survivors: array<Survivor>;
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
 @group(0) @binding(9) var<storage, read_write> entries: array<Entry>;
-@group(0) @binding(10) var<storage, read_write> samples: array<vec4f>;
+@group(0) @binding(10) var<storage, read_write> samples: array<Sample>;
 
 @compute @workgroup_size(256)
 fn sample(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
@@ -39,6 +39,6 @@ fn sample(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     }
     let slot = atomicAdd(&work[state + SAMPLE_COUNT], 1u);
     if slot < SAMPLE_SLOTS {
-        samples[side * SAMPLE_SLOTS + slot] = vec4f(normal, 0.0);
+        samples[side * SAMPLE_SLOTS + slot] = Sample(normal, 0u, survivors[i].position, 0u);
     }
 }

@@ -6,8 +6,6 @@
 @group(0) @binding(8) var<storage, read_write> work: array<atomic<u32>>;
 
 var<workgroup> near_count: atomic<u32>;
-// Of the near points, in steps.
-var<workgroup> near_places: array<atomic<u32>, 3>;
 var<workgroup> main_side: u32;
 
 // Whether the cell or one of its neighbours is marked by the other side.
@@ -62,33 +60,15 @@ fn zone(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     }
     workgroupBarrier();
     if near {
-        let pair = side_index / 2u;
-        let low = pairs[pair].overlap_min;
-        let extents = max(pairs[pair].overlap_max - low, vec3f(1.0e-30));
-        let place = vec3u(round((survivors[i].position - low) / extents * PLACE_STEPS));
-        let state = batch.sides_at + side_index * SIDE_WORDS;
         if side_index == main_side {
             atomicAdd(&near_count, 1u);
         } else {
-            atomicAdd(&work[state + NEAR_COUNT], 1u);
-        }
-        for (var k = 0u; k < 3u; k++) {
-            if side_index == main_side {
-                atomicAdd(&near_places[k], place[k]);
-            } else {
-                atomicAdd(&work[state + NEAR_LOW + k], place[k]);
-            }
+            atomicAdd(&work[batch.sides_at + side_index * SIDE_WORDS + NEAR_COUNT], 1u);
         }
     }
     workgroupBarrier();
     let count = atomicLoad(&near_count);
     if lane == 0u && count > 0u {
-        let state = batch.sides_at + main_side * SIDE_WORDS;
-        atomicAdd(&work[state + NEAR_COUNT], count);
-        for (var k = 0u; k < 3u; k++) {
-            let sum = atomicLoad(&near_places[k]);
-            atomicAdd(&work[state + NEAR_LOW + k], sum & 0xffffu);
-            atomicAdd(&work[state + NEAR_HIGH + k], sum >> 16u);
-        }
+        atomicAdd(&work[batch.sides_at + main_side * SIDE_WORDS + NEAR_COUNT], count);
     }
 }

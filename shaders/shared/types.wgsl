@@ -38,6 +38,9 @@ override LEAST_SHARE: f32;
 override CONCLUSIVE: f32;
 override HINT_WEIGHT: f32;
 override MEMORY_WEIGHT: f32;
+override ALIKE: f32;
+override TURNS: u32;
+override FLAT: f32;
 override AXIS_HYSTERESIS: f32;
 override PLAINLY: f32;
 override CROSSING: f32;
@@ -105,8 +108,12 @@ struct Side {
     stride: u32,
     other_max: vec3f,
     len: u32,
+    // Of its bounds, in its own frame; if it is a body.
     middle: vec3f,
     flags: u32,
+    half_extents: vec3f,
+    // Told standard deviation of the points, metres.
+    noise: f32,
     // Word of the first point's x.
     first_point: u32,
     first_normal: u32,
@@ -119,13 +126,16 @@ struct Side {
     cell_inv: f32,
     mean_radius: f32,
     merge_steps: u32,
-    // Told standard deviation of the points, metres.
-    noise: f32,
     // Words from a point to the next one; the radius is the fourth.
     point_step: u32,
+}
+
+// One of the near points of a side, in the frame of `a`.
+struct Sample {
+    normal: vec3f,
     padding_a: u32,
+    point: vec3f,
     padding_b: u32,
-    padding_c: u32,
 }
 
 struct Pair {
@@ -187,7 +197,7 @@ const FIXED_VIEW: u32 = 6u;
 const HAS_NORMALS: u32 = 1u;
 const ORIENTED: u32 = 2u;
 const RADII_DIFFER: u32 = 4u;
-const HAS_MIDDLE: u32 = 8u;
+const IS_BODY: u32 = 8u;
 
 // A point that passed the cull.
 struct Survivor {
@@ -219,7 +229,8 @@ struct View {
     view_z: vec4f,
     axis: vec3f,
     exists: u32,
-    middles: vec2f,
+    // Depths between which `a` and `b` lie, if they are bodies.
+    near: vec2f,
     flags: u32,
     depth_zero: f32,
     tile_origin: vec2i,
@@ -231,9 +242,8 @@ struct View {
     rect_origin: vec2i,
     rect_size: vec2u,
     pixel_count: u32,
-    padding_a: u32,
-    padding_b: u32,
-    padding_c: u32,
+    padding: u32,
+    far: vec2f,
 }
 
 // Values of `View.exists`. What is known is not drawn in this round.
@@ -242,7 +252,7 @@ const DRAWN: u32 = 1u;
 const KNOWN: u32 = 2u;
 
 // Bits of `View.flags`: for `a`, then for `b`.
-const MIDDLE_KNOWN: u32 = 1u;
+const BODY: u32 = 1u;
 const FROM_BEHIND: u32 = 4u;
 // This view only looks for crossings.
 const IS_FURTHER: u32 = 16u;
@@ -290,15 +300,12 @@ const ENTRIES: u32 = 7u;
 const FRAGMENTS_WRAPPED: u32 = 8u;
 
 // Words of a side in the arena.
-const SIDE_WORDS: u32 = 16u;
+const SIDE_WORDS: u32 = 8u;
 const KEPT_COUNT: u32 = 0u;
 const NEAR_COUNT: u32 = 1u;
 const RADIUS_LOW: u32 = 2u;
 const RADIUS_HIGH: u32 = 3u;
 const SAMPLE_COUNT: u32 = 4u;
-// Σ of the near points' places in the overlap, lower and upper halves, for each axis.
-const NEAR_LOW: u32 = 5u;
-const NEAR_HIGH: u32 = 8u;
 
 // Words of a view in the arena: greatest and least coordinates of what is seen of each side, as
 // ordered numbers (the least ones negated), and the touching tiles' bounds likewise.
@@ -307,9 +314,6 @@ const TOUCHED: u32 = 12u;
 
 // Steps of the sum of radii, in shares of the largest: 2^20.
 const RADIUS_STEPS: f32 = 1048576.0;
-
-// Steps of a place in the overlap, in shares of its extent.
-const PLACE_STEPS: f32 = 65535.0;
 
 // Words of a pair in what is read back, and of a contact.
 const PAIR_WORDS: u32 = 16u;

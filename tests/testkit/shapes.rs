@@ -60,6 +60,25 @@ pub fn sampled_sphere(radius: f32, spacing: f32) -> Samples {
     samples
 }
 
+/// A torus about the y axis through the origin: a tube of radius `minor` around a circle of radius `major`, metres, in
+/// rows around the axis.
+pub fn sampled_torus(major: f32, minor: f32, spacing: f32) -> Samples {
+    use std::f32::consts::TAU;
+    let mut samples = Samples::default();
+    let rows = (TAU * minor / spacing).ceil();
+    for row in 0..rows as u32 {
+        let (up, out) = (TAU * row as f32 / rows).sin_cos();
+        let count = (TAU * (major + minor * out) / spacing).ceil().max(1.0);
+        for k in 0..count as u32 {
+            // Neighbouring rows do not stand in line.
+            let (s, c) = (TAU * (k as f32 + 0.5 * (row % 2) as f32) / count).sin_cos();
+            let normal = Vec3::new(out * c, up, out * s);
+            samples.push(major * Vec3::new(c, 0.0, s) + minor * normal, normal);
+        }
+    }
+    samples
+}
+
 /// A square in the plane y = 0 about the origin with edges of `size` metres and normal +y, points
 /// moved at random by up to 0.3 `spacing` within the plane.
 pub fn sampled_plane(size: f32, spacing: f32, rng: &mut fastrand::Rng) -> Samples {

@@ -3,7 +3,8 @@
 use crate::buffers::Growable;
 use crate::layout::{
     BatchData, CONTACT_WORDS, COUNTERS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, MAX_VIEWS,
-    PAIR_WORDS, PIXEL_BYTES, PLANE_BYTES, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES, VIEW_BYTES,
+    PAIR_WORDS, PIXEL_BYTES, PLANE_BYTES, SAMPLE_BYTES, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES,
+    VIEW_BYTES,
 };
 use crate::resident::Resident;
 use crate::upload::Upload;
@@ -86,7 +87,7 @@ impl BatchBuffers {
             (&mut self.entries, ENTRY_BYTES * u64::from(bare)),
             (&mut self.planes, PLANE_BYTES * u64::from(bare)),
             (&mut self.adopted, PLANE_BYTES * u64::from(bare)),
-            (&mut self.samples, 2 * 16 * SAMPLE_SLOTS * pairs),
+            (&mut self.samples, 2 * SAMPLE_BYTES * SAMPLE_SLOTS * pairs),
             (&mut self.splats, SPLAT_BYTES * u64::from(data.splats)),
             (
                 &mut self.fragments,

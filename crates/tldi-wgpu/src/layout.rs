@@ -5,7 +5,9 @@ use crate::resident::Place;
 use bytemuck::{Pod, Zeroable};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
 use tldi::plan::{DepthScale, PairPlan, SidePlan, ZoneGrid};
-use tldi::{CameraPolicy, PairQuery, Params, Projection, Radii, Surface, Variant, View, plan};
+use tldi::{
+    Aabb, CameraPolicy, PairQuery, Params, Projection, Radii, Surface, Variant, View, plan,
+};
 
 /// Words of 32 bits, and bytes, of what only lives on the device.
 pub(crate) const SURVIVOR_BYTES: u64 = 32;
@@ -19,7 +21,8 @@ pub(crate) const TILE_BYTES: u64 = 3 * 4;
 /// The begins and ends of both sides.
 pub(crate) const PIXEL_BYTES: u64 = 4 * 4;
 pub(crate) const SAMPLE_SLOTS: u64 = 1024;
-pub(crate) const SIDE_WORDS: u32 = 16;
+pub(crate) const SAMPLE_BYTES: u64 = 32;
+pub(crate) const SIDE_WORDS: u32 = 8;
 pub(crate) const VIEW_WORDS: u32 = 16;
 pub(crate) const PAIR_WORDS: u32 = 16;
 pub(crate) const CONTACT_WORDS: u32 = 12;
@@ -48,7 +51,7 @@ const FIXED_VIEW: u32 = 6;
 const HAS_NORMALS: u32 = 1;
 const ORIENTED: u32 = 2;
 const RADII_DIFFER: u32 = 4;
-const HAS_MIDDLE: u32 = 8;
+const IS_BODY: u32 = 8;
 
 /// See `Batch` in WGSL.
 #[repr(C)]
@@ -219,6 +222,8 @@ pub(crate) struct SideData {
     len: u32,
     middle: [f32; 3],
     flags: u32,
+    half_extents: [f32; 3],
+    noise: f32,
     first_point: u32,
     first_normal: u32,
     radius_scale: f32,
@@ -228,11 +233,7 @@ pub(crate) struct SideData {
     cell_inv: f32,
     mean_radius: f32,
     merge_steps: u32,
-    noise: f32,
     point_step: u32,
-    padding_a: u32,
-    padding_b: u32,
-    padding_c: u32,
 }
 
 impl SideData {
@@ -254,7 +255,9 @@ impl SideData {
         set(HAS_NORMALS, cloud.has_normals);
         set(ORIENTED, cloud.has_normals && cloud.is_oriented);
         set(RADII_DIFFER, cloud.radii_differ);
-        set(HAS_MIDDLE, side.middle.is_some());
+        set(IS_BODY, side.body.is_some());
+        let halves = |body: Aabb| (body.center(), 0.5 * body.extents());
+        let (middle, half_extents) = side.body.map_or_else(Default::default, halves);
         let cell = plan::SUPPORT * radius_scale * cloud.mean_radius;
         let (cell, cell_dims) = match cloud.has_normals {
             true => (cell, [0; 3]),
@@ -267,8 +270,10 @@ impl SideData {
             stride: stride as u32,
             other_max: side.region.other_bounds.max.to_array(),
             len: numbered("points", cloud.len as u64)?,
-            middle: side.middle.unwrap_or(Vec3::ZERO).to_array(),
+            middle: middle.to_array(),
             flags,
+            half_extents: half_extents.to_array(),
+            noise: cloud.noise,
             first_point: place.first_point,
             first_normal: place.first_normal,
             radius_scale,
@@ -278,11 +283,7 @@ impl SideData {
             cell_inv: 1.0 / cell,
             mean_radius: cloud.mean_radius,
             merge_steps: DepthScale::new(0.0, params).merge_steps(params, cloud.noise),
-            noise: cloud.noise,
             point_step: place.point_step,
-            padding_a: 0,
-            padding_b: 0,
-            padding_c: 0,
         })
     }
 
@@ -419,10 +420,10 @@ mod tests {
         assert_same_layout!("Side", SideData, [
             frame_from_cloud frame_from_cloud_x, other_from_frame other_from_frame_x,
             other_min other_min, stride stride, other_max other_max, len len, middle middle,
-            flags flags, first_point first_point, first_normal first_normal,
+            flags flags, half_extents half_extents, noise noise, first_point first_point, first_normal first_normal,
             radius_scale radius_scale, max_radius max_radius, cell_dims cell_dims,
             cell_first cell_first, cell_inv cell_inv, mean_radius mean_radius,
-            merge_steps merge_steps, noise noise, point_step point_step,
+            merge_steps merge_steps, point_step point_step,
         ]);
     }
 
@@ -432,6 +433,7 @@ mod tests {
         for (name, bytes) in [
             ("Survivor", SURVIVOR_BYTES),
             ("Entry", ENTRY_BYTES),
+            ("Sample", SAMPLE_BYTES),
             ("Plane", PLANE_BYTES),
             ("View", VIEW_BYTES),
             ("Splat", SPLAT_BYTES),
@@ -473,7 +475,7 @@ mod tests {
             ("HAS_NORMALS", HAS_NORMALS),
             ("ORIENTED", ORIENTED),
             ("RADII_DIFFER", RADII_DIFFER),
-            ("HAS_MIDDLE", HAS_MIDDLE),
+            ("IS_BODY", IS_BODY),
         ] {
             let line = format!("const {name}: u32 = {value}u;");
             assert!(compare.source.contains(&line), "{line}");

@@ -2,8 +2,8 @@
 
 use crate::counters::Counters;
 use crate::layout::{
-    CONTACT_WORDS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, PLANE_BYTES, SAMPLE_SLOTS,
-    SPLAT_BYTES, SURVIVOR_BYTES,
+    CONTACT_WORDS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, PLANE_BYTES, SAMPLE_BYTES,
+    SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES,
 };
 use crate::pipelines::is_needed;
 use crate::upload::Upload;
@@ -27,7 +27,10 @@ pub(crate) fn stage_bytes(upload: &Upload, counted: &Counters) -> Vec<(&'static 
         ("normals_alloc", upload.cell_bytes()),
         ("normals_sort", survivors + entries),
         ("sample", survivors),
-        ("aim", 2 * 16 * SAMPLE_SLOTS * upload.pairs.len() as u64),
+        (
+            "aim",
+            2 * SAMPLE_BYTES * SAMPLE_SLOTS * upload.pairs.len() as u64,
+        ),
         ("columns_bounds", survivors),
         ("columns_tiles", 0),
         ("columns_depths", survivors + 2 * tiles),

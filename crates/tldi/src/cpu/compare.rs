@@ -1,7 +1,7 @@
 //! Stage `compare`: two images of one camera, pixel by pixel.
 //!
 //! `crossings` tells whether the surfaces cross. Contact pixels pair a layer through which rays leave the second body with
-//! one through which they enter the first.
+//! one through which they enter the first; and the other way round where the normals of both tell what is outside.
 
 use super::crossings::{Crossings, best_seen};
 use super::fold::ViewFold;
@@ -12,15 +12,21 @@ use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
 
-/// Depths of the middles of both bodies, where a body's size says that it is one.
+/// Depths between which a body lies, by its bounds, where its size says that it is one.
 ///
-/// Without oriented normals a layer does not tell which side is inside. Then the smaller surface of
-/// a pair counts as a body that reaches at least to the middle of its bounds. The larger one counts
-/// as a sheet, without a volume.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Middles {
-    pub(crate) a: Option<f32>,
-    pub(crate) b: Option<f32>,
+/// Where a layer is missing, the smaller surface of a pair counts as a body: it reaches at least to the middle of its bounds,
+/// and at most to their end if oriented normals tell that its inside begins there. The larger one counts as a sheet without
+/// a volume or, with such normals, as a solid without an end.
+#[derive(Clone, Copy)]
+pub(crate) struct Span {
+    pub(crate) near: f32,
+    pub(crate) far: f32,
+}
+
+impl Span {
+    fn middle(self) -> f32 {
+        0.5 * (self.near + self.far)
+    }
 }
 
 /// What is known of a view beside its images.
@@ -30,9 +36,13 @@ pub(crate) struct Seen<'a> {
     pub(crate) axes: &'a [Vec3],
     /// Index of this view's axis.
     pub(crate) view: usize,
-    pub(crate) middles: Middles,
+    /// Of `a` and `b`.
+    pub(crate) bodies: [Option<Span>; 2],
     /// Whether the outward normals of `a`, and of `b`, say that the view looks at it from behind.
     pub(crate) from_behind: [bool; 2],
+    /// Whether normals tell the outsides of both. Then contacts on the other side of `a` are looked for, too: the layers
+    /// say which of them can touch.
+    pub(crate) tells_facing: bool,
     /// Of the columns and rows of both images, if they are folded.
     pub(crate) fold: Option<&'a ViewFold>,
 }
@@ -83,15 +93,27 @@ pub(crate) fn compare(
                 frame_from_view: &frame_from_view,
                 view: seen.view,
                 others: &others,
-                middles: &seen.middles,
             };
-            let columns = [
-                Column::new(la, Facing::Entry, seen.from_behind[0]),
-                Column::new(lb, Facing::Exit, seen.from_behind[1]),
-            ];
-            contact_pixels(columns, &at, params, result);
+            let [behind_a, behind_b] = seen.from_behind;
+            let front = Column::new(lb, Facing::Exit, behind_b, seen.bodies[1]);
+            let back = Column::new(la, Facing::Entry, behind_a, seen.bodies[0]);
+            contact_pixels([front, back], Side::Main, &at, params, result);
+            if seen.tells_facing {
+                let front = Column::new(la, Facing::Exit, false, seen.bodies[0]);
+                let back = Column::new(lb, Facing::Entry, false, seen.bodies[1]);
+                contact_pixels([front, back], Side::Other, &at, params, result);
+            }
         }
     }
+}
+
+/// On which side of `a` a view looks for `b`.
+#[derive(Clone, Copy, PartialEq)]
+enum Side {
+    /// Where the axis says. Rays leave `b` and enter `a`.
+    Main,
+    /// On the opposite one, as in a slot. Rays leave `a` and enter `b`.
+    Other,
 }
 
 /// Where a pixel is.
@@ -102,7 +124,6 @@ struct PixelView<'a> {
     view: usize,
     /// Axes of the other views, in the frame of this one.
     others: &'a [Vec3],
-    middles: &'a Middles,
 }
 
 /// A surface's layers in one pixel.
@@ -111,13 +132,18 @@ struct Column<'a> {
     layers: &'a [Layer],
     /// A sheet seen from behind: what its layers face says nothing.
     is_turned: bool,
+    body: Option<Span>,
 }
 
 impl<'a> Column<'a> {
     /// `met` is what the layers face that the other surface can meet.
-    fn new(layers: &'a [Layer], met: Facing, from_behind: bool) -> Self {
+    fn new(layers: &'a [Layer], met: Facing, from_behind: bool, body: Option<Span>) -> Self {
         let is_turned = from_behind && layers.iter().all(|layer| layer.facing != met);
-        Self { layers, is_turned }
+        Self {
+            layers,
+            is_turned,
+            body,
+        }
     }
 
     fn facing(&self, layer: &Layer) -> Facing {
@@ -142,23 +168,37 @@ impl<'a> Column<'a> {
     }
 }
 
-fn contact_pixels([a, b]: [Column; 2], at: &PixelView, params: &Params, result: &mut PairResult) {
-    for (kb, exit) in b.layers.iter().enumerate() {
-        if b.facing(exit) == Facing::Entry || is_edge_on(exit) {
+/// Contacts in a pixel, where the ray leaves the body in `front` and enters the one in `back`.
+fn contact_pixels(
+    [front, back]: [Column; 2],
+    side: Side,
+    at: &PixelView,
+    params: &Params,
+    result: &mut PairResult,
+) {
+    for (kf, exit) in front.layers.iter().enumerate() {
+        if front.facing(exit) == Facing::Entry || is_edge_on(exit) {
             continue;
         }
-        let entered = entered_at(&b.up_to(kb), at.middles.b, params);
-        // What b has left behind altogether it does not touch.
-        let entry = (a.layers.iter().enumerate())
-            .filter(|(_, la)| a.facing(la) != Facing::Exit && !is_edge_on(la))
-            .filter(|(ka, _)| entered <= left_at(&a.from(*ka), at.middles.a, params))
-            .map(|(_, la)| la)
-            .find(|la| exit.depth - la.depth <= params.thickness || opposed(la, exit));
-        let Some(entry) = entry else { continue };
-        // Outward normals in the view frame: the camera sees a from outside, b from inside.
-        let normal_a = facing_camera(entry.normal, -1.0);
-        let normal_b = facing_camera(exit.normal, 1.0);
-        let normal = (normal_a - normal_b).normalize_or(-Vec3::Z);
+        let entered = entered_at(&front.up_to(kf), params);
+        // What `front` has left behind altogether it does not touch.
+        let entry = (back.layers.iter().enumerate())
+            .filter(|(_, layer)| back.facing(layer) != Facing::Exit && !is_edge_on(layer))
+            .map(|(kb, layer)| (layer, left_at(&back.from(kb), params)))
+            .filter(|(_, left)| entered <= *left)
+            .find(|(layer, left)| {
+                let depth = exit.depth - layer.depth;
+                match side {
+                    Side::Main => depth <= params.thickness || opposed(layer, exit),
+                    // The least way out counts.
+                    Side::Other => depth <= params.thickness && entered + depth <= *left,
+                }
+            });
+        let Some((entry, _)) = entry else { continue };
+        // Outward normals in the view frame: the ray leaves the front body and enters the other.
+        let normal_back = facing_camera(entry.normal, -1.0);
+        let normal_front = facing_camera(exit.normal, 1.0);
+        let normal = (normal_back - normal_front).normalize_or(-Vec3::Z);
         let along_view = entry.depth - exit.depth;
         let gap = along_view * normal.z.abs();
         if !best_seen(normal, at.others) {
@@ -170,13 +210,20 @@ fn contact_pixels([a, b]: [Column; 2], at: &PixelView, params: &Params, result: 
         }
         let in_frame = |v: Vec3| at.frame_from_view.rotation * v;
         let [u, v] = at.pixel.map(|c| c as f32 + 0.5);
+        let point = |layer: &Layer| *at.frame_from_view * at.camera.view_at(u, v, layer.depth);
+        let of_back = (point(entry), share_of(entry, -1.0) * in_frame(normal_back));
+        let of_front = (point(exit), share_of(exit, 1.0) * in_frame(normal_front));
+        let ((point_a, normal_a), (point_b, normal_b)) = match side {
+            Side::Main => (of_back, of_front),
+            Side::Other => (of_front, of_back),
+        };
         result.contacts.push(ContactPixel {
             pixel: at.pixel,
             view: at.view as u32,
-            point_a: *at.frame_from_view * at.camera.view_at(u, v, entry.depth),
-            point_b: *at.frame_from_view * at.camera.view_at(u, v, exit.depth),
-            normal_a: share_of(entry, -1.0) * in_frame(normal_a),
-            normal_b: share_of(exit, 1.0) * in_frame(normal_b),
+            point_a,
+            point_b,
+            normal_a,
+            normal_b,
             gap,
         });
     }
@@ -201,35 +248,35 @@ fn opposed(entry: &Layer, exit: &Layer) -> bool {
     n.z <= -FACING && m.z >= FACING && n.dot(m) <= -FACING
 }
 
-/// Depth at which the ray entered the part of a body that it leaves through the last of `layers`:
-/// unbounded where its normal says that there is an inside but the entry was culled. A ray that
-/// leaves a body twice in a row has missed a layer and tells no more than that the surface is there.
-fn entered_at(column: &Column, middle: Option<f32>, params: &Params) -> f32 {
+/// Depth at which the ray entered the part of a body that it leaves through the last of `layers`: where the body begins, if
+/// its normal says that there is an inside but the entry was culled. A ray that leaves a body twice in a row has missed a
+/// layer and tells no more than that the surface is there.
+fn entered_at(column: &Column, params: &Params) -> f32 {
     let Some((exit, before)) = column.layers.split_last() else {
         return f32::INFINITY;
     };
     let thin = exit.depth - params.thickness;
     let before = before.iter().rfind(|l| !is_edge_on(l));
     match (column.facing(exit), before) {
-        (Facing::Exit, None) => f32::NEG_INFINITY,
+        (Facing::Exit, None) => thin.min(column.body.map_or(f32::NEG_INFINITY, |body| body.near)),
         (Facing::Exit, Some(l)) if l.facing != Facing::Entry => thin,
         (_, Some(l)) => l.depth,
-        (_, None) => thin.min(middle.unwrap_or(f32::INFINITY)),
+        (_, None) => thin.min(column.body.map_or(f32::INFINITY, Span::middle)),
     }
 }
 
 /// Depth at which the ray leaves the part of a body that it enters through the first of `layers`.
-fn left_at(column: &Column, middle: Option<f32>, params: &Params) -> f32 {
+fn left_at(column: &Column, params: &Params) -> f32 {
     let Some((entry, behind)) = column.layers.split_first() else {
         return f32::NEG_INFINITY;
     };
     let thin = entry.depth + params.thickness;
     let behind = behind.iter().find(|l| !is_edge_on(l));
     match (column.facing(entry), behind) {
-        (Facing::Entry, None) => f32::INFINITY,
+        (Facing::Entry, None) => thin.max(column.body.map_or(f32::INFINITY, |body| body.far)),
         (Facing::Entry, Some(l)) if l.facing != Facing::Exit => thin,
         (_, Some(l)) => l.depth,
-        (_, None) => thin.max(middle.unwrap_or(f32::NEG_INFINITY)),
+        (_, None) => thin.max(column.body.map_or(f32::NEG_INFINITY, Span::middle)),
     }
 }
 
@@ -355,15 +402,16 @@ mod tests {
             Column {
                 layers,
                 is_turned: false,
+                body: None,
             }
         }
-        let entered = |layers: &[Layer]| entered_at(&column(layers), None, &params);
+        let entered = |layers: &[Layer]| entered_at(&column(layers), &params);
         assert_eq!(entered(&[entry(1.0), exit(9.0)]), 1.0);
         assert_eq!(entered(&[exit(9.0)]), f32::NEG_INFINITY);
         // The entry belongs to the first exit.
         assert_eq!(entered(&[entry(1.0), exit(3.0), exit(9.0)]), 7.0);
         assert_eq!(entered(&[unknown(1.0), unknown(9.0)]), 1.0);
-        let left = |layers: &[Layer]| left_at(&column(layers), None, &params);
+        let left = |layers: &[Layer]| left_at(&column(layers), &params);
         assert_eq!(left(&[entry(1.0), exit(9.0)]), 9.0);
         assert_eq!(left(&[entry(1.0)]), f32::INFINITY);
         assert_eq!(left(&[entry(1.0), entry(5.0), exit(9.0)]), 3.0);
@@ -371,5 +419,23 @@ mod tests {
         let mut edge_on = exit(5.0);
         edge_on.normal = Vec3::X;
         assert_eq!(left(&[entry(1.0), edge_on, exit(9.0)]), 9.0);
+        // A body ends with its bounds, but holds at least its layer.
+        let body = Some(Span {
+            near: -2.0,
+            far: 12.0,
+        });
+        let of_body = |layers: &[Layer], of: fn(&Column, &Params) -> f32| {
+            let column = Column {
+                body,
+                ..column(layers)
+            };
+            of(&column, &params)
+        };
+        assert_eq!(of_body(&[exit(9.0)], entered_at), -2.0);
+        assert_eq!(of_body(&[entry(1.0)], left_at), 12.0);
+        assert_eq!(of_body(&[unknown(9.0)], entered_at), 5.0);
+        assert_eq!(of_body(&[unknown(1.0)], left_at), 5.0);
+        assert_eq!(of_body(&[exit(-3.0)], entered_at), -5.0);
+        assert_eq!(of_body(&[entry(13.0)], left_at), 15.0);
     }
 }

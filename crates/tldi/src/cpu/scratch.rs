@@ -1,7 +1,7 @@
 //! What one pair needs while it is compared, and the steps that all looks at it share.
 
 use super::columns::{Tiles, Touching};
-use super::compare::{Middles, Seen};
+use super::compare::{Seen, Span};
 use super::crossings::Crossings;
 use super::exact::placed::Placed;
 use super::first_look::window::Window;
@@ -15,9 +15,10 @@ use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneScratch, ZoneSide};
 use crate::cloud::reach::Place;
 use crate::contact::patches::PatchScratch;
-use crate::pair::plan::{Approach, PairPlan, SidePlan};
+use crate::pair::plan::{PairPlan, SidePlan};
 use crate::stage::stage;
-use crate::view::camera_policy::{self, ZoneNormals, seen_from_behind};
+use crate::view::camera_policy::{self, seen_from_behind};
+use crate::view::zone_normals::ZoneNormals;
 use crate::{
     CameraPolicy, Looked, PairQuery, PointCloud, RayHit, Surface, View, VirtualCamera, Work, paper,
 };
@@ -125,7 +126,7 @@ impl Scratch {
                 true
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
-                let near = &mut self.b.near_normals;
+                let near = &mut self.b.near_samples;
                 let exact = Placed {
                     surface,
                     frame_from_surface: &query.a_from_b,
@@ -134,7 +135,7 @@ impl Scratch {
                     .near_exact(cloud, &Pose3::IDENTITY, &exact, reach, near)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
-                let near = &mut self.a.near_normals;
+                let near = &mut self.a.near_samples;
                 let exact = Placed {
                     surface,
                     frame_from_surface: &Pose3::IDENTITY,
@@ -167,18 +168,7 @@ impl Scratch {
         axes: &mut Vec<Vec3>,
     ) {
         let _stage = stage!("aim");
-        let approach = self.approach(query, plan);
-        camera_policy::aim(policy, self.zone_normals(query), &approach, axes);
-    }
-
-    /// What is known about where the second surface lies. For bare clouds, the near points tell as
-    /// well.
-    fn approach(&self, query: &PairQuery, plan: &PairPlan) -> Approach {
-        let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| {
-            let is_cloud = matches!(surface, Surface::Cloud(_));
-            (is_cloud && !surface.is_oriented()).then(|| side.mean_of_near())
-        });
-        plan.approach.at_sheet(near)
+        camera_policy::aim(policy, self.zone_normals(query), &plan.approach, axes);
     }
 
     /// What is known about a view besides its images and their folding.
@@ -190,22 +180,29 @@ impl Scratch {
         axes: &'a [Vec3],
         view: usize,
     ) -> Seen<'a> {
-        let depth = |side: &SidePlan| side.middle.map(|middle| camera.view_from_point(middle).z);
+        let span = |side: &SidePlan| {
+            let body = side
+                .body?
+                .transformed(&(camera.view_from_frame * side.frame_from_surface));
+            Some(Span {
+                near: body.min.z,
+                far: body.max.z,
+            })
+        };
         Seen {
             axes,
             view,
-            middles: Middles {
-                a: depth(&plan.sides[0]),
-                b: depth(&plan.sides[1]),
-            },
+            bodies: [span(&plan.sides[0]), span(&plan.sides[1])],
             from_behind: seen_from_behind(camera.axis(), &self.zone_normals(query)),
+            tells_facing: query.a.is_oriented() && query.b.is_oriented(),
             fold: None,
         }
     }
 
     fn zone_normals(&self, query: &PairQuery) -> [ZoneNormals<'_>; 2] {
         [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| ZoneNormals {
-            normals: &side.near_normals,
+            normals: &side.near_samples.normals,
+            points: &side.near_samples.points,
             oriented: surface.is_oriented(),
         })
     }

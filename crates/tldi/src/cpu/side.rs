@@ -18,7 +18,25 @@ use crate::pair::plan::SidePlan;
 use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
 use crate::stage::stage;
 use crate::{Params, PointCloud, RayHit, Tldi, VirtualCamera};
-use glamx::{DVec3, Mat3, Pose3, Vec3};
+use glamx::{Mat3, Pose3, Vec3};
+
+/// An even selection of the near points of a surface, in the frame of the query.
+#[derive(Default)]
+pub(super) struct NearSamples {
+    pub(super) normals: Vec<Vec3>,
+    /// Where they are, metres.
+    pub(super) points: Vec<Vec3>,
+}
+
+impl NearSamples {
+    /// Empties it, with room for twice as many as are wanted: a hash chooses them, and their number varies.
+    pub(super) fn clear(&mut self) {
+        for samples in [&mut self.normals, &mut self.points] {
+            samples.clear();
+            samples.reserve(2 * AIM_SAMPLES);
+        }
+    }
+}
 
 /// What one side holds, kept from call to call.
 #[derive(Default)]
@@ -33,8 +51,7 @@ pub(super) struct Side {
     pub(super) columns: Columns,
     /// Indices of the near points.
     pub(super) near: Vec<u32>,
-    /// Normals of some of the near points, in the frame of the query.
-    pub(super) near_normals: Vec<Vec3>,
+    pub(super) near_samples: NearSamples,
     /// Indices of the points that are modelled, and their normals in the view frame.
     pub(super) kept: Vec<u32>,
     kept_normals: Vec<Vec3>,
@@ -99,28 +116,39 @@ impl CloudView<'_> {
 }
 
 impl Side {
-    /// Fills `near_normals` from an even selection of the near points.
+    /// Fills `near_samples` from the near points.
     pub(super) fn sample_normals(&mut self, cloud: &PointCloud, frame_from_cloud: &Pose3) {
         let _stage = stage!("aim");
         let step = self.near.len().div_ceil(AIM_SAMPLES) as u32;
+        let index = &self.points.index;
+        self.near_samples.clear();
         if let Some(given) = cloud.normals() {
             let rotation = Mat3::from_quat(frame_from_cloud.rotation);
-            let indices = self.near.iter().map(|&i| self.points.index[i as usize]);
-            let sampled = indices.filter(|&index| is_aim_sample(index, step));
-            self.near_normals.clear();
-            self.near_normals
-                .extend(sampled.map(|index| rotation * given[index as usize]));
-            return;
+            let sampled = self.near.iter().copied();
+            let sampled = sampled.filter(|&i| is_aim_sample(index[i as usize], step));
+            self.kept.clear();
+            self.kept.extend(sampled);
+            let normals = self.kept.iter().map(|&i| index[i as usize]);
+            (self.near_samples.normals)
+                .extend(normals.map(|index| rotation * given[index as usize]));
+        } else {
+            normals::estimate(
+                &self.near,
+                |i| self.points.point(i as usize),
+                |k| is_aim_sample(index[self.near[k] as usize], step),
+                &self.neighborhood(cloud),
+                &mut self.normals,
+                &mut self.kept,
+                &mut self.near_samples.normals,
+            );
         }
-        normals::estimate(
-            &self.near,
-            |i| self.points.point(i as usize),
-            |k| is_aim_sample(self.points.index[self.near[k] as usize], step),
-            &self.neighborhood(cloud),
-            &mut self.normals,
-            &mut self.kept,
-            &mut self.near_normals,
-        );
+        self.place_samples();
+    }
+
+    /// Fills the points of `near_samples`, which are those in `kept`.
+    pub(super) fn place_samples(&mut self) {
+        let points = self.kept.iter().map(|&i| self.points.point(i as usize));
+        self.near_samples.points.extend(points);
     }
 
     /// The culled points, if they are all that there are where `plan` says.
@@ -129,12 +157,6 @@ impl Side {
             points: &self.points,
             region: &plan.region,
         })
-    }
-
-    /// Mean of the cloud's near points, in the frame of the query, metres. There must be some.
-    pub(super) fn mean_of_near(&self) -> Vec3 {
-        let near = self.near.iter().map(|&i| self.points.point(i as usize));
-        (near.map(|p| p.as_dvec3()).sum::<DVec3>() / self.near.len() as f64).as_vec3()
     }
 
     /// Mean radius of the culled points, metres. If their reaches differ, it is that of the near points.

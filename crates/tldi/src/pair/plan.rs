@@ -51,9 +51,8 @@ pub struct SidePlan {
     pub frame_from_surface: Pose3,
     /// Which of its points are kept.
     pub region: Region,
-    /// Middle of its bounds in the frame of the query, unless it is the larger one of the pair. If normals do not tell the
-    /// inside, the body reaches at least that far.
-    pub middle: Option<Vec3>,
+    /// Its bounds, in its own frame, unless it is the larger one of the pair: then it counts as a body, which fills them.
+    pub body: Option<Aabb>,
 }
 
 impl PairPlan {
@@ -91,12 +90,12 @@ impl PairPlan {
         if widest.is_empty() {
             return None;
         }
-        let [middle_a, middle_b] = middles(query);
+        let [body_a, body_b] = bodies(query);
         let side = |frame_from_surface,
                     other_from_frame,
                     other_bounds: Aabb,
                     [own, other]: [Ring; 2],
-                    middle| {
+                    body| {
             let included = own.beside(&other);
             let margin = prediction + included;
             SidePlan {
@@ -108,7 +107,7 @@ impl PairPlan {
                     ring: own,
                     included,
                 },
-                middle,
+                body,
             }
         };
         let [ring_a, ring_b] = rings;
@@ -121,14 +120,14 @@ impl PairPlan {
                     b_from_a,
                     bounds_b,
                     [ring_a, ring_b],
-                    middle_a,
+                    body_a,
                 ),
                 side(
                     query.a_from_b,
                     Pose3::IDENTITY,
                     bounds_a,
                     [ring_b, ring_a],
-                    middle_b,
+                    body_b,
                 ),
             ],
             zone_reach: prediction + a.mean_radius() + b.mean_radius(),
@@ -203,12 +202,12 @@ fn bounds_with_inside(query: &PairQuery) -> [Aabb; 2] {
     }
 }
 
-/// See [`SidePlan::middle`].
-fn middles(query: &PairQuery) -> [Option<Vec3>; 2] {
+/// See [`SidePlan::body`].
+fn bodies(query: &PairQuery) -> [Option<Aabb>; 2] {
     let (a, b) = (query.a.bounds(), query.b.bounds());
     let (size_a, size_b) = (a.extents().length(), b.extents().length());
     [
-        (size_a <= size_b).then(|| a.center()),
-        (size_b <= size_a).then(|| query.a_from_b * b.center()),
+        (size_a <= size_b).then_some(a),
+        (size_b <= size_a).then_some(b),
     ]
 }

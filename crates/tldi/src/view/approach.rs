@@ -34,8 +34,6 @@ pub struct Approach {
     pub motion: Vec3,
     /// The smaller surface.
     pub body: Body,
-    /// Mean of the near points of the larger surface, if that may be a sheet, metres.
-    pub sheet: Option<Vec3>,
     /// The main axis of the frame before.
     pub last_axis: Option<Vec3>,
 }
@@ -56,18 +54,18 @@ pub struct Body {
 impl Body {
     /// Whether `b`, off by `offset`, is plainly on the side of `a` that `axis` points away from, or
     /// on the other; `sheet` is the mean of the near points of the larger surface.
-    fn side(&self, sheet: Vec3, axis: Vec3, offset: Vec3) -> Option<bool> {
+    fn side(&self, sheet: f32, axis: Vec3, offset: Vec3) -> Option<bool> {
         let share = self.share_along(axis, sheet, offset);
         (share.abs() > PLAINLY).then_some(share < 0.0)
     }
 
     /// How far along `axis` `b`, off by `offset`, is from `a`, from `sheet` to the body's middle or the
     /// opposite, in half extents of the body.
-    fn share_along(&self, axis: Vec3, sheet: Vec3, offset: Vec3) -> f32 {
-        let toward_body = self.middle - sheet;
+    fn share_along(&self, axis: Vec3, sheet: f32, offset: Vec3) -> f32 {
+        let toward_body = self.middle.dot(axis) - sheet;
         let toward_b = if self.is_b { toward_body } else { -toward_body };
         let half = self.half_extents.dot((self.from_a * axis).abs());
-        axis.dot(toward_b + offset) / half.max(f32::MIN_POSITIVE)
+        (toward_b + axis.dot(offset)) / half.max(f32::MIN_POSITIVE)
     }
 }
 
@@ -115,16 +113,8 @@ impl Approach {
             lies: toward_b,
             motion,
             body,
-            sheet: None,
             last_axis,
         }
-    }
-
-    /// The same with the means of the near points of `a` and of `b`, where they may be sheets.
-    pub(crate) fn at_sheet(self, near: [Option<Vec3>; 2]) -> Self {
-        let [near_a, near_b] = near;
-        let sheet = if self.body.is_b { near_a } else { near_b };
-        Self { sheet, ..self }
     }
 
     /// From where the bounds meet to where `b` lies or comes from, metres.
@@ -152,8 +142,8 @@ impl Approach {
     /// Whether `b` surely lies on the side of `a` that `axis` points away from. This is so if its
     /// middle, or the place it came from, is plainly off the near points of `a`, or outside the
     /// overlap of the bounds.
-    pub(crate) fn side_by_position(&self, axis: Vec3) -> Option<bool> {
-        let side = |from: Vec3| match self.sheet {
+    pub(crate) fn side_by_position(&self, axis: Vec3, sheet: Option<f32>) -> Option<bool> {
+        let side = |from: Vec3| match sheet {
             Some(sheet) => self.body.side(sheet, axis, from),
             None => {
                 let along = (self.lies + from).dot(axis);
@@ -169,18 +159,10 @@ impl Approach {
     /// when nothing is certain. If the near points may be a sheet, `b`'s middle and these points
     /// decide, in half extents of the body: the bounds of a tilted sheet hold a body on either side
     /// of it. Elsewhere the bounds decide, as a cosine.
-    pub(crate) fn leaning(&self, axis: Vec3) -> f32 {
-        match self.sheet {
+    pub(crate) fn leaning(&self, axis: Vec3, sheet: Option<f32>) -> f32 {
+        match sheet {
             Some(sheet) => self.body.share_along(axis, sheet, -self.motion),
             None => axis.dot(self.direction()),
         }
-    }
-
-    /// Whether `b` is plainly not on the side that is remembered, nor comes from there.
-    pub(crate) fn contradicts(&self, remembered: bool, axis: Vec3) -> bool {
-        self.sheet.is_some_and(|sheet| {
-            self.body.side(sheet, axis, Vec3::ZERO) == Some(!remembered)
-                && self.body.side(sheet, axis, -self.motion) != Some(remembered)
-        })
     }
 }

@@ -4,3 +4,4 @@ pub(crate) mod approach;
 pub(crate) mod camera;
 pub(crate) mod camera_policy;
 pub(crate) mod tldi;
+pub(crate) mod zone_normals;

@@ -8,7 +8,7 @@
 use crate::cpu::exact::placed::{CellDistances, Placed};
 use crate::cpu::fold::is_coarse;
 use crate::cpu::normals;
-use crate::cpu::side::Side;
+use crate::cpu::side::{NearSamples, Side};
 use crate::cpu::zone::ZoneGrid;
 use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
 use crate::stage::stage;
@@ -20,7 +20,7 @@ const ENOUGH: usize = 32;
 
 impl Side {
     /// Finds the culled points within `reach` metres of an exact surface or inside it, coarser ones farther away, or
-    /// an even selection of them; its normals at the nearest points go to `surface_normals`. `false` where none is
+    /// an even selection of them; its points nearest to them go to `of_surface`. `false` where none is
     /// near.
     pub(crate) fn near_exact(
         &mut self,
@@ -28,16 +28,16 @@ impl Side {
         frame_from_cloud: &Pose3,
         exact: &Placed,
         reach: f32,
-        surface_normals: &mut Vec<Vec3>,
+        of_surface: &mut NearSamples,
     ) -> bool {
         let _stage = stage!("zone");
         self.near.clear();
         let support = self.support_radius(cloud);
         self.in_near_cells(exact, reach, support);
         let step = self.kept.len().div_ceil(AIM_SAMPLES) as u32;
-        self.select_near(exact, reach, step, surface_normals);
+        self.select_near(exact, reach, step, of_surface);
         if step > 1 && self.near.len() < ENOUGH {
-            self.select_near(exact, reach, 1, surface_normals);
+            self.select_near(exact, reach, 1, of_surface);
         }
         if self.near.is_empty() {
             return false;
@@ -46,6 +46,7 @@ impl Side {
             self.sample_normals(cloud, frame_from_cloud);
         } else {
             let _stage = stage!("aim");
+            self.near_samples.clear();
             // Neighbours are not among the samples.
             let around = self.neighborhood(cloud);
             let of_support = &self.support;
@@ -56,8 +57,9 @@ impl Side {
                 &around,
                 &mut self.normals,
                 &mut self.kept,
-                &mut self.near_normals,
+                &mut self.near_samples.normals,
             );
+            self.place_samples();
         }
         true
     }
@@ -114,25 +116,21 @@ impl Side {
     }
 
     /// Fills `near` with those of about every `step`-th of the points in `kept` that are near.
-    fn select_near(
-        &mut self,
-        exact: &Placed,
-        reach: f32,
-        step: u32,
-        surface_normals: &mut Vec<Vec3>,
-    ) {
+    fn select_near(&mut self, exact: &Placed, reach: f32, step: u32, of_surface: &mut NearSamples) {
         self.near.clear();
-        surface_normals.clear();
+        of_surface.clear();
         self.deepest = 0.0;
         for &i in &self.kept {
             if !is_aim_sample(self.points.index[i as usize], step) {
                 continue;
             }
-            let (distance, normal) = exact.project(self.points.point(i as usize));
+            let point = self.points.point(i as usize);
+            let (distance, normal) = exact.project(point);
             self.deepest = self.deepest.max(-distance);
             if distance <= reach + self.points.further(i as usize) {
                 self.near.push(i);
-                surface_normals.push(normal);
+                of_surface.normals.push(normal);
+                of_surface.points.push(point - distance * normal);
             }
         }
     }
@@ -243,10 +241,10 @@ mod tests {
         let cloud = PointCloud::builder(&points).radii(radii);
         let cloud = cloud.build().expect("a valid cloud");
         let mut side = side_of(&cloud);
-        let mut normals = Vec::new();
+        let mut samples = NearSamples::default();
         let (exact, frame) = (here(&Ball), Pose3::IDENTITY);
         let mean = cloud.mean_radius();
-        assert!(side.near_exact(&cloud, &frame, &exact, mean, &mut normals));
+        assert!(side.near_exact(&cloud, &frame, &exact, mean, &mut samples));
         for (k, &height) in heights.iter().enumerate() {
             let reach = radius(k).max(mean);
             if (height - reach).abs() > 1e-3 * reach {
@@ -322,12 +320,14 @@ mod tests {
         }
         let cloud = cloud_of(&points);
         let mut side = side_of(&cloud);
-        let mut normals = Vec::new();
+        let mut samples = NearSamples::default();
         let exact = here(&Ball);
-        assert!(side.near_exact(&cloud, &Pose3::IDENTITY, &exact, REACH, &mut normals));
+        assert!(side.near_exact(&cloud, &Pose3::IDENTITY, &exact, REACH, &mut samples));
         assert_eq!(side.near, near.map(|i| i as u32));
-        for (i, normal) in near.into_iter().zip(normals) {
-            assert!(normal.dot(points[i].normalize()) > 0.999);
+        for (k, i) in near.into_iter().enumerate() {
+            let outward = points[i].normalize();
+            assert!(samples.normals[k].dot(outward) > 0.999);
+            assert!(samples.points[k].distance(outward) < 1e-5);
         }
     }
 

@@ -250,6 +250,8 @@ impl Scratch {
         self.work.large += self.looked(query);
         let seen = Seen {
             fold: Some(&self.fold),
+            // Planes of large pixels at walls that are seen edge-on tell nothing.
+            tells_facing: false,
             ..self.seen(query, plan, camera, axes, view)
         };
         let [a, b] = [&self.a.image, &self.b.image];

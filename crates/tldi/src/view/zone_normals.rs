@@ -1,0 +1,104 @@
+//! The near points of both surfaces, as the stage `aim` asks: where they face an axis, and where that is.
+
+use glamx::Vec3;
+
+/// The other side must face a further axis within 60° ...
+pub(crate) const SUPPORTED: f32 = 0.5;
+
+/// ... with at least this share of its near points. Fewer is noise at the rim of the zone. Half or twice,
+/// and half or twice the angle: no change in any suite.
+pub(crate) const LEAST_SHARE: f32 = 0.05;
+
+/// An even selection of the near points of one surface, in the frame of `a`.
+#[derive(Clone, Copy)]
+pub(crate) struct ZoneNormals<'a> {
+    pub(crate) normals: &'a [Vec3],
+    /// Where they are, metres.
+    pub(crate) points: &'a [Vec3],
+    /// Whether their sign is outward.
+    pub(crate) oriented: bool,
+}
+
+/// Where points are along an axis, metres.
+struct Place {
+    mean: f32,
+    /// Standard deviation.
+    scatter: f32,
+}
+
+impl ZoneNormals<'_> {
+    /// Share of the normals that `keep` keeps.
+    pub(crate) fn share(&self, keep: impl Fn(&Vec3) -> bool) -> f32 {
+        let kept = self.normals.iter().filter(|n| keep(n)).count();
+        kept as f32 / self.normals.len().max(1) as f32
+    }
+
+    /// Mean of n·axis over the normals that face it or its opposite, if they tell the outside.
+    pub(crate) fn mean_along(&self, axis: Vec3) -> f32 {
+        let facing = || {
+            let along = self.normals.iter().map(|n| n.dot(axis));
+            along.filter(|d| d.abs() >= SUPPORTED)
+        };
+        let count = facing().count() as f32;
+        if !self.oriented || count < LEAST_SHARE * self.normals.len() as f32 {
+            return 0.0;
+        }
+        facing().sum::<f32>() / count.max(1.0)
+    }
+
+    /// Mean place along `axis` of the points that face it or its opposite, metres; of all, if none do.
+    pub(crate) fn faces_at(&self, axis: Vec3) -> f32 {
+        let faces = self.place(axis, |along| along.abs() >= SUPPORTED);
+        let place = faces.or_else(|| self.place(axis, |_| true));
+        place.map_or(0.0, |place| place.mean)
+    }
+
+    /// Of the points with the n·axis that `keep` keeps, if these are enough.
+    fn place(&self, axis: Vec3, keep: impl Fn(f32) -> bool) -> Option<Place> {
+        let kept = self.normals.iter().zip(self.points);
+        let kept = kept.filter(|(normal, _)| keep(normal.dot(axis)));
+        let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for along in kept.map(|(_, point)| point.dot(axis)) {
+            count += 1.0;
+            sum += along;
+            squares += along * along;
+        }
+        let mean = sum / count;
+        let is_enough = count > 0.0 && count >= LEAST_SHARE * self.normals.len() as f32;
+        is_enough.then(|| Place {
+            mean,
+            scatter: (squares / count - mean * mean).max(0.0).sqrt(),
+        })
+    }
+
+    /// Of the points that face `axis` (`sign` 1) or its opposite (-1); of all, if the outside is not known.
+    fn facing(&self, axis: Vec3, sign: f32) -> Option<Place> {
+        self.place(axis, |along| !self.oriented || sign * along >= SUPPORTED)
+    }
+}
+
+/// How far `a` is beyond `b` along `axis` where they face each other, and how much these places scatter, metres. With
+/// `sign` -1, how far it is before `b`, where both face away from that.
+fn gap([a, b]: &[ZoneNormals; 2], axis: Vec3, sign: f32) -> Option<(f32, f32)> {
+    let (of_a, of_b) = (a.facing(axis, -sign)?, b.facing(axis, sign)?);
+    let gap = sign * (of_a.mean - of_b.mean);
+    Some((gap, of_a.scatter + of_b.scatter))
+}
+
+/// Whether `axis` points from `b` towards `a`, and not the other way, as far as the near points tell: if only so both show
+/// each other their outsides, or are apart by more than these places scatter.
+///
+/// Where the outsides are not known all near points count. So two links of a chain are told, whose middles lie on the
+/// wrong sides, but not surfaces that are in each other by as much as their points scatter.
+pub(crate) fn side_by_places(sides: &[ZoneNormals; 2], axis: Vec3) -> Option<bool> {
+    let are_oriented = sides.iter().all(|side| side.oriented);
+    match [1.0, -1.0].map(|sign| gap(sides, axis, sign)) {
+        [Some((gap, scatter)), Some((opposite, other_scatter))] => {
+            let further = 0.5 * (gap - opposite);
+            (further.abs() > scatter.max(other_scatter)).then_some(further > 0.0)
+        }
+        [Some(_), None] => are_oriented.then_some(true),
+        [None, Some(_)] => are_oriented.then_some(false),
+        [None, None] => None,
+    }
+}
