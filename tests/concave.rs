@@ -1,6 +1,8 @@
 //! Bodies that touch a surface in several places with several normals: corners of a tray, slots, links of a chain, rings
 //! around a pole. In the inner corners no single view sees all contacts, and middles of bodies tell nothing of the sides.
 
+use rapier3d::prelude::{PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d_tldi::prelude::{TldiConfig, TldiPipeline};
 use std::f32::consts::{PI, TAU};
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi::{CameraPolicy, PairQuery, PairResult, Params, PointCloud, Surface, View};
@@ -8,6 +10,9 @@ use tldi_tests::{Samples, compare_batch, random_unit, sampled_box, sampled_spher
 
 /// Spacing of all samples and radius of their points, metres.
 const R: f32 = 0.01;
+
+/// Radius of the tubes of rings and links, metres.
+const TUBE: f32 = 0.03;
 
 /// A contact that is known: unit normal from the first surface towards the second, and gap, metres.
 type Known = (Vec3, f32);
@@ -152,12 +157,11 @@ fn both_walls_of_a_slot_are_met() {
     }
 }
 
-/// A ring around a pole, which it touches somewhere, with and without normals. Without normals nothing tells one side of
-/// a tube from the other: two contacts in thirty are missed.
+/// A ring around a pole, which it touches somewhere, with and without normals.
 #[test]
 fn a_ring_meets_the_pole_in_it() {
     let mut rng = fastrand::Rng::with_seed(33);
-    let ring = sampled_torus(0.2, 0.06, R);
+    let ring = sampled_torus(0.2, TUBE, R);
     // 0.4 m of a pole: its ends are far from the ring.
     let mut pole = Samples::default();
     for row in 0..40 {
@@ -169,7 +173,6 @@ fn a_ring_meets_the_pole_in_it() {
             pole.normals.push(normal);
         }
     }
-    let mut missed = 0;
     for k in 0..60 {
         let cloud = if k % 2 == 1 {
             Samples::bare_cloud
@@ -179,30 +182,25 @@ fn a_ring_meets_the_pole_in_it() {
         let gap = R * (-0.5 + 1.2 * rng.f32());
         let (s, c) = (TAU * rng.f32()).sin_cos();
         let out = Vec3::new(c, 0.0, s);
-        let pose = Pose3::from_translation((0.14 - 0.05 - gap) * out);
+        let pose = Pose3::from_translation((0.2 - TUBE - 0.05 - gap) * out);
         let result = compared(&cloud(&pole, R), &cloud(&ring, R), pose, &mut rng, &[out]);
         let (normal, found) = tldi_tests::deepest_contact(&result).expect("they are near");
-        if normal.dot(-out) < 0.95 || (found + gap).abs() > 0.4 * R {
-            assert!(
-                k % 2 == 1,
-                "case {k}: {normal} {found}, not {} {}",
-                -out,
-                -gap
-            );
-            missed += 1;
-        }
+        assert!(normal.dot(-out) > 0.95, "case {k}: {normal}, not {}", -out);
+        assert!(
+            (found + gap).abs() < 0.4 * R,
+            "case {k}: {gap}, found {found}"
+        );
     }
-    assert!(missed <= 3, "{missed} of 30");
 }
 
 /// A link that hangs in another lies with its middle on the other side of it than where it touches.
 #[test]
 fn links_of_a_chain_hang_in_each_other() {
     let mut rng = fastrand::Rng::with_seed(34);
-    let link = sampled_torus(0.2, 0.06, R).cloud(R);
+    let link = sampled_torus(0.2, TUBE, R).cloud(R);
     for k in 0..40 {
         let gap = R * (-0.5 + 1.2 * rng.f32());
-        let below = -(2.0 * (0.2 - 0.06) - gap) * Vec3::Z;
+        let below = -(2.0 * (0.2 - TUBE) - gap) * Vec3::Z;
         let pose = Pose3::from_parts(below, Quat::from_rotation_z(0.5 * PI));
         let result = compared(&link, &link, pose, &mut rng, &[-Vec3::Z]);
         let (normal, found) = tldi_tests::deepest_contact(&result).expect("they are near");
@@ -211,6 +209,82 @@ fn links_of_a_chain_hang_in_each_other() {
         assert!(
             (found + gap).abs() < 0.5 * R,
             "case {k}: {gap}, found {found}"
+        );
+    }
+}
+
+/// A world with gravity along `down`, its contacts by this library.
+fn world(down: Vec3) -> (PhysicsWorld, TldiPipeline) {
+    let mut world = PhysicsWorld::default();
+    world.gravity = 9.81 * down;
+    let tldi = TldiPipeline::new(TldiConfig::default()).expect("the CPU is there");
+    tldi.attach(&mut world);
+    (world, tldi)
+}
+
+fn run(world: &mut PhysicsWorld, tldi: &mut TldiPipeline, seconds: f32) {
+    let steps = (seconds / world.integration_parameters.dt) as usize;
+    for _ in 0..steps {
+        tldi.step(world).expect("a step");
+    }
+}
+
+/// Bodies that are poured into a tray lie on its floor and within its walls, or on each other.
+#[test]
+fn a_tray_holds_what_is_poured_into_it() {
+    let mut rng = fastrand::Rng::with_seed(42);
+    let (mut world, mut tldi) = world(Vec3::NEG_Y);
+    let collider = tldi.collider(tray(&mut rng).cloud(R));
+    world.insert(RigidBodyBuilder::fixed(), collider);
+    let (ball, size) = (sampled_sphere(0.05, R), Vec3::new(0.05, 0.04, 0.06));
+    let mut bodies: Vec<RigidBodyHandle> = Vec::new();
+    for k in 0..24 {
+        let samples = match k % 2 {
+            0 => ball.clone(),
+            _ => sampled_box(size, R, &mut rng),
+        };
+        let along = |cell: i32| 0.15 * (cell - 1) as f32 + 0.02 * (rng.f32() - 0.5);
+        let [x, z] = [k % 3, k / 3 % 3].map(along);
+        let at = Vec3::new(x, 0.1 + 0.13 * (k / 9) as f32, z);
+        let collider = tldi.collider(samples.cloud(R));
+        let body = RigidBodyBuilder::dynamic().translation(at);
+        bodies.push(world.insert(body, collider).0);
+    }
+    run(&mut world, &mut tldi, 4.0);
+    for (k, body) in bodies.into_iter().enumerate() {
+        let at = world.bodies[body].translation();
+        // The least half extent of a body is 0.04 m.
+        let wide = WALL - 0.04 + R;
+        let is_held = at.x.abs() < wide && at.z.abs() < wide && at.y > 0.04 - R && at.y < 0.5;
+        assert!(is_held, "body {k} is at {at}");
+    }
+}
+
+/// The links of a chain hang in each other. The first one is fixed.
+#[test]
+fn a_chain_hangs() {
+    let (mut world, mut tldi) = world(Vec3::NEG_Z);
+    let link = sampled_torus(0.2, TUBE, R).cloud(R);
+    let apart = 2.0 * (0.2 - TUBE);
+    let mut bodies = Vec::new();
+    for k in 0..5 {
+        let body = match k {
+            0 => RigidBodyBuilder::fixed(),
+            _ => RigidBodyBuilder::dynamic(),
+        };
+        let turned = Quat::from_rotation_z(0.5 * PI * (k % 2) as f32);
+        let pose = Pose3::from_parts(-apart * k as f32 * Vec3::Z, turned);
+        let collider = tldi.collider(link.clone());
+        bodies.push(world.insert(body.pose(pose), collider).0);
+    }
+    run(&mut world, &mut tldi, 3.0);
+    for (k, body) in bodies.into_iter().enumerate() {
+        let at = world.bodies[body].translation();
+        let held = -apart * k as f32 * Vec3::Z;
+        // It may swing a little, and sinks by at most a splat in each link above.
+        assert!(
+            at.distance(held) < 0.01 + R * k as f32,
+            "link {k} is at {at}, not {held}"
         );
     }
 }

@@ -53,7 +53,7 @@ pub struct Body {
 
 impl Body {
     /// Whether `b`, off by `offset`, is plainly on the side of `a` that `axis` points away from, or
-    /// on the other; `sheet` is the mean of the near points of the larger surface.
+    /// on the other; `sheet` is where along `axis` the larger surface faces it, metres.
     fn side(&self, sheet: f32, axis: Vec3, offset: Vec3) -> Option<bool> {
         let share = self.share_along(axis, sheet, offset);
         (share.abs() > PLAINLY).then_some(share < 0.0)
