@@ -113,26 +113,6 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
         "Two of eighty seeds: several flying pixels near each other look like a surface.",
         &[("worst_corner_local_radii", 1.0..=4.0)],
     ),
-    known(
-        "grazing",
-        "ball in a groove, bare",
-        "Near the bottom of a groove without normals some of the estimated ones are means of both sides: of 600 \
-         turns about an axis 28 have an angle at which a gap is off by 0.3 to 0.75 r̄ or jumps by as much, once the \
-         normal by 12°, or a side has no contact.",
-        &[
-            ("worst_gap_error_mean_radii", 0.3..=0.8),
-            ("worst_jump_mean_radii", 0.3..=0.6),
-            ("worst_pushing_normal_error_deg", 5.0..=12.0),
-            ("missing_contacts", 1.0..=1.0),
-        ],
-    ),
-    known(
-        "grazing",
-        "ball in a groove, oriented",
-        "At one angle of one seed in 200 the ball's contact with one side is so rough that a depth of 0.2 r̄ counts \
-         as scatter.",
-        &[("worst_gap_error_mean_radii", 0.3..=0.31)],
-    ),
 ];
 
 /// The declared cause of a failure, if there is one.
