@@ -215,8 +215,10 @@ fn links_of_a_chain_hang_in_each_other() {
 
 /// A world with gravity along `down`, its contacts by this library.
 fn world(down: Vec3) -> (PhysicsWorld, TldiPipeline) {
-    let mut world = PhysicsWorld::default();
-    world.gravity = 9.81 * down;
+    let mut world = PhysicsWorld {
+        gravity: 9.81 * down,
+        ..PhysicsWorld::default()
+    };
     let tldi = TldiPipeline::new(TldiConfig::default()).expect("the CPU is there");
     tldi.attach(&mut world);
     (world, tldi)
