@@ -56,6 +56,7 @@ const AIM: &str = shader!(
     "shared/math.wgsl",
     "shared/eigen.wgsl",
     "shared/view_along.wgsl",
+    "aim_side.wgsl",
     "aim.wgsl"
 );
 const FURTHER: &str = shader!(

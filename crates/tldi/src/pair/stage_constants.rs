@@ -4,7 +4,7 @@ use crate::BLOCK;
 use crate::cpu::normals::{planes, sharpen, sorted};
 use crate::cpu::{compare, crossings, splat, sweep};
 use crate::pair::sampling::AIM_SAMPLES;
-use crate::view::{approach, camera_policy};
+use crate::view::{approach, camera_policy, main_axis, zone_normals};
 
 /// The numbers of the stages, by the names of the override constants that a GPU backend's shaders
 /// declare for them.
@@ -18,6 +18,8 @@ pub fn stage_constants() -> Vec<(&'static str, f64)> {
     all.extend(compare::CONSTANTS);
     all.extend(crossings::CONSTANTS);
     all.extend(camera_policy::CONSTANTS);
+    all.extend(main_axis::CONSTANTS);
+    all.extend(zone_normals::CONSTANTS);
     all.extend(approach::CONSTANTS);
     all
 }

@@ -10,11 +10,11 @@
 //! motion, the bounds and the outsides of the surfaces decide it.
 
 use crate::AXIS_HYSTERESIS;
-use crate::cloud::point_normals::least_variance_axis;
 use crate::view::approach::Approach;
+use crate::view::main_axis::{outer, top_eigenvector, turned_to_face, zone_covariance};
 use crate::view::zone_normals::{LEAST_SHARE, SUPPORTED, ZoneNormals, side_by_places};
 use arrayvec::ArrayVec;
-use glamx::{DMat3, DVec3, Mat3, Vec3};
+use glamx::Vec3;
 
 /// How the axes of a pair's views are chosen.
 ///
@@ -63,31 +63,13 @@ const HINT_WEIGHT: f32 = 0.5;
 /// Weight of the last axis beside the normals of a surface. Half or twice: no change in any suite.
 const MEMORY_WEIGHT: f32 = 0.5;
 
-/// Share of the normals along an axis that another direction across it must have for both to be alike, as a floor and
-/// a wall are: then any direction between is as good an eigenvector, and the axis turns to one of them. With 0 a box's
-/// edge takes the axis from the floor that it stands on, and shallow depths are three times as wrong.
-const ALIKE: f32 = 0.7;
-
-/// Steps in which the axis turns to a face. The angle to it shrinks with its cube: eight are enough from 1° off the middle
-/// between two. With four, one of 160 contacts in corners is missed.
-const TURNS: usize = 8;
-
-/// Least mean of (n·v)⁴, as a share of that of (n·v)², of faces across v. It is 1 of flat ones and 0.6 of normals in all
-/// directions, as around two balls that are deep in each other, whose axis then stays as it is.
-const FLAT: f32 = 0.7;
-
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 10] = [
+pub(crate) const CONSTANTS: [(&str, f64); 5] = [
     ("WELL_SEEN", WELL_SEEN as f64),
-    ("SUPPORTED", SUPPORTED as f64),
-    ("LEAST_SHARE", LEAST_SHARE as f64),
     ("CONCLUSIVE", CONCLUSIVE as f64),
     ("HINT_WEIGHT", HINT_WEIGHT as f64),
     ("MEMORY_WEIGHT", MEMORY_WEIGHT as f64),
     ("AXIS_HYSTERESIS", AXIS_HYSTERESIS as f64),
-    ("ALIKE", ALIKE as f64),
-    ("TURNS", TURNS as f64),
-    ("FLAT", FLAT as f64),
 ];
 
 /// Fills `axes`, unit vectors from `b` towards `a`; at least one. Empty normals on either side give
@@ -157,7 +139,7 @@ fn aim_at_zone(
         let Some(mut axis) = top_eigenvector(&covariance) else {
             break;
         };
-        if turns && is_one_of_alike(&of_normals, axis) {
+        if turns {
             axis = turned_to_face(sides, axis, &of_normals, &left);
         }
         if views > 0 {
@@ -185,36 +167,6 @@ fn aim_at_zone(
         axes.push(axis);
         views += 1;
     }
-}
-
-/// Whether another direction across `axis` has nearly as much of the normals' covariance.
-fn is_one_of_alike(covariance: &Mat3, axis: Vec3) -> bool {
-    let along = |v: Vec3| v.dot(*covariance * v);
-    let onto = Mat3::IDENTITY - outer(axis);
-    let across = top_eigenvector(&(onto * *covariance * onto));
-    across.is_some_and(|other| along(other) >= ALIKE * along(axis))
-}
-
-/// The axis turned to the face that it is nearest to: towards the next maximum of the mean of (n·v)⁴ over the normals of
-/// both sides, each as `map` makes it. The axis itself, if there are no faces: `covariance` is the mean of n nᵀ.
-fn turned_to_face(
-    sides: &[ZoneNormals; 2],
-    axis: Vec3,
-    covariance: &Mat3,
-    map: &dyn Fn(Vec3) -> Option<Vec3>,
-) -> Vec3 {
-    let (mut turned, mut flatness) = (axis, 0.0);
-    for _ in 0..TURNS {
-        let [a, b] = sides.each_ref().map(|side| {
-            let kept = side.normals.iter().filter_map(|n| map(*n));
-            let pulls = kept.map(|n| n.dot(turned).powi(3) * n);
-            pulls.sum::<Vec3>() / side.normals.len().max(1) as f32
-        });
-        let pull = a + b;
-        flatness = pull.dot(turned) / turned.dot(*covariance * turned);
-        turned = pull.normalize_or(turned);
-    }
-    if flatness >= FLAT { turned } else { axis }
 }
 
 /// The axis or its opposite, such that it points from `b` towards `a`; and whether anything told.
@@ -249,30 +201,6 @@ pub(crate) fn seen_from_behind(axis: Vec3, [a, b]: &[ZoneNormals; 2]) -> [bool; 
         a.mean_along(axis) >= CONCLUSIVE,
         b.mean_along(axis) <= -CONCLUSIVE,
     ]
-}
-
-/// Mean of n nᵀ over the normals of both sides, each as `map` makes it, if it keeps it.
-fn zone_covariance(sides: &[ZoneNormals; 2], map: &dyn Fn(Vec3) -> Option<Vec3>) -> Mat3 {
-    let [a, b] = sides.each_ref().map(|side| {
-        let kept = side.normals.iter().filter_map(|n| map(*n));
-        let sum = kept.fold(Mat3::ZERO, |m, n| m + outer(n));
-        sum * (1.0 / side.normals.len().max(1) as f32)
-    });
-    a + b
-}
-
-fn outer(n: Vec3) -> Mat3 {
-    Mat3::from_cols(n * n.x, n * n.y, n * n.z)
-}
-
-fn top_eigenvector(m: &Mat3) -> Option<Vec3> {
-    let trace = m.x_axis.x + m.y_axis.y + m.z_axis.z;
-    if trace.is_nan() || trace <= 0.0 {
-        return None;
-    }
-    // The largest eigenvalue of m is the least of trace − m.
-    let rest = DMat3::from_diagonal(DVec3::splat(f64::from(trace))) - m.as_dmat3();
-    least_variance_axis(rest).as_vec3().try_normalize()
 }
 
 #[cfg(test)]

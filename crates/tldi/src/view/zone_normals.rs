@@ -9,6 +9,12 @@ pub(crate) const SUPPORTED: f32 = 0.5;
 /// and half or twice the angle: no change in any suite.
 pub(crate) const LEAST_SHARE: f32 = 0.05;
 
+/// For [`stage_constants`](crate::pair::plan::stage_constants).
+pub(crate) const CONSTANTS: [(&str, f64); 2] = [
+    ("SUPPORTED", SUPPORTED as f64),
+    ("LEAST_SHARE", LEAST_SHARE as f64),
+];
+
 /// An even selection of the near points of one surface, in the frame of `a`.
 #[derive(Clone, Copy)]
 pub(crate) struct ZoneNormals<'a> {
