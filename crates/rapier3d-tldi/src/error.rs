@@ -79,14 +79,14 @@ pub enum TldiError {
         /// What is wrong with the points.
         source: CloudError,
     },
-    /// A deforming cloud was given another number of points than it has.
+    /// A deforming cloud was given another number of points than before.
     #[error(
-        "collider {collider:?} has {expected} points and was given {found}: a surface that deforms keeps its points; use `set_points` for new ones"
+        "collider {collider:?} was given {expected} points before and {found} now: a surface that deforms keeps its points; use `set_points` for new ones"
     )]
     OtherPoints {
         /// The collider.
         collider: ColliderHandle,
-        /// Points of the cloud.
+        /// Points given before, with those that are not finite.
         expected: usize,
         /// Points given.
         found: usize,

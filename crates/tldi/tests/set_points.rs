@@ -115,6 +115,29 @@ fn radii_for_each_point_follow_points_that_move() {
     }
 }
 
+/// The same points that are not finite leave the others what belongs to them, and other ones do not.
+#[test]
+fn radii_follow_points_among_dropped_ones() {
+    let mut rng = Rng::with_seed(10);
+    let (mut points, mut moved) = (random_points(&mut rng, 600), random_points(&mut rng, 600));
+    for missing in [0, 17, 18, 300, 599] {
+        (points[missing], moved[missing]) = (Vec3::NAN, Vec3::NAN);
+    }
+    let Attributes {
+        radii,
+        normals,
+        colors,
+    } = attributes(600);
+    let builder = PointCloud::builder(&points).radii(&radii).colors(&colors);
+    let mut cloud = builder.normals(&normals).build().expect("valid");
+    let finite: Vec<usize> = (0..600).filter(|&i| moved[i].is_finite()).collect();
+    cloud.set_points(&moved, Some(&normals)).expect("valid");
+    assert_holds(&cloud, &moved, &finite);
+    moved.swap(18, 19);
+    let refused = cloud.set_points(&moved, Some(&normals));
+    assert!(matches!(refused, Err(CloudError::LengthMismatch { .. })));
+}
+
 #[test]
 fn a_spatial_order_ends_with_dropped_points() {
     let mut rng = Rng::with_seed(8);

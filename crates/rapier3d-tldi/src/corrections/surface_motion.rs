@@ -37,7 +37,7 @@ struct SurfaceMotion {
     collider: ColliderHandle,
     /// Of the points whose velocities these are. The collider may get others without a word to the pipeline.
     revision: u64,
-    /// Of each point, in the collider's frame, m/s.
+    /// Of each point, in the collider's frame, m/s; not finite where the point was not there before.
     velocities: Vec<Vector>,
 }
 
@@ -70,11 +70,15 @@ impl SampledMotion {
 const LEFT_TO_CORRECTION: f32 = 0.5;
 
 impl SurfaceMotions {
-    /// The points that `cloud` has now, in memory to be handed to [`record`](Self::record).
+    /// The points that `cloud` was given, those that were dropped as NaN, in memory to be handed to
+    /// [`record`](Self::record).
     pub(crate) fn before(&mut self, cloud: &PointCloud<'_>) -> Vec<Vector> {
         let mut points = self.spare.pop().unwrap_or_default();
         points.clear();
-        points.extend(cloud.points());
+        points.resize(cloud.len() + cloud.dropped(), Vector::NAN);
+        for (i, point) in cloud.points().iter().enumerate() {
+            points[cloud.given_index(i)] = *point;
+        }
         points
     }
 
@@ -86,22 +90,25 @@ impl SurfaceMotions {
         snapshot
     }
 
-    /// Records that the points `before` moved to those of `shape` within `dt` seconds.
+    /// Records that the points [`before`](Self::before) moved to those of `shape`, as many, within `dt` seconds.
     pub(crate) fn record(
         &mut self,
         collider: ColliderHandle,
-        mut before: Vec<Vector>,
+        before: Vec<Vector>,
         shape: &PointCloudShape,
         dt: f32,
     ) {
-        for (old, new) in before.iter_mut().zip(shape.cloud().points()) {
-            *old = (new - *old) / dt;
-        }
         self.forget(collider);
+        let cloud = shape.cloud();
+        let mut velocities = self.spare.pop().unwrap_or_default();
+        velocities.clear();
+        let points = cloud.points().iter().enumerate();
+        velocities.extend(points.map(|(i, new)| (*new - before[cloud.given_index(i)]) / dt));
+        self.spare.push(before);
         self.motions.push(SurfaceMotion {
             collider,
             revision: shape.revision(),
-            velocities: before,
+            velocities,
         });
     }
 
@@ -224,7 +231,7 @@ impl SurfaceMotions {
 }
 
 /// Mean of the values of the points near `point`, weighted by nearness; of the nearest where none
-/// is within two radii.
+/// is within two radii. Values that are not finite do not count.
 fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector {
     let reach = 2.0 * cloud.mean_radius();
     let points = cloud.points();
@@ -236,7 +243,8 @@ fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector
             continue;
         }
         let first = block * tldi::BLOCK;
-        for i in first..(first + tldi::BLOCK).min(values.len()) {
+        let indices = first..(first + tldi::BLOCK).min(values.len());
+        for i in indices.filter(|&i| values[i].is_finite()) {
             let squared = points[i].distance_squared(point);
             if squared < nearest.0 {
                 nearest = (squared, values[i]);

@@ -265,6 +265,50 @@ fn a_surface_that_jumps_does_not_throw() -> TestResult {
     Ok(())
 }
 
+/// A surface that deforms may have points that are not finite, the same ones in every frame or others: it carries what
+/// stands on it.
+#[test]
+fn surfaces_with_dropped_points_deform() -> TestResult {
+    let missing = Vector::splat(f32::NAN);
+    let velocity = Vector::X * 0.5;
+    for changes in [false, true] {
+        let (mut world, mut tldi) = attached();
+        let dt = world.integration_parameters.dt;
+        let frame = |k: usize| -> Vec<Vector> {
+            let lost = if changes { k % 7 } else { 3 };
+            let moved = (square(1.6).into_iter()).map(|p| p + k as f32 * dt * velocity);
+            let seen = moved.enumerate().map(|(i, p)| match i % 7 == lost {
+                true => missing,
+                false => p,
+            });
+            seen.collect()
+        };
+        let floor = cloud(&frame(0));
+        let (_, floor) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(floor));
+        let (body, _) = world.insert(dynamic_at(HALF), tldi.collider(cloud(&cube(HALF))));
+        for k in 1..=60 {
+            tldi.deform(&mut world, floor, &frame(k), None)?;
+            tldi.step(&mut world)?;
+        }
+        // Friction of 0.5 brings it to the speed within 0.1 s.
+        let slower = world.bodies[body].linvel() - velocity;
+        assert!(
+            slower.with_y(0.0).length() < 0.05,
+            "{changes}: {slower} m/s"
+        );
+        let one_more: Vec<Vector> = frame(0).into_iter().chain([Vector::ZERO]).collect();
+        assert_eq!(
+            tldi.deform(&mut world, floor, &one_more, None),
+            Err(TldiError::OtherPoints {
+                collider: floor,
+                expected: one_more.len() - 1,
+                found: one_more.len(),
+            })
+        );
+    }
+    Ok(())
+}
+
 /// Velocities are those of the points that a deforming surface has: a shape that takes its place in the same frame, with as
 /// many points or with fewer, has none.
 #[test]

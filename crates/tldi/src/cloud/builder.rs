@@ -1,7 +1,9 @@
 //! Builds and validates clouds.
 
 use crate::cloud::checks::{check_count, check_dropped, check_length};
-use crate::cloud::gather::{bounds_of_blocks, merged, non_finite_indices, without};
+use crate::cloud::gather::{
+    bounds_of_blocks, index_before_drop, merged, non_finite_indices, without,
+};
 use crate::cloud::morton::{morton_order, permuted};
 use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_cloud::{Spare, next_content_id};
@@ -287,7 +289,7 @@ impl<'a> CloudBuilder<'a> {
             blocks,
             mean_radius,
             max_radius,
-            dropped: dropped.len(),
+            dropped,
             recipe,
             order,
             content: next_content_id(),
@@ -325,11 +327,4 @@ fn usable_normals<'a>(
         fill_from_nearest(&mut normals, points)?;
     }
     Ok(Cow::Owned(normals))
-}
-
-/// The index, among the points given, of the one with index `kept` among those not dropped.
-fn index_before_drop(kept: usize, dropped: &[u32]) -> usize {
-    dropped
-        .iter()
-        .fold(kept, |index, &d| index + usize::from(d as usize <= index))
 }

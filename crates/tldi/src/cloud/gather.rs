@@ -120,6 +120,21 @@ fn bounds_of(points: &[Vec3]) -> Aabb {
     }
 }
 
+/// The index, among the points given, of the one with index `kept` among those not dropped. `dropped` is ascending.
+pub(crate) fn index_before_drop(kept: usize, dropped: &[u32]) -> usize {
+    // Of those before a dropped one, all were kept but the ones dropped before it.
+    let (mut before, mut end) = (0, dropped.len());
+    while before < end {
+        let middle = before.midpoint(end);
+        if dropped[middle] as usize - middle <= kept {
+            before = middle + 1;
+        } else {
+            end = middle;
+        }
+    }
+    kept + before
+}
+
 /// `values` without the entries at the ascending indices `dropped`.
 pub(crate) fn without<T: Copy>(values: &[T], dropped: &[u32]) -> Vec<T> {
     let mut kept = Vec::with_capacity(values.len() - dropped.len());

@@ -1,7 +1,7 @@
 //! The point cloud: positions, radii, optional normals and colours, bounds.
 
 use crate::cloud::checks::{check_count, check_dropped, check_length};
-use crate::cloud::gather::{Gathered, extend_without, merged};
+use crate::cloud::gather::{Gathered, extend_without, index_before_drop, merged};
 use crate::cloud::morton::permuted;
 use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_normals::{fill_from_nearest, normalize};
@@ -42,7 +42,8 @@ pub struct PointCloud<'a> {
     pub(crate) blocks: Vec<Aabb>,
     pub(crate) mean_radius: f32,
     pub(crate) max_radius: f32,
-    pub(crate) dropped: usize,
+    /// Indices, among the points last given, of those left out because they are not finite; ascending.
+    pub(crate) dropped: Vec<u32>,
     pub(crate) recipe: CloudRecipe,
     pub(crate) order: Option<Vec<u32>>,
     pub(crate) content: u64,
@@ -161,7 +162,7 @@ impl<'a> PointCloud<'a> {
 
     /// Non-finite points that were dropped from those last given.
     pub fn dropped(&self) -> usize {
-        self.dropped
+        self.dropped.len()
     }
 
     /// Number of the content: clouds of this process with the same number have the same points,
@@ -176,6 +177,24 @@ impl<'a> PointCloud<'a> {
     /// the cloud finds it in their own data. Else `None`: the points are as given.
     pub fn order(&self) -> Option<&[u32]> {
         self.order.as_deref()
+    }
+
+    /// The index, among the points last given, of the one with this index in the cloud: some may have been
+    /// dropped, or [reordered](crate::CloudBuilder::spatial_order).
+    ///
+    /// ```
+    /// use tldi::{PointCloud, glamx::Vec3};
+    /// let points = [Vec3::ZERO, Vec3::NAN, Vec3::X];
+    /// let cloud = PointCloud::builder(&points[..]).radius(0.5).build()?;
+    /// assert_eq!((cloud.point(1), cloud.given_index(1)), (Vec3::X, 2));
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If a reordered cloud has no such point.
+    pub fn given_index(&self, index: usize) -> usize {
+        let kept = self.order().map_or(index, |order| order[index] as usize);
+        index_before_drop(kept, &self.dropped)
     }
 
     /// Whether [`set_points`](Self::set_points) with these points and normals would leave the cloud
@@ -199,7 +218,7 @@ impl<'a> PointCloud<'a> {
             _ => false,
         };
         points.len() == self.len()
-            && self.dropped == 0
+            && self.dropped.is_empty()
             && (0..self.len()).all(|i| self.point(i) == points[given(i)])
             && same_normals
     }
@@ -208,8 +227,8 @@ impl<'a> PointCloud<'a> {
     /// make of points (its [recipe](CloudRecipe)).
     ///
     /// - A global radius is kept; radii from neighbours are made anew. Radii given for each point are
-    ///   kept if as many points as the cloud has are given, all finite: they are taken to be the
-    ///   same points, moved. Otherwise they are an error ([`CloudError::LengthMismatch`]):
+    ///   kept if as many points as the cloud has are given, all finite, or as many as were given before, the same
+    ///   ones not finite: they are taken to be the same points, moved. Otherwise they are an error ([`CloudError::LengthMismatch`]):
     ///   [set](Self::set_radii) a global radius first, or build another cloud. Colours are kept under the
     ///   same condition, else removed.
     /// - Normals are replaced by those given, which must be outward (see
@@ -242,7 +261,7 @@ impl<'a> PointCloud<'a> {
     }
 
     /// [`set_points`](Self::set_points) for a surface that deforms: the same points, elsewhere. Radii from
-    /// neighbours stay as well, where all points are there and finite, which saves their cost.
+    /// neighbours stay as well, where all points are there and the same ones are finite, which saves their cost.
     ///
     /// ```
     /// use tldi::{PointCloud, glamx::Vec3};
@@ -293,7 +312,11 @@ impl<'a> PointCloud<'a> {
             gathered.refill(points, None);
         }
         check_dropped(self.recipe.non_finite, points.len(), &gathered.dropped)?;
-        let same_points = points.len() == self.points.len() && gathered.dropped.is_empty();
+        let own_moved = points.len() == self.points.len() && gathered.dropped.is_empty();
+        let given_moved = self.order.is_none()
+            && points.len() == self.points.len() + self.dropped.len()
+            && gathered.dropped == self.dropped;
+        let same_points = own_moved || given_moved;
         let bounds = merged(&gathered.blocks);
         let new_points = &gathered.points;
         let rule = match &self.radii {
@@ -358,7 +381,7 @@ impl<'a> PointCloud<'a> {
         }
         self.colors.take_if(|_| !same_points);
         self.bounds = bounds;
-        self.dropped = gathered.dropped.len();
+        std::mem::swap(&mut self.dropped, &mut gathered.dropped);
         self.content = next_content_id();
         Ok(())
     }

@@ -44,6 +44,7 @@ pub(crate) fn assert_holds(cloud: &PointCloud<'_>, points: &[Vec3], given: &[usi
     assert_eq!(cloud.len(), given.len());
     for (i, &g) in given.iter().enumerate() {
         assert_eq!(cloud.point(i), points[g], "point {i}");
+        assert_eq!(cloud.given_index(i), g);
         assert_eq!(cloud.radius(i), radius_of(g), "radius {i}");
         assert_eq!(
             cloud.normals().expect("given")[i],

@@ -213,7 +213,8 @@ impl TldiPipeline {
     ///
     /// # Errors
     /// Those of `set_points`, and [`TldiError::OtherPoints`] if there are not as many points as the
-    /// cloud has.
+    /// cloud was given before. Points that are not finite count: they are dropped, and have no velocity when they
+    /// come back.
     ///
     /// ```
     /// use rapier3d::prelude::*;
@@ -294,8 +295,8 @@ impl TldiPipeline {
             shape.move_points(points, normals)
         })?;
         let after = cloud_of(colliders, collider)?.clone();
-        // Without a time there is no velocity, and dropped points leave none to compare with.
-        if dt > 0.0 && after.cloud().len() == before.len() {
+        // Without a time there is no velocity.
+        if dt > 0.0 {
             self.motions.record(collider, before, &after, dt);
             if let Some(collider) = colliders.get_mut(collider) {
                 let hooks = collider.active_hooks() | ActiveHooks::MODIFY_SOLVER_CONTACTS;
