@@ -7,8 +7,8 @@ use tldi::{BackendError, CloudError};
 /// Why a step of a [`TldiPipeline`](crate::TldiPipeline) failed.
 ///
 /// Rapier drops errors of its narrow phase, and the bodies concerned fall through each other. Here
-/// such errors are kept, and the pipeline's next [`finish`](crate::TldiPipeline::finish) or
-/// [`step`](crate::TldiPipeline::step) returns them.
+/// such errors are kept, and the [`finish`](crate::TldiPipeline::finish) of that step returns them. What failed
+/// outside of a step, such as a cast of your own, goes to the [`log`] when the next step is prepared.
 ///
 /// ```
 /// use rapier3d::prelude::*;
@@ -55,7 +55,7 @@ pub enum TldiError {
         "{count} pairs that were not in the batch had no contacts in the last step; the first: {first}"
     )]
     OnTheSpot {
-        /// How many failed since the last report.
+        /// How many failed since the step was prepared.
         count: usize,
         /// The error of one of them.
         first: BackendError,

@@ -140,7 +140,8 @@ impl TldiPipeline {
     ///
     /// The arguments are those of the [`PhysicsPipeline::step`](rapier3d::pipeline::PhysicsPipeline)
     /// that follows. What is changed in between is compared on the spot. After the step, call
-    /// [`finish`](Self::finish).
+    /// [`finish`](Self::finish). Queries of your own that failed since the last step are told to the [`log`], and
+    /// fail no step.
     ///
     /// # Errors
     /// [`TldiError::Pair`] or [`TldiError::Batch`] where the backend fails; the step should not be
@@ -178,6 +179,9 @@ impl TldiPipeline {
         let start = Instant::now();
         let shared = Arc::clone(&self.shared);
         shared.take_spot_counts();
+        if let Some((count, first)) = shared.take_failures() {
+            log::warn!("{count} comparisons outside of a step failed; the first: {first}");
+        }
         self.motions.prepare(integration);
         // Taken out and put back: no lock is held during the comparison.
         let mut batch = std::mem::take(&mut *shared.batch_mut());

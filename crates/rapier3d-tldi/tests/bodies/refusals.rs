@@ -2,6 +2,7 @@
 
 use crate::common::worlds::{HALF, TestResult, attached_with, dynamic_at, insert_floor};
 use crate::common::{cloud, cube};
+use rapier3d::parry::query::{NonlinearRigidMotion, QueryDispatcher};
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 use std::time::Duration;
@@ -52,6 +53,34 @@ fn error_on_the_spot_is_kept() -> TestResult {
     }
     world.remove_body(body);
     assert!(tldi.step(&mut world).is_ok(), "the error is returned once");
+    Ok(())
+}
+
+/// A cast that the user makes between two steps fails neither of them.
+#[test]
+fn casts_outside_of_a_step_fail_no_step() -> TestResult {
+    let (mut world, mut tldi) = attached_with(TldiConfig::default());
+    let floor = insert_floor(&mut world, 0.4);
+    tldi.step(&mut world)?;
+    let beyond_all_numbers = NonlinearRigidMotion::new(
+        Pose::IDENTITY,
+        Vector::ZERO,
+        Vector::Y * f32::MAX,
+        Vector::ZERO,
+    );
+    let floor = world.colliders[floor].shape();
+    let resting = NonlinearRigidMotion::identity();
+    let hit = tldi.dispatcher().cast_shapes_nonlinear(
+        &beyond_all_numbers,
+        &Ball::new(0.1),
+        &resting,
+        floor,
+        0.0,
+        10.0,
+        false,
+    );
+    assert!(hit.is_ok_and(|hit| hit.is_none()));
+    assert!(tldi.step(&mut world).is_ok());
     Ok(())
 }
 
