@@ -1,6 +1,6 @@
 //! A point cloud as a rapier shape.
 
-use crate::shape::mass::{MassModel, unit_mass_properties};
+use crate::shape::mass::{MassModel, mass_properties};
 use rapier3d::glamx::Vec3;
 use rapier3d::parry::bounding_volume::{Aabb, BoundingSphere};
 use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy};
@@ -39,7 +39,7 @@ fn next_revision() -> u64 {
 ///
 /// # Cost
 /// Bounds, bounding sphere and CCD thickness are O(1). Mass properties are computed when first
-/// asked for ([`unit_mass_properties`]) and kept, also when the points change; a collider that is
+/// asked for ([`unit_mass_properties`](crate::unit_mass_properties)) and kept, also when the points change; a collider that is
 /// given its mass properties
 /// ([`ColliderBuilder::mass_properties`](rapier3d::prelude::ColliderBuilder::mass_properties)), or
 /// the density 0, never asks. The tree for rays and projections is built on first use after the
@@ -114,10 +114,15 @@ impl PointCloudShape {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn new(cloud: PointCloud<'static>) -> Self {
-        Self::with_mass_model(cloud, MassModel::default())
+        Self {
+            content: Arc::new(Content::new(cloud, MassModel::default())),
+        }
     }
 
     /// A shape over `cloud` with the mass that `mass_model` says.
+    ///
+    /// # Errors
+    /// [`CloudError::BadParameter`] for a shell whose thickness is not finite, or not greater than 0.
     ///
     /// ```
     /// # use rapier3d::prelude::*;
@@ -127,15 +132,19 @@ impl PointCloudShape {
     /// #     .collect();
     /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
     /// use rapier3d_tldi::MassModel;
-    /// let shape = PointCloudShape::with_mass_model(scan, MassModel::Shell { thickness: 0.01 });
+    /// let shape = PointCloudShape::with_mass_model(scan, MassModel::Shell { thickness: 0.01 })?;
     /// let mass = ColliderBuilder::new(SharedShape::new(shape)).density(1000.0).build().mass();
     /// assert!(mass > 0.0);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn with_mass_model(cloud: PointCloud<'static>, mass_model: MassModel) -> Self {
-        Self {
+    pub fn with_mass_model(
+        cloud: PointCloud<'static>,
+        mass_model: MassModel,
+    ) -> Result<Self, CloudError> {
+        mass_model.check()?;
+        Ok(Self {
             content: Arc::new(Content::new(cloud, mass_model)),
-        }
+        })
     }
 
     /// The points, in the shape's own frame.
@@ -165,7 +174,7 @@ impl PointCloudShape {
     /// #     .collect();
     /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
     /// let model = MassModel::Shell { thickness: 0.01 };
-    /// assert_eq!(PointCloudShape::with_mass_model(scan, model).mass_model(), model);
+    /// assert_eq!(PointCloudShape::with_mass_model(scan, model)?.mass_model(), model);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn mass_model(&self) -> MassModel {
@@ -301,7 +310,7 @@ impl PointCloudShape {
     /// #     .collect();
     /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
     /// use rapier3d::parry::shape::Shape;
-    /// let mut shape = PointCloudShape::with_mass_model(scan, MassModel::Shell { thickness: 0.01 });
+    /// let mut shape = PointCloudShape::with_mass_model(scan, MassModel::Shell { thickness: 0.01 })?;
     /// let mass_of = |shape: &PointCloudShape| shape.mass_properties(1000.0).mass();
     /// let before = mass_of(&shape);
     /// let shrunk: Vec<Vector> = points.iter().map(|p| 0.5 * *p).collect();
@@ -416,7 +425,7 @@ impl Shape for PointCloudShape {
                 thickness: thickness * largest,
             },
         };
-        let scaled = Self::with_mass_model(builder.build().ok()?, mass_model);
+        let scaled = Self::with_mass_model(builder.build().ok()?, mass_model).ok()?;
         Some(Box::new(scaled))
     }
 
@@ -424,7 +433,7 @@ impl Shape for PointCloudShape {
         let unit = self
             .content
             .unit_mass
-            .get_or_init(|| unit_mass_properties(self.cloud(), self.mass_model()));
+            .get_or_init(|| mass_properties(self.cloud(), self.mass_model()));
         MassProperties::with_principal_inertia_frame(
             unit.local_com,
             unit.mass() * density,

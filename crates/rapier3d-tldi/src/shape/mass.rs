@@ -7,7 +7,7 @@ mod surfels;
 use rapier3d::glamx::{DMat3, DSymmetricEigen3, DVec3, Vec3};
 use rapier3d::prelude::MassProperties;
 use surfel::Surfel;
-use tldi::PointCloud;
+use tldi::{CloudError, PointCloud};
 
 /// Which part of a cloud has mass.
 ///
@@ -19,7 +19,7 @@ use tldi::PointCloud;
 ///     .map(|i| 0.05 * Vector::new((i % 21) as f32, 0.0, (i / 21) as f32))
 ///     .collect();
 /// let sheet = PointCloud::builder(points).radius(0.05).build()?;
-/// let shape = PointCloudShape::with_mass_model(sheet, MassModel::Shell { thickness: 0.002 });
+/// let shape = PointCloudShape::with_mass_model(sheet, MassModel::Shell { thickness: 0.002 })?;
 /// let plate = cloud_collider(shape).density(7850.0).build();
 /// let kilograms = plate.mass();
 /// // 15.7 kg for 1 m². At the rim, patches reach up to 1.5 radii farther: at most 1.15² m².
@@ -34,9 +34,25 @@ pub enum MassModel {
     Solid,
     /// A sheet of even thickness along the sampled surface.
     Shell {
-        /// Thickness of the sheet in metres.
+        /// Thickness of the sheet in metres; finite and greater than 0.
         thickness: f32,
     },
+}
+
+impl MassModel {
+    /// Refuses what would have no mass.
+    pub(crate) fn check(self) -> Result<(), CloudError> {
+        match self {
+            Self::Shell { thickness } if !(thickness.is_finite() && thickness > 0.0) => {
+                Err(CloudError::BadParameter {
+                    parameter: "thickness",
+                    value: thickness,
+                    expected: "metres of a sheet, finite and greater than 0",
+                })
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// A surface counts as closed if the vectors of its areas (area times outward normal), which
@@ -80,7 +96,7 @@ const FLAT: f64 = 0.1;
 ///     .collect();
 /// let points: Vec<Vec3> = normals.iter().map(|n| 0.5 * *n).collect();
 /// let ball = PointCloud::builder(points).normals(normals).build()?;
-/// let volume = unit_mass_properties(&ball, MassModel::Solid).mass(); // at 1 kg/m³
+/// let volume = unit_mass_properties(&ball, MassModel::Solid)?.mass(); // at 1 kg/m³
 /// assert!((volume / (std::f32::consts::PI / 6.0) - 1.0).abs() < 0.01);
 /// # Ok::<(), rapier3d_tldi::CloudError>(())
 /// ```
@@ -88,7 +104,19 @@ const FLAT: f64 = 0.1;
 /// Clouds of more than 100,000 points are thinned to about that number. Cost: 16 nearest neighbours
 /// of each point, in parallel, about 5 µs a point and core. The result does not depend on the
 /// number of threads.
-pub fn unit_mass_properties(cloud: &PointCloud<'_>, model: MassModel) -> MassProperties {
+///
+/// # Errors
+/// [`CloudError::BadParameter`] for a shell whose thickness is not finite, or not greater than 0.
+pub fn unit_mass_properties(
+    cloud: &PointCloud<'_>,
+    model: MassModel,
+) -> Result<MassProperties, CloudError> {
+    model.check()?;
+    Ok(mass_properties(cloud, model))
+}
+
+/// The same for a model that was checked.
+pub(crate) fn mass_properties(cloud: &PointCloud<'_>, model: MassModel) -> MassProperties {
     let surfels = surfels::surfels(cloud);
     let thickness = match model {
         MassModel::Shell { thickness } => thickness,

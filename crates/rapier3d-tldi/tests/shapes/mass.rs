@@ -3,7 +3,7 @@
 use crate::skip::test_data;
 use rapier3d::glamx::Vec3;
 use rapier3d::prelude::{Cuboid, MassProperties, Shape, SharedShape};
-use rapier3d_tldi::{MassModel, PointCloud, PointCloudShape, unit_mass_properties};
+use rapier3d_tldi::{CloudError, MassModel, PointCloud, PointCloudShape};
 
 type Samples = (Vec<Vec3>, Vec<Vec3>);
 
@@ -61,6 +61,11 @@ fn cloud((points, normals): Samples, with_normals: bool) -> PointCloud<'static> 
         builder
     };
     builder.build().unwrap()
+}
+
+/// Of a model that has mass.
+fn unit_mass_properties(cloud: &PointCloud<'_>, model: MassModel) -> MassProperties {
+    rapier3d_tldi::unit_mass_properties(cloud, model).expect("the model has mass")
 }
 
 /// Relative error of mass, of the centre of mass against `size` and of the inertia matrix.
@@ -206,6 +211,23 @@ fn shells() {
         0.5,
         [0.04, 0.02, 0.05],
     );
+}
+
+/// Nothing would weigh what has no thickness.
+#[test]
+fn thicknesses_that_are_no_lengths_are_refused() {
+    let ball = cloud(sphere(500, CENTER, 5), true);
+    for thickness in [0.0, -0.01, f32::NAN, f32::INFINITY] {
+        let model = MassModel::Shell { thickness };
+        let is_refused = |error: CloudError| {
+            matches!(error, CloudError::BadParameter { parameter: "thickness", value, .. }
+                if value.to_bits() == thickness.to_bits())
+        };
+        let mass = rapier3d_tldi::unit_mass_properties(&ball, model);
+        assert!(mass.is_err_and(is_refused), "{thickness}");
+        let shape = PointCloudShape::with_mass_model(ball.clone(), model);
+        assert!(shape.is_err_and(is_refused), "{thickness}");
+    }
 }
 
 #[test]

@@ -276,7 +276,8 @@ fn moved_points_move_everything_but_the_mass_and_leave_clones_alone() {
 #[test]
 fn scaling_keeps_the_cover_and_the_outside() {
     let shape =
-        PointCloudShape::with_mass_model(sphere(3000, true), MassModel::Shell { thickness: 0.01 });
+        PointCloudShape::with_mass_model(sphere(3000, true), MassModel::Shell { thickness: 0.01 })
+            .expect("a sheet has this thickness");
     let scale = Vec3::new(-2.0, 1.0, 0.5);
     let scaled = shape.scale_dyn(scale, 0).unwrap();
     let scaled = scaled.as_shape::<PointCloudShape>().unwrap();

@@ -67,10 +67,10 @@ pub enum CloudError {
         /// The point's radius in metres.
         radius: f32,
     },
-    /// A parameter of the builder is outside its range.
+    /// A parameter is outside its range.
     #[error("{parameter} is {value}: {expected}")]
     BadParameter {
-        /// Name of the builder's parameter.
+        /// Name of the parameter.
         parameter: &'static str,
         /// The value given.
         value: f32,
