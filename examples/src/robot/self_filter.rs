@@ -1,7 +1,7 @@
 //! Takes the robot out of what its own camera sees.
 
 use super::links::LinkCloud;
-use rapier3d_tldi::{PointCloudShape, points_on};
+use rapier3d_tldi::{CloudError, PointCloudShape, points_on};
 use tldi::glamx::{Pose3, Vec3};
 
 /// Finds points that lie on or in a robot, wherever its links are.
@@ -22,7 +22,14 @@ impl SelfFilter {
 
     /// Whether each point lies on the robot, whose links are at `world_from_link` (by index of the
     /// URDF).
-    pub fn on_robot(&self, points: &[Vec3], world_from_link: &[Pose3]) -> Vec<bool> {
+    ///
+    /// # Errors
+    /// Those of [`points_on`].
+    pub fn on_robot(
+        &self,
+        points: &[Vec3],
+        world_from_link: &[Pose3],
+    ) -> Result<Vec<bool>, CloudError> {
         let shapes: Vec<_> = (self.links.iter())
             .map(|(link, shape)| (world_from_link[*link], shape as _))
             .collect();

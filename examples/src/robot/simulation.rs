@@ -148,7 +148,9 @@ impl RobotSimulation {
                 .iter()
                 .map(|p| *scan_from_root * *p)
                 .collect();
-            count(&obstacles.on_robot(&points, &poses))
+            // With a margin that is refused there is no place.
+            let in_the_way = obstacles.on_robot(&points, &poses);
+            in_the_way.map_or(usize::MAX, |on| count(&on))
         })?;
         let scan_from_link: Vec<Pose3> = (root_from_link.iter())
             .map(|pose| placement.scan_from_root * *pose)
@@ -159,7 +161,7 @@ impl RobotSimulation {
         let filter = (scene.self_filter)
             .then(|| SelfFilter::new(&clouds, kept_margin + build.model_error(&clouds)));
         let on_robot = match &filter {
-            Some(filter) if build.is_fixed => filter.on_robot(&points, &scan_from_link),
+            Some(filter) if build.is_fixed => filter.on_robot(&points, &scan_from_link)?,
             _ => vec![false; points.len()],
         };
         let self_filtered = count(&on_robot);
@@ -302,7 +304,7 @@ impl RobotSimulation {
             .collect();
         let mut frame = camera.frame(&self.scan, &self.clouds, &world_from_link);
         if let Some(filter) = &self.filter {
-            let on_robot = filter.on_robot(&frame, &world_from_link);
+            let on_robot = filter.on_robot(&frame, &world_from_link)?;
             self.self_filtered = count(&on_robot);
             let mut on = on_robot.into_iter();
             frame.retain(|_| !on.next().unwrap_or(false));

@@ -154,7 +154,8 @@ impl CloudStream {
     }
 
     /// Leaves out points on these colliders, where they are when a frame is taken: the links of the robot that
-    /// carries the sensor. `margin` is in metres, see [`points_on`].
+    /// carries the sensor. `margin` is in metres, see [`points_on`]; one that is negative or not finite is an error of
+    /// each [`frame`](Self::frame).
     ///
     /// ```
     /// # use rapier3d::prelude::*;
@@ -200,7 +201,7 @@ impl CloudStream {
     /// are in no order. What the step models of it is estimated there anyway, but does not know its side.
     ///
     /// # Errors
-    /// [`TldiError::Cloud`] where the points are refused, or the pose is not finite;
+    /// [`TldiError::Cloud`] where the points or the margin are refused, or the pose is not finite;
     /// [`TldiError::NoSuchCollider`] if the collider, or one of those [without](Self::without) which
     /// the frame is taken, was removed. The collider then keeps the points of the frame before.
     ///
@@ -297,7 +298,9 @@ impl CloudStream {
         if shapes.is_empty() {
             return Ok(());
         }
-        let on = points_on(&self.points, &shapes, self.own_margin);
+        let collider = self.collider;
+        let on = points_on(&self.points, &shapes, self.own_margin)
+            .map_err(|source| TldiError::Cloud { collider, source })?;
         for list in [&mut self.points, &mut self.normals] {
             remove(list, &on);
         }

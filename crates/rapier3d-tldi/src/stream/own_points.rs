@@ -6,7 +6,7 @@ use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::bounding_volume::BoundingVolume;
 use rapier3d::parry::shape::Shape;
 use rayon::prelude::*;
-use tldi::RaySurface;
+use tldi::{CloudError, RaySurface};
 
 /// Whether each point lies on or in one of `shapes`, such as the links of the robot that carries the
 /// sensor. In parallel; the result does not depend on the number of threads.
@@ -22,15 +22,30 @@ use tldi::RaySurface;
 ///
 /// Cost: a box test for each point and shape, and a search in the shape's tree where that is met.
 ///
+/// # Errors
+/// [`CloudError::BadParameter`] for a margin that is negative or not finite.
+///
 /// ```
 /// use rapier3d::prelude::*;
 /// use rapier3d_tldi::points_on;
 /// let arm = SharedShape::capsule_y(0.5, 0.1);
 /// let pose = Pose::from_translation(Vector::X);
 /// let seen = [Vector::new(1.11, 0.2, 0.0), Vector::new(1.3, 0.2, 0.0)];
-/// assert_eq!(points_on(&seen, &[(pose, &*arm)], 0.02), [true, false]);
+/// assert_eq!(points_on(&seen, &[(pose, &*arm)], 0.02)?, [true, false]);
+/// # Ok::<(), rapier3d_tldi::CloudError>(())
 /// ```
-pub fn points_on(points: &[Vector], shapes: &[(Pose, &dyn Shape)], margin: f32) -> Vec<bool> {
+pub fn points_on(
+    points: &[Vector],
+    shapes: &[(Pose, &dyn Shape)],
+    margin: f32,
+) -> Result<Vec<bool>, CloudError> {
+    if !(margin.is_finite() && margin >= 0.0) {
+        return Err(CloudError::BadParameter {
+            parameter: "margin",
+            value: margin,
+            expected: "metres off a surface, finite and not negative",
+        });
+    }
     let parts: Vec<_> = (shapes.iter())
         .flat_map(|(pose, shape)| {
             (0..part_count(*shape)).map(move |i| {
@@ -50,7 +65,7 @@ pub fn points_on(points: &[Vector], shapes: &[(Pose, &dyn Shape)], margin: f32) 
                 && is_on_part(*part, *part_from_points * *point, margin)
         })
     };
-    points.par_iter().map(is_on).collect()
+    Ok(points.par_iter().map(is_on).collect())
 }
 
 /// Whether a point in the frame of the part lies on or in it.

@@ -16,7 +16,7 @@ fn assert_on(shape: &dyn Shape, distance: impl Fn(Vector) -> f32, slack: f32, se
         .map(|_| 1.6 * Vector::new(rng.f32(), rng.f32(), rng.f32()) - Vector::splat(0.8))
         .collect();
     let in_world: Vec<Vector> = points.iter().map(|p| pose * *p).collect();
-    let on = points_on(&in_world, &[(pose, shape)], MARGIN);
+    let on = points_on(&in_world, &[(pose, shape)], MARGIN).expect("a margin");
     for (p, on) in points.iter().zip(&on) {
         let distance = distance(*p);
         if distance < 0.5 * MARGIN {
@@ -77,6 +77,20 @@ fn clouds_are_told_up_to_their_radius() {
     assert!((700..1200).contains(&count), "{count}");
 }
 
+#[test]
+fn margins_that_are_no_lengths_are_refused() {
+    let ball = Ball::new(0.1);
+    for margin in [f32::NAN, -0.01, f32::INFINITY] {
+        let on = points_on(&[Vector::ZERO], &[(Pose::IDENTITY, &ball)], margin);
+        let is_refused = matches!(
+            on,
+            Err(CloudError::BadParameter { parameter: "margin", value, .. })
+                if value.to_bits() == margin.to_bits()
+        );
+        assert!(is_refused, "{margin}: {on:?}");
+    }
+}
+
 /// Without a side there is no inside: only what is near the samples is on them. The squares are tilted, so that
 /// their bounds hold all points.
 #[test]
@@ -99,6 +113,6 @@ fn bare_clouds_and_open_meshes_have_no_inside() {
     let seen = [0.005, -0.005, 0.2, -0.2].map(|height| tilted(0.1, 0.2) + height * normal);
     for shape in [&bare as &dyn Shape, &*mesh] {
         let on = points_on(&seen, &[(Pose::IDENTITY, shape)], MARGIN);
-        assert_eq!(on, [true, true, false, false]);
+        assert_eq!(on.expect("a margin"), [true, true, false, false]);
     }
 }
