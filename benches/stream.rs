@@ -94,7 +94,13 @@ fn stream(args: &Args, recipe: CloudRecipe) -> anyhow::Result<(usize, Vec<f64>)>
             Vector::new(x, NOISE * (2.0 * rng.f32() - 1.0) - 2.0, z)
         }));
         let begin = Instant::now();
-        let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, &sensor)?;
+        let taken = stream.frame(
+            &mut tldi,
+            &world.bodies,
+            &mut world.colliders,
+            &seen,
+            &sensor,
+        )?;
         tldi.step(&mut world)?;
         times.push(1e3 * begin.elapsed().as_secs_f64());
         ensure!(

@@ -146,9 +146,13 @@ impl Soak {
                     SPACING * Vector::new(at[0], 0.05 * rng.f32(), at[1])
                 })
                 .collect();
-            let colliders = &mut self.world.colliders;
-            self.stream
-                .frame(&mut self.tldi, colliders, &frame, &Pose::IDENTITY)?;
+            self.stream.frame(
+                &mut self.tldi,
+                &self.world.bodies,
+                &mut self.world.colliders,
+                &frame,
+                &Pose::IDENTITY,
+            )?;
             if step % EVERY == 0 && step + STAYS < CYCLE {
                 let mut spread = || 1.6 * (rng.f32() - 0.5);
                 let at = Vector::new(spread(), 0.4, spread());

@@ -91,6 +91,7 @@ impl LidarSimulation {
         let seen = sweep.within(self.scene.range);
         let taken = self.stream.frame(
             &mut self.tldi,
+            &self.world.bodies,
             &mut self.world.colliders,
             seen.as_points(),
             &sweep.world_from_scanner,

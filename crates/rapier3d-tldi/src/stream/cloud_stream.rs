@@ -1,6 +1,8 @@
 //! The frames of a sensor as a collider.
 
+use crate::step::candidates::pose_of;
 use crate::{PointCloudShape, TldiError, TldiPipeline, cloud_collider, points_on};
+use rapier3d::dynamics::RigidBodySet;
 use rapier3d::geometry::{ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::shape::Shape;
@@ -37,7 +39,7 @@ const STAND_IN_RADIUS: f32 = 1.0;
 ///     let seen: Vec<Vector> = (0..n * n)
 ///         .map(|i| Vector::new((i % n) as f32 / n as f32 - 0.5, -2.0, (i / n) as f32 / n as f32 - 0.5))
 ///         .collect();
-///     let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, &world_from_sensor)?;
+///     let taken = stream.frame(&mut tldi, &world.bodies, &mut world.colliders, &seen, &world_from_sensor)?;
 ///     assert_eq!(taken.points, seen.len());
 ///     tldi.step(&mut world)?;
 /// }
@@ -70,7 +72,7 @@ pub struct CloudStream {
 /// let mut stream = CloudStream::new(&mut world.colliders, CloudRecipe::default())?;
 /// let (points, radii) = ([Vector::Z, 1.1 * Vector::Z], [0.1, 0.11]);
 /// let seen = SeenPoints { radii: Some(&radii), ..SeenPoints::from(&points[..]) };
-/// let taken = stream.frame(&mut tldi, &mut world.colliders, seen, &Pose::IDENTITY)?;
+/// let taken = stream.frame(&mut tldi, &world.bodies, &mut world.colliders, seen, &Pose::IDENTITY)?;
 /// assert_eq!(taken.points, 2);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -110,7 +112,7 @@ impl<'a> From<&'a Vec<Vector>> for SeenPoints<'a> {
 /// let recipe = CloudRecipe { radii: RadiusRule::Global(0.1), ..CloudRecipe::default() };
 /// let mut stream = CloudStream::new(&mut world.colliders, recipe)?;
 /// let seen = [Vector::Z, Vector::splat(f32::NAN)];
-/// let taken = stream.frame(&mut tldi, &mut world.colliders, &seen[..], &Pose::IDENTITY)?;
+/// let taken = stream.frame(&mut tldi, &world.bodies, &mut world.colliders, &seen[..], &Pose::IDENTITY)?;
 /// assert_eq!(taken, StreamFrame { points: 1, dropped: 1, own: 0 });
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -153,7 +155,7 @@ impl CloudStream {
         })
     }
 
-    /// Leaves out points on these colliders, where they are when a frame is taken: the links of the robot that
+    /// Leaves out points on these colliders, where their bodies are when a frame is taken: the links of the robot that
     /// carries the sensor. `margin` is in metres, see [`points_on`]; one that is negative or not finite is an error of
     /// each [`frame`](Self::frame).
     ///
@@ -166,7 +168,7 @@ impl CloudStream {
     /// let recipe = CloudRecipe { radii: RadiusRule::Global(0.05), ..CloudRecipe::default() };
     /// let mut stream = CloudStream::new(&mut world.colliders, recipe)?.without([hand], 0.02);
     /// let seen = [Vector::Z, 2.0 * Vector::Z]; // in the hand, and beyond it
-    /// let taken = stream.frame(&mut tldi, &mut world.colliders, &seen[..], &Pose::IDENTITY)?;
+    /// let taken = stream.frame(&mut tldi, &world.bodies, &mut world.colliders, &seen[..], &Pose::IDENTITY)?;
     /// assert_eq!((taken.points, taken.own), (1, 1));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -213,7 +215,7 @@ impl CloudStream {
     /// let recipe = CloudRecipe { radii: RadiusRule::Global(0.1), ..CloudRecipe::default() };
     /// let mut stream = CloudStream::new(&mut world.colliders, recipe)?;
     /// let above = Pose::from_translation(Vector::Y);
-    /// let taken = stream.frame(&mut tldi, &mut world.colliders, &[Vector::Z][..], &above)?;
+    /// let taken = stream.frame(&mut tldi, &world.bodies, &mut world.colliders, &[Vector::Z][..], &above)?;
     /// assert_eq!(taken.points, 1);
     /// let bounds = world.colliders[stream.collider()].compute_aabb();
     /// assert!(bounds.center().distance(Vector::Y + Vector::Z) < 1e-6);
@@ -222,6 +224,7 @@ impl CloudStream {
     pub fn frame<'a>(
         &mut self,
         tldi: &mut TldiPipeline,
+        bodies: &RigidBodySet,
         colliders: &mut ColliderSet,
         seen: impl Into<SeenPoints<'a>>,
         world_from_sensor: &Pose,
@@ -230,7 +233,7 @@ impl CloudStream {
         let refused = |source| TldiError::Cloud { collider, source };
         let seen = seen.into();
         check(&seen, world_from_sensor).map_err(refused)?;
-        let world_from_collider = get(colliders, collider)?.position();
+        let world_from_collider = pose_of(get(colliders, collider)?, bodies);
         let collider_from_world = world_from_collider.inverse();
         let collider_from_sensor = collider_from_world * *world_from_sensor;
         self.points.clear();
@@ -242,7 +245,7 @@ impl CloudStream {
             .extend(seen.normals.unwrap_or_default().iter().map(|n| turn * *n));
         self.radii.clear();
         self.radii.extend(seen.radii.unwrap_or_default());
-        self.remove_own(colliders, &collider_from_world)?;
+        self.remove_own(bodies, colliders, &collider_from_world)?;
 
         let own = seen.points.len() - self.points.len();
         self.recipe.viewpoint = Some(collider_from_sensor.translation);
@@ -286,13 +289,14 @@ impl CloudStream {
     /// Takes what is on the own colliders out of all lists.
     fn remove_own(
         &mut self,
+        bodies: &RigidBodySet,
         colliders: &ColliderSet,
         collider_from_world: &Pose,
     ) -> Result<(), TldiError> {
         let shapes = (self.own.iter())
             .map(|own| {
                 let own = get(colliders, *own)?;
-                Ok((*collider_from_world * *own.position(), own.shape()))
+                Ok((*collider_from_world * pose_of(own, bodies), own.shape()))
             })
             .collect::<Result<Vec<(Pose, &dyn Shape)>, TldiError>>()?;
         if shapes.is_empty() {

@@ -65,7 +65,13 @@ fn a_thousand_frames_lose_nothing_and_keep_nothing() -> Result<(), Box<dyn Error
                     Vector::splat(f32::NAN)
                 });
             }
-            let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, &sensor)?;
+            let taken = stream.frame(
+                &mut tldi,
+                &world.bodies,
+                &mut world.colliders,
+                &seen,
+                &sensor,
+            )?;
             assert_eq!(
                 (taken.points, taken.dropped, taken.own),
                 (count - invalid, invalid, 0),

@@ -41,7 +41,13 @@ fn every_frame_is_made_as_it_was_asked_for() -> TestResult {
         let sensor_from_world = world_from_sensor.inverse();
         let mut seen: Vec<Vector> = in_world.iter().map(|p| sensor_from_world * *p).collect();
         seen.push(Vector::splat(f32::NAN));
-        let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, &world_from_sensor)?;
+        let taken = stream.frame(
+            &mut tldi,
+            &world.bodies,
+            &mut world.colliders,
+            &seen,
+            &world_from_sensor,
+        )?;
         let points = (n * n) as usize;
         assert_eq!(
             taken,
@@ -84,10 +90,10 @@ fn given_normals_are_turned_to_the_sensor() -> TestResult {
     let normals: Vec<Vector> = (0..points.len())
         .map(|i| sensor_from_world.rotation * if i % 2 == 0 { Vector::Y } else { -Vector::Y })
         .collect();
-    let colliders = &mut world.colliders;
     stream.frame(
         &mut tldi,
-        colliders,
+        &world.bodies,
+        &mut world.colliders,
         SeenPoints {
             normals: Some(&normals),
             ..SeenPoints::from(&points)
@@ -100,6 +106,7 @@ fn given_normals_are_turned_to_the_sensor() -> TestResult {
     let few = &normals[1..];
     let refused = stream.frame(
         &mut tldi,
+        &world.bodies,
         &mut world.colliders,
         SeenPoints {
             normals: Some(few),
@@ -139,14 +146,26 @@ fn an_empty_frame_holds_nothing() -> TestResult {
         tldi.contacts(&w.narrow_phase, &w.colliders).count()
     };
 
-    stream.frame(&mut tldi, &mut world.colliders, &floor(0.0), &sensor)?;
+    stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        &floor(0.0),
+        &sensor,
+    )?;
     settle(&mut world, &mut tldi)?;
     assert!((world.bodies[ball].translation().y - 0.1).abs() < REST_TOLERANCE);
     assert!(world.bodies[ball].is_sleeping() && contacts(&tldi, &world) > 0);
 
     let nothing = [Vector::splat(f32::NAN); 3];
     for empty in [&nothing[..0], &nothing[..]] {
-        let taken = stream.frame(&mut tldi, &mut world.colliders, empty, &sensor)?;
+        let taken = stream.frame(
+            &mut tldi,
+            &world.bodies,
+            &mut world.colliders,
+            empty,
+            &sensor,
+        )?;
         assert_eq!((taken.points, taken.dropped), (0, empty.len()));
         assert!(!world.colliders[stream.collider()].is_enabled());
         assert_eq!(cloud_of(&world, &stream).len(), 1, "no point is kept");
@@ -159,7 +178,13 @@ fn an_empty_frame_holds_nothing() -> TestResult {
     }
     // 20 steps of free fall are 0.57 m: the floor is back below it.
     assert!(world.bodies[ball].translation().y < -0.3);
-    stream.frame(&mut tldi, &mut world.colliders, &floor(-1.0), &sensor)?;
+    stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        &floor(-1.0),
+        &sensor,
+    )?;
     settle(&mut world, &mut tldi)?;
     assert!((world.bodies[ball].translation().y + 0.9).abs() < REST_TOLERANCE);
     Ok(())
@@ -172,7 +197,13 @@ fn a_single_point_is_taken() -> TestResult {
     let mut stream = CloudStream::new(&mut world.colliders, RECIPE)?;
     let sensor = Pose::from_translation(2.0 * Vector::Y);
     let one = [-2.0 * Vector::Y];
-    let refused = stream.frame(&mut tldi, &mut world.colliders, &one[..], &sensor);
+    let refused = stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        &one[..],
+        &sensor,
+    );
     assert!(
         matches!(
             refused,
@@ -183,9 +214,21 @@ fn a_single_point_is_taken() -> TestResult {
         ),
         "{refused:?}"
     );
-    stream.frame(&mut tldi, &mut world.colliders, &square(0.4), &sensor)?;
+    stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        &square(0.4),
+        &sensor,
+    )?;
     let mean = cloud_of(&world, &stream).mean_radius();
-    let taken = stream.frame(&mut tldi, &mut world.colliders, &one[..], &sensor)?;
+    let taken = stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        &one[..],
+        &sensor,
+    )?;
     assert_eq!(taken.points, 1);
     let cloud = cloud_of(&world, &stream);
     assert_eq!((cloud.len(), cloud.mean_radius()), (1, mean));
@@ -217,7 +260,13 @@ fn own_links_are_left_out_where_they_are() -> TestResult {
             seen.push(on_link);
         }
         seen.iter_mut().for_each(|p| *p -= 2.0 * Vector::Y);
-        let taken = stream.frame(&mut tldi, &mut world.colliders, &seen, &sensor)?;
+        let taken = stream.frame(
+            &mut tldi,
+            &world.bodies,
+            &mut world.colliders,
+            &seen,
+            &sensor,
+        )?;
         assert_eq!(
             taken,
             StreamFrame {
@@ -228,8 +277,40 @@ fn own_links_are_left_out_where_they_are() -> TestResult {
         );
     }
     world.remove_body(link);
-    let refused = stream.frame(&mut tldi, &mut world.colliders, &square(0.8), &sensor);
+    let refused = stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        &square(0.8),
+        &sensor,
+    );
     assert_eq!(refused, Err(TldiError::NoSuchCollider(collider)));
+    Ok(())
+}
+
+/// A link that was put elsewhere since the last step is left out there.
+#[test]
+fn own_links_that_were_moved_are_left_out() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let collider = ColliderBuilder::ball(0.2).translation(0.1 * Vector::X);
+    let (link, collider) = world.insert(RigidBodyBuilder::fixed(), collider);
+    let recipe = CloudRecipe {
+        radii: RadiusRule::Global(SPACING),
+        ..CloudRecipe::default()
+    };
+    let mut stream = CloudStream::new(&mut world.colliders, recipe)?.without([collider], 0.01);
+    world.bodies[link].set_translation(2.0 * Vector::Y, true);
+    let [now, before] = [2.0, 0.0].map(|y| Vector::new(0.2, y, 0.0));
+    let seen = [now, before];
+    let taken = stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        &seen[..],
+        &Pose::IDENTITY,
+    )?;
+    assert_eq!((taken.points, taken.own), (1, 1));
+    assert_eq!(cloud_of(&world, &stream).points(), [before]);
     Ok(())
 }
 
@@ -246,7 +327,13 @@ fn what_cannot_be_followed_is_refused() -> TestResult {
     ));
     let mut stream = CloudStream::new(&mut world.colliders, CloudRecipe::default())?;
     let nowhere = Pose::from_translation(Vector::new(0.0, f32::NAN, 0.0));
-    let refused = stream.frame(&mut tldi, &mut world.colliders, &square(0.4), &nowhere);
+    let refused = stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        &square(0.4),
+        &nowhere,
+    );
     assert!(
         matches!(
             refused,
@@ -274,7 +361,13 @@ fn radii_may_come_with_a_frame() -> TestResult {
         radii: Some(&radii),
         ..SeenPoints::from(&points)
     };
-    let taken = stream.frame(&mut tldi, &mut world.colliders, seen, &Pose::IDENTITY)?;
+    let taken = stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        seen,
+        &Pose::IDENTITY,
+    )?;
     assert!(taken.own > 0 && taken.dropped == 1);
     let cloud = cloud_of(&world, &stream);
     assert!(cloud.normals().is_some());
@@ -289,7 +382,13 @@ fn radii_may_come_with_a_frame() -> TestResult {
         radii: Some(&radii[1..]),
         ..SeenPoints::from(&points)
     };
-    let refused = stream.frame(&mut tldi, &mut world.colliders, few, &Pose::IDENTITY);
+    let refused = stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        few,
+        &Pose::IDENTITY,
+    );
     assert!(
         matches!(
             refused,
@@ -303,7 +402,13 @@ fn radii_may_come_with_a_frame() -> TestResult {
         ),
         "{refused:?}"
     );
-    stream.frame(&mut tldi, &mut world.colliders, &points, &Pose::IDENTITY)?;
+    stream.frame(
+        &mut tldi,
+        &world.bodies,
+        &mut world.colliders,
+        &points,
+        &Pose::IDENTITY,
+    )?;
     assert!(cloud_of(&world, &stream).max_radius() < 0.1);
     Ok(())
 }
