@@ -230,6 +230,8 @@ fn compare(
             &world.integration_parameters,
             &world.bodies,
             &world.colliders,
+            &world.impulse_joints,
+            &world.multibody_joints,
         )?;
         seconds = start.seconds();
     }

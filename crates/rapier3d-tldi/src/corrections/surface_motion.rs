@@ -272,6 +272,8 @@ fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector
 ///     &world.integration_parameters,
 ///     &world.bodies,
 ///     &world.colliders,
+///     &world.impulse_joints,
+///     &world.multibody_joints,
 /// )?;
 /// world.step_with_events(&tldi.hooks(&()), &());
 /// tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;

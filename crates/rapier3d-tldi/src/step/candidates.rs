@@ -1,11 +1,14 @@
 //! Which pairs of colliders rapier's narrow phase is going to ask about.
 //!
 //! Rapier offers no hook between its broad and narrow phase, so the pairs are found before its
-//! step, by the same rules: enabled colliders, parents, body types, groups, sleep, and bounds
+//! step, by the same rules: enabled colliders, parents, joints, body types, groups, sleep, and bounds
 //! loosened like those in its broad phase. A pair that is missed here is compared on the spot.
 
 use crate::narrow_phase::parts::{clouds_of, has_cloud};
-use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet, RigidBodyType};
+use rapier3d::dynamics::{
+    ImpulseJointSet, IntegrationParameters, MultibodyJointSet, RigidBody, RigidBodyHandle,
+    RigidBodySet, RigidBodyType,
+};
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
 
@@ -28,6 +31,33 @@ pub(crate) struct Candidate {
     pub(crate) collider2: ColliderHandle,
     /// Rapier is not going to update the pair: no side is awake or was changed.
     pub(crate) asleep: bool,
+}
+
+/// All joints of a world.
+pub(crate) struct Joints<'a> {
+    pub(crate) impulse: &'a ImpulseJointSet,
+    pub(crate) multibody: &'a MultibodyJointSet,
+}
+
+impl Joints<'_> {
+    /// Whether rapier drops contacts between the two bodies, by the rules of rapier3d's `narrow_phase/pair_update.rs`.
+    fn keep_apart(&self, body1: RigidBodyHandle, body2: RigidBodyHandle) -> bool {
+        let mut between = self.impulse.joints_between(body1, body2);
+        if between.any(|(_, joint)| !joint.data.contacts_enabled) {
+            return true;
+        }
+        let links = [body1, body2].map(|body| self.multibody.rigid_body_link(body));
+        let [Some(link1), Some(link2)] = links else {
+            return false;
+        };
+        if link1.multibody != link2.multibody {
+            return false;
+        }
+        let multibody = self.multibody.get_multibody(link1.multibody);
+        let joint = self.multibody.joint_between(body1, body2);
+        multibody.is_some_and(|multibody| !multibody.self_contacts_enabled())
+            || joint.is_some_and(|(_, _, link)| !link.joint.data.contacts_enabled)
+    }
 }
 
 /// A collider in the sweep.
@@ -55,13 +85,14 @@ impl CandidateSearch {
         &mut self,
         bodies: &RigidBodySet,
         colliders: &ColliderSet,
+        joints: &Joints<'_>,
         integration: &IntegrationParameters,
         changed: &[ColliderHandle],
     ) -> &[Candidate] {
         self.candidates.clear();
         self.collect(bodies, colliders, integration);
         if self.proxies.iter().any(|proxy| proxy.has_cloud) {
-            self.sweep(bodies, colliders, changed);
+            self.sweep(bodies, colliders, joints, changed);
             self.candidates
                 .sort_unstable_by_key(|c| (index(c.collider1), index(c.collider2)));
         }
@@ -109,6 +140,7 @@ impl CandidateSearch {
         &mut self,
         bodies: &RigidBodySet,
         colliders: &ColliderSet,
+        joints: &Joints<'_>,
         changed: &[ColliderHandle],
     ) {
         let axis = axis_of_most_spread(&self.proxies);
@@ -139,7 +171,7 @@ impl CandidateSearch {
                     (other.handle, proxy.handle)
                 };
                 let (c1, c2) = (&colliders[collider1], &colliders[collider2]);
-                if may_collide(c1, c2, bodies) {
+                if may_collide(c1, c2, bodies, joints) {
                     let is_updated = |c, handle| is_awake(c, bodies) || changed.contains(handle);
                     self.candidates.push(Candidate {
                         collider1,
@@ -252,10 +284,18 @@ pub(crate) fn contact_reach(
     effective_prediction(collider1, collider2, bodies, integration).max(way.min(AHEAD * coarsest))
 }
 
-/// Whether rapier lets the two collide, joints and user hooks left aside.
-fn may_collide(collider1: &Collider, collider2: &Collider, bodies: &RigidBodySet) -> bool {
-    if collider1.parent().is_some() && collider1.parent() == collider2.parent() {
-        return false;
+/// Whether rapier lets the two collide, user hooks left aside. Joints keep contacts apart, and let sensors see.
+fn may_collide(
+    collider1: &Collider,
+    collider2: &Collider,
+    bodies: &RigidBodySet,
+    joints: &Joints<'_>,
+) -> bool {
+    if let (Some(body1), Some(body2)) = (collider1.parent(), collider2.parent()) {
+        let is_sensor = collider1.is_sensor() || collider2.is_sensor();
+        if body1 == body2 || (!is_sensor && joints.keep_apart(body1, body2)) {
+            return false;
+        }
     }
     let body_type =
         |collider| parent_of(collider, bodies).map_or(RigidBodyType::Fixed, RigidBody::body_type);

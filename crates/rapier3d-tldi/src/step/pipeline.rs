@@ -10,11 +10,11 @@ use crate::narrow_phase::parts::append_queries;
 use crate::narrow_phase::passing::Told;
 use crate::shape::exact::ExactShape;
 use crate::step::batching::{Frame, PairMemory};
-use crate::step::candidates::CandidateSearch;
+use crate::step::candidates::{CandidateSearch, Joints};
 use crate::step::prepared::Shared;
 use crate::step::report::{ComparedBy, cloud_pairs, contacts_of};
 use crate::{Contact, PointCloudShape, StepReport, TldiConfig, TldiError, cloud_collider};
-use rapier3d::dynamics::{IntegrationParameters, RigidBodySet};
+use rapier3d::dynamics::{ImpulseJointSet, IntegrationParameters, MultibodyJointSet, RigidBodySet};
 use rapier3d::geometry::{ColliderBuilder, ColliderHandle, ColliderSet, NarrowPhase};
 use rapier3d::math::Vector;
 use rapier3d::pipeline::{EventHandler, PhysicsHooks, PhysicsWorld};
@@ -162,7 +162,9 @@ impl TldiPipeline {
     /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
     /// // What `step` does, one call after the other.
     /// let integration = world.integration_parameters;
-    /// tldi.prepare(world.gravity, &integration, &world.bodies, &world.colliders)?;
+    /// let (bodies, colliders) = (&world.bodies, &world.colliders);
+    /// let joints = (&world.impulse_joints, &world.multibody_joints);
+    /// tldi.prepare(world.gravity, &integration, bodies, colliders, joints.0, joints.1)?;
     /// tldi.push(&mut world.bodies, &world.colliders, &integration);
     /// world.step_with_events(&tldi.hooks(&()), &()); // your own hooks and events
     /// let report = tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
@@ -175,6 +177,8 @@ impl TldiPipeline {
         integration: &IntegrationParameters,
         bodies: &RigidBodySet,
         colliders: &ColliderSet,
+        impulse_joints: &ImpulseJointSet,
+        multibody_joints: &MultibodyJointSet,
     ) -> Result<(), TldiError> {
         let start = Instant::now();
         let shared = Arc::clone(&self.shared);
@@ -186,9 +190,11 @@ impl TldiPipeline {
         // Taken out and put back: no lock is held during the comparison.
         let mut batch = std::mem::take(&mut *shared.batch_mut());
         batch.clear();
-        let candidates = self
-            .search
-            .find(bodies, colliders, integration, &self.changed);
+        let joints = Joints {
+            impulse: impulse_joints,
+            multibody: multibody_joints,
+        };
+        let candidates = (self.search).find(bodies, colliders, &joints, integration, &self.changed);
         self.told.look_for_passing(candidates, colliders);
         let config = shared.config();
         let frame = Frame {
@@ -251,7 +257,9 @@ impl TldiPipeline {
     /// let risen: Vec<Vector> = points.iter().map(|p| *p + 0.05 * Vector::Y).collect(); // 3 m/s
     /// tldi.deform(&mut world, scan, &risen, None)?;
     /// let integration = world.integration_parameters;
-    /// tldi.prepare(world.gravity, &integration, &world.bodies, &world.colliders)?;
+    /// let (bodies, colliders) = (&world.bodies, &world.colliders);
+    /// let joints = (&world.impulse_joints, &world.multibody_joints);
+    /// tldi.prepare(world.gravity, &integration, bodies, colliders, joints.0, joints.1)?;
     /// tldi.push(&mut world.bodies, &world.colliders, &integration);
     /// assert!(world.bodies[ball].linvel().y >= 3.0, "as fast as the surface, or a little faster");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -295,7 +303,9 @@ impl TldiPipeline {
     /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
     /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
     /// let integration = world.integration_parameters;
-    /// tldi.prepare(world.gravity, &integration, &world.bodies, &world.colliders)?;
+    /// let (bodies, colliders) = (&world.bodies, &world.colliders);
+    /// let joints = (&world.impulse_joints, &world.multibody_joints);
+    /// tldi.prepare(world.gravity, &integration, bodies, colliders, joints.0, joints.1)?;
     /// world.step_with_events(&tldi.hooks(&()), &());
     /// let report = tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
     /// assert_eq!(report.pairs_in_contact, 1);
@@ -419,6 +429,8 @@ impl TldiPipeline {
             &world.integration_parameters,
             &world.bodies,
             &world.colliders,
+            &world.impulse_joints,
+            &world.multibody_joints,
         )?;
         self.push(
             &mut world.bodies,

@@ -56,6 +56,8 @@ fn teleport_after_the_batch_is_a_miss() -> TestResult {
         &world.integration_parameters,
         &world.bodies,
         &world.colliders,
+        &world.impulse_joints,
+        &world.multibody_joints,
     )?;
     world.bodies[body].set_translation(Vector::new(0.1, HALF - 0.002, 0.0), true);
     world.step();
@@ -172,6 +174,49 @@ fn pairs_that_cannot_collide_cost_nothing() -> TestResult {
     );
     let report = tldi.step(&mut world)?;
     assert_eq!((report.pairs_batched, report.pairs_missed), (0, 0));
+    Ok(())
+}
+
+/// Neither are pairs that a joint keeps from touching, of each kind of joint that rapier has. Sensors see each other in spite of
+/// joints.
+#[test]
+fn pairs_that_joints_keep_apart_cost_nothing() -> TestResult {
+    let passing = FixedJointBuilder::new().contacts_enabled(false);
+    let meeting = FixedJointBuilder::new().contacts_enabled(true);
+    type Join = fn(&mut PhysicsWorld, [RigidBodyHandle; 2], FixedJointBuilder);
+    let by_impulses: Join = |world, [body1, body2], joint| {
+        world.insert_impulse_joint(body1, body2, joint);
+    };
+    let in_multibody: Join = |world, [body1, body2], joint| {
+        world.insert_multibody_joint(body1, body2, joint);
+    };
+    let without_self_contacts: Join = |world, [body1, body2], joint| {
+        let joint = world.insert_multibody_joint(body1, body2, joint);
+        let joint = joint.expect("two bodies that nothing joins yet");
+        let (multibody, _) = world.multibody_joints.get_mut(joint).expect("inserted");
+        multibody.set_self_contacts_enabled(false);
+    };
+    for (case, join, joint, batched) in [
+        ("impulses", by_impulses, meeting, 1),
+        ("impulses", by_impulses, passing, 0),
+        ("multibody", in_multibody, meeting, 1),
+        ("multibody", in_multibody, passing, 0),
+        ("no self-contacts", without_self_contacts, meeting, 0),
+        ("a sensor", by_impulses, passing, 1),
+    ] {
+        let (mut world, mut tldi) = attached();
+        let bodies = [0.0, 0.1].map(|y| {
+            let collider = tldi.collider(cloud(&cube(0.1))).sensor(case == "a sensor");
+            world.insert(dynamic_at(y), collider).0
+        });
+        join(&mut world, bodies, joint);
+        let report = tldi.step(&mut world)?;
+        assert_eq!(
+            (report.pairs_batched, report.pairs_missed),
+            (batched, 0),
+            "{case} {batched}"
+        );
+    }
     Ok(())
 }
 

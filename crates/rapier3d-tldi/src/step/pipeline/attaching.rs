@@ -104,7 +104,9 @@ impl TldiPipeline {
     /// let moved: Vec<Vector> = points.iter().map(|p| *p + 0.01 * Vector::X).collect(); // 0.6 m/s
     /// tldi.deform(&mut world, scan, &moved, None)?;
     /// let integration = world.integration_parameters;
-    /// tldi.prepare(world.gravity, &integration, &world.bodies, &world.colliders)?;
+    /// let (bodies, colliders) = (&world.bodies, &world.colliders);
+    /// let joints = (&world.impulse_joints, &world.multibody_joints);
+    /// tldi.prepare(world.gravity, &integration, bodies, colliders, joints.0, joints.1)?;
     /// world.step_with_events(&tldi.hooks(&()), &());
     /// tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
     /// assert!(world.bodies[ball].linvel().x > 0.0, "the ball is carried along");
