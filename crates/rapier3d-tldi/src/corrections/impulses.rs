@@ -1,6 +1,7 @@
 //! Impulses outside of rapier's solver: bodies that have to separate at points.
 
 use rapier3d::dynamics::{RigidBodyHandle, RigidBodySet, RigidBodyVelocity};
+use rapier3d::geometry::Collider;
 use rapier3d::math::Vector;
 
 /// Rounds over all points: a box on four corners has come to 1 % of the velocity asked for. Half or
@@ -18,6 +19,12 @@ pub(crate) struct PushedPoint {
     pub(crate) speed: f32,
     /// So far, Ns.
     pub(crate) impulse: f32,
+}
+
+/// Whether rapier's solver separates the two, user hooks left aside.
+pub(crate) fn may_separate(collider1: &Collider, collider2: &Collider) -> bool {
+    let groups = [collider1, collider2].map(Collider::solver_groups);
+    !collider1.is_sensor() && !collider2.is_sensor() && groups[0].test(groups[1])
 }
 
 /// Velocity that a unit of impulse along `normal` at `point` gives to a body.

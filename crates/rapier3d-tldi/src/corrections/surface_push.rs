@@ -6,14 +6,15 @@
 //! step, a body that such a surface is about to penetrate gets the surface's velocity along the
 //! normal, as in an inelastic impact.
 
-use crate::corrections::impulses::{PushedPoint, separate, velocity_at};
+use crate::corrections::impulses::{PushedPoint, may_separate, separate, velocity_at};
 use crate::corrections::surface_motion::SurfaceMotions;
 use crate::narrow_phase::parts::PartPair;
 use crate::step::candidates::pose_of;
 use crate::step::prepared::Batch;
 use rapier3d::dynamics::{IntegrationParameters, RigidBodySet};
-use rapier3d::geometry::{Collider, ColliderSet};
+use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet, SolverFlags};
 use rapier3d::math::{Pose, Vector};
+use rapier3d::pipeline::{ActiveHooks, PairFilterContext, PhysicsHooks};
 use tldi::PairResult;
 
 /// Steps in which a penetration is resolved. A body that moves exactly as fast as the surface would
@@ -21,7 +22,8 @@ use tldi::PairResult;
 /// in any suite.
 const UNDONE_IN: f32 = 6.0;
 
-/// Gives the bodies in the way of surfaces that close faster than `least_speed` m/s their velocity.
+/// Gives the bodies in the way of surfaces that close faster than `least_speed` m/s their velocity. `hooks` are the
+/// user's.
 pub(crate) fn push(
     motions: &SurfaceMotions,
     least_speed: f32,
@@ -29,6 +31,7 @@ pub(crate) fn push(
     bodies: &mut RigidBodySet,
     colliders: &ColliderSet,
     integration: &IntegrationParameters,
+    hooks: &dyn PhysicsHooks,
 ) {
     let mut points = Vec::new();
     for pair in batch.pairs.iter().filter(|pair| !pair.is_kept) {
@@ -39,7 +42,9 @@ pub(crate) fn push(
         let [Some(collider1), Some(collider2)] = found else {
             continue;
         };
-        if collider1.is_sensor() || collider2.is_sensor() {
+        if !may_separate(collider1, collider2)
+            || !hooks_let(hooks, pair.colliders, colliders, bodies)
+        {
             continue;
         }
         let of = [collider1, collider2].map(Collider::parent);
@@ -64,6 +69,32 @@ pub(crate) fn push(
         }
     }
     separate(&mut points, bodies);
+}
+
+/// Whether the user's hooks let rapier's solver separate the colliders.
+fn hooks_let(
+    hooks: &dyn PhysicsHooks,
+    pair: [ColliderHandle; 2],
+    colliders: &ColliderSet,
+    bodies: &RigidBodySet,
+) -> bool {
+    let found = pair.map(|handle| &colliders[handle]);
+    let is_filtered = found.iter().any(|collider| {
+        let active = collider.active_hooks();
+        active.contains(ActiveHooks::FILTER_CONTACT_PAIRS)
+    });
+    let [rigid_body1, rigid_body2] = found.map(Collider::parent);
+    let context = PairFilterContext {
+        bodies,
+        colliders,
+        collider1: pair[0],
+        collider2: pair[1],
+        rigid_body1,
+        rigid_body2,
+    };
+    !is_filtered
+        || (hooks.filter_contact_pair(&context))
+            .is_some_and(|flags| flags.contains(SolverFlags::COMPUTE_RIGID_IMPULSES))
 }
 
 /// Points on both surfaces, normals and gaps of the contacts of `parts`, in world space; `pose1` is

@@ -11,7 +11,7 @@
 //! Rapier does not name the colliders of a sweep. They are found by their shapes, by the pose of the moving one at the
 //! beginning of the step, and by the place of its target.
 
-use crate::corrections::impulses::{PushedPoint, separate};
+use crate::corrections::impulses::{PushedPoint, may_separate, separate};
 use crate::step::prepared::{Batch, Blocked, PreparedPair, Question, address, locked};
 use rapier3d::dynamics::RigidBodySet;
 use rapier3d::geometry::{Collider, ColliderSet};
@@ -93,7 +93,7 @@ impl Batch {
             let Blocked { point, normal } = locked(&pair.blocked).take()?;
             let [collider1, collider2] = pair.colliders.map(|handle| colliders.get(handle));
             let colliders = [collider1?, collider2?];
-            (!colliders.iter().any(|collider| collider.is_sensor())).then(|| PushedPoint {
+            may_separate(colliders[0], colliders[1]).then(|| PushedPoint {
                 bodies: colliders.map(Collider::parent),
                 point,
                 normal,
@@ -110,11 +110,47 @@ mod tests {
     use super::*;
     use crate::narrow_phase::parts::{Hint, ShapePair, append_part_pairs};
     use crate::{PointCloudShape, TldiConfig};
-    use rapier3d::geometry::{ColliderHandle, SharedShape};
-    use rapier3d::math::Vector;
+    use rapier3d::prelude::*;
     use std::sync::Mutex;
     use std::sync::atomic::AtomicBool;
     use tldi::{ContactPatch, ContactPoint, PairResult, PointCloud};
+
+    /// Rapier sweeps bodies of other solver groups, too, but does not stop them.
+    #[test]
+    fn sweeps_stop_what_the_solver_may() {
+        let [first, second] = [Group::GROUP_1, Group::GROUP_2]
+            .map(|group| InteractionGroups::new(group, group, InteractionTestMode::And));
+        for (of_body, speed) in [(first, 0.0), (second, 3.0)] {
+            let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
+            let body = bodies.insert(RigidBodyBuilder::dynamic().linvel(-3.0 * Vector::Y));
+            let [ground, ball] = [SharedShape::ball(1.0), SharedShape::ball(0.1)];
+            let floor = ColliderBuilder::new(ground.clone()).solver_groups(first);
+            let of_ball = ColliderBuilder::new(ball.clone()).solver_groups(of_body);
+            let pair = PreparedPair {
+                colliders: [
+                    colliders.insert(floor),
+                    colliders.insert_with_parent(of_ball, body, &mut bodies),
+                ],
+                bodies: [None, Some(body)],
+                poses: [Pose::IDENTITY; 2],
+                question: Question::Contacts(0.1),
+                parts: 0..0,
+                used: AtomicBool::new(true),
+                blocked: Mutex::new(Some(Blocked {
+                    point: Vector::ZERO,
+                    normal: Vector::Y,
+                })),
+                is_kept: false,
+                measured: None,
+                shapes: [ground, ball],
+            };
+            bodies[body].recompute_mass_properties_from_colliders(&colliders);
+            let mut batch = Batch::default();
+            batch.push(pair, &Pose::IDENTITY);
+            batch.stop_blocked(&mut bodies, &colliders);
+            assert_eq!(bodies[body].linvel().length(), speed);
+        }
+    }
 
     /// A body between two tiles of one shape is as deep in each as that one's contacts say; a sensor tile holds nothing.
     #[test]

@@ -165,7 +165,7 @@ impl TldiPipeline {
     /// let (bodies, colliders) = (&world.bodies, &world.colliders);
     /// let joints = (&world.impulse_joints, &world.multibody_joints);
     /// tldi.prepare(world.gravity, &integration, bodies, colliders, joints.0, joints.1)?;
-    /// tldi.push(&mut world.bodies, &world.colliders, &integration);
+    /// tldi.push(&mut world.bodies, &world.colliders, &integration, &());
     /// world.step_with_events(&tldi.hooks(&()), &()); // your own hooks and events
     /// let report = tldi.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)?;
     /// assert_eq!((report.pairs_batched, report.pairs_missed), (1, 0));
@@ -241,6 +241,10 @@ impl TldiPipeline {
     /// the last two steps; noise, and a surface that jumps once, have none. Cost: for each contact of
     /// such a cloud a pass over the points in the blocks around it.
     ///
+    /// A surface pushes what rapier's solver lets it push: no sensors, no colliders whose solver groups exclude each
+    /// other, and what `filter_contact_pair` of your hooks lets it, which is asked here once more in each step. What
+    /// `modify_solver_contacts` will do is not known yet.
+    ///
     /// ```
     /// # use rapier3d::prelude::*;
     /// # use rapier3d_tldi::prelude::*;
@@ -260,7 +264,7 @@ impl TldiPipeline {
     /// let (bodies, colliders) = (&world.bodies, &world.colliders);
     /// let joints = (&world.impulse_joints, &world.multibody_joints);
     /// tldi.prepare(world.gravity, &integration, bodies, colliders, joints.0, joints.1)?;
-    /// tldi.push(&mut world.bodies, &world.colliders, &integration);
+    /// tldi.push(&mut world.bodies, &world.colliders, &integration, &());
     /// assert!(world.bodies[ball].linvel().y >= 3.0, "as fast as the surface, or a little faster");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -269,6 +273,7 @@ impl TldiPipeline {
         bodies: &mut RigidBodySet,
         colliders: &ColliderSet,
         integration: &IntegrationParameters,
+        hooks: &dyn PhysicsHooks,
     ) {
         let least_speed = self.motions.begin_push();
         surface_push::push(
@@ -278,6 +283,7 @@ impl TldiPipeline {
             bodies,
             colliders,
             integration,
+            hooks,
         );
     }
 
@@ -436,6 +442,7 @@ impl TldiPipeline {
             &mut world.bodies,
             &world.colliders,
             &world.integration_parameters,
+            hooks,
         );
         world.step_with_events(&self.hooks(hooks), events);
         self.finish(&mut world.bodies, &world.narrow_phase, &world.colliders)

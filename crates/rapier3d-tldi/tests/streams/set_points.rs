@@ -232,6 +232,41 @@ fn fast_floors_push_what_stands_on_them() -> TestResult {
     Ok(())
 }
 
+/// It passes what rapier's solver keeps apart: bodies of other solver groups, and those that a joint lets pass.
+#[test]
+fn fast_floors_push_only_what_they_touch() -> TestResult {
+    let apart = InteractionGroups::new(Group::GROUP_1, Group::GROUP_1, InteractionTestMode::And);
+    let others = InteractionGroups::new(Group::GROUP_2, Group::GROUP_2, InteractionTestMode::And);
+    for (case, of_floor, of_body, is_joined) in [
+        ("same groups", apart, apart, false),
+        ("other groups", apart, others, false),
+        ("a joint", apart, apart, true),
+    ] {
+        let (mut world, mut tldi) = attached();
+        let collider = tldi.collider(cloud(&square(0.8))).solver_groups(of_floor);
+        let (ground, floor) = world.insert(RigidBodyBuilder::fixed(), collider);
+        let collider = tldi.collider(cloud(&cube(HALF))).solver_groups(of_body);
+        let (body, _) = world.insert(dynamic_at(HALF).gravity_scale(0.0), collider);
+        if is_joined {
+            let free = GenericJointBuilder::new(JointAxesMask::empty()).contacts_enabled(false);
+            world.insert_impulse_joint(ground, body, free);
+        }
+        let rise = Vector::Y * 6.0 * world.integration_parameters.dt;
+        for k in 1..=3 {
+            let risen: Vec<Vector> = (square(0.8).iter()).map(|p| *p + k as f32 * rise).collect();
+            tldi.deform(&mut world, floor, &risen, None)?;
+            tldi.step(&mut world)?;
+        }
+        let speed = world.bodies[body].linvel().y;
+        let is_right = match case {
+            "same groups" => speed > 5.0,
+            _ => speed == 0.0,
+        };
+        assert!(is_right, "{case}: {speed} m/s");
+    }
+    Ok(())
+}
+
 /// So does one that a sensor sees in every second step only: it is not taken to be twice as fast, nor
 /// for one that stands still in between.
 #[test]
