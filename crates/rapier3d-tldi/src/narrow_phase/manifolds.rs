@@ -8,7 +8,7 @@
 use crate::narrow_phase::parts::{PartPair, ShapePair, part};
 use crate::narrow_phase::planes::share_planes;
 use crate::step::measured::Measured;
-use rapier3d::geometry::{ContactManifold, ContactManifoldData};
+use rapier3d::geometry::{ContactData, ContactManifold, ContactManifoldData};
 use rapier3d::parry::query::details::{
     ContactManifoldsWorkspace, TypedWorkspaceData, WorkspaceData,
 };
@@ -63,7 +63,7 @@ pub(crate) fn keep(
 }
 
 /// Replaces a pair's manifolds by those of `parts`, whose comparisons have the results `results`,
-/// and carries the impulses of the step before over to the contacts nearest by. `measured` tells
+/// and carries the impulses and user data of the step before over to the contacts nearest by. `measured` tells
 /// for how long they hold.
 pub(crate) fn fill(
     pair: &ShapePair<'_>,
@@ -108,6 +108,7 @@ pub(crate) fn fill(
     if parts.len() > 1 {
         share_planes(pair, scatter, manifolds);
     }
+    inherit_user_data(manifolds, previous, match_distance);
     for manifold in manifolds {
         inherit_impulses(manifold, previous, match_distance);
     }
@@ -202,42 +203,63 @@ fn append_exact(pair: &ShapePair<'_>, parts: &PartPair, manifolds: &mut Vec<Cont
     }
 }
 
-/// Hands the impulses of the old contacts to the new ones nearest to them, each at most once.
-///
-/// A contact stays put on at least one of the two shapes (both at rest, one when sliding), so the
-/// nearer of the two distances counts. Manifolds the solver did not see (rapier solved clusters in
-/// their place, and matches those itself) have nothing to inherit.
+/// Hands the user data of the old manifolds to the new ones nearest to them. What hooks know of a manifold holds as long as
+/// the pair touches in its place, whether the solver saw it and wherever its normal turns: so a one-way platform knows
+/// a body that is on its way through.
+fn inherit_user_data(
+    manifolds: &mut [ContactManifold],
+    previous: &[ContactManifold],
+    match_distance: f32,
+) {
+    for manifold in manifolds {
+        let mut points = manifold.points.iter();
+        let nearest = points.find_map(|point| nearest(point, previous, match_distance, |_| true));
+        if let Some((m, _)) = nearest {
+            manifold.data.user_data = previous[m].data.user_data;
+        }
+    }
+}
+
+/// Hands the impulses of the old contacts to the new ones nearest to them, each at most once. Manifolds the solver did
+/// not see (rapier solved clusters in their place, and matches those itself) have nothing to inherit.
 fn inherit_impulses(
     manifold: &mut ContactManifold,
     previous: &mut [ContactManifold],
     match_distance: f32,
 ) {
     let normal = manifold.local_n1;
-    let mut inherits_user_data = true;
+    let is_meant = |old: &ContactManifold| {
+        !old.data.solver_contacts.is_empty() && old.local_n1.dot(normal) >= COS_SAME_NORMAL
+    };
     for point in &mut manifold.points {
-        let mut nearest = None;
-        let mut nearest_squared = match_distance * match_distance;
-        for (m, old) in previous.iter().enumerate() {
-            if old.data.solver_contacts.is_empty() || old.local_n1.dot(normal) < COS_SAME_NORMAL {
-                continue;
-            }
-            for (p, old_point) in old.points.iter().enumerate() {
-                let squared = old_point
-                    .local_p1
-                    .distance_squared(point.local_p1)
-                    .min(old_point.local_p2.distance_squared(point.local_p2));
-                if squared < nearest_squared {
-                    nearest = Some((m, p));
-                    nearest_squared = squared;
-                }
-            }
+        if let Some((m, p)) = nearest(point, previous, match_distance, is_meant) {
+            point.data = previous[m].points.swap_remove(p).data;
         }
-        if let Some((m, p)) = nearest {
-            let old = &mut previous[m];
-            point.data = old.points.swap_remove(p).data;
-            if std::mem::take(&mut inherits_user_data) {
-                manifold.data.user_data = old.data.user_data;
+    }
+}
+
+/// Which point of which old manifold is nearest to `point`, among those that are meant and within `match_distance`.
+/// A contact stays put on at least one of the two shapes (both at rest, one when sliding), so the nearer of the two
+/// distances counts.
+fn nearest(
+    point: &TrackedContact<ContactData>,
+    previous: &[ContactManifold],
+    match_distance: f32,
+    is_meant: impl Fn(&ContactManifold) -> bool,
+) -> Option<(usize, usize)> {
+    let mut nearest = None;
+    let mut nearest_squared = match_distance * match_distance;
+    for (m, old) in previous.iter().enumerate().filter(|(_, old)| is_meant(old)) {
+        for (p, old_point) in old.points.iter().enumerate() {
+            let squared = old_point
+                .local_p1
+                .distance_squared(point.local_p1)
+                .min(old_point.local_p2.distance_squared(point.local_p2));
+            if squared < nearest_squared {
+                nearest = Some((m, p));
+                nearest_squared = squared;
             }
         }
     }
+    nearest
 }

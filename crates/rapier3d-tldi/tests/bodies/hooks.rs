@@ -215,6 +215,47 @@ fn fast_floors_push_only_what_hooks_let() -> TestResult {
     Ok(())
 }
 
+/// Hooks that count in the user data of a manifold how often they saw it, and may take its contacts away.
+struct Counting {
+    clears: bool,
+    counts: Mutex<Vec<u32>>,
+}
+
+impl PhysicsHooks for Counting {
+    fn modify_solver_contacts(&self, context: &mut ContactModificationContext<'_>) {
+        let rigid = context.rigid_mut().expect("no soft body is there");
+        *rigid.user_data += 1;
+        let mut counts = self.counts.lock().expect("no hook panicked");
+        counts.push(*rigid.user_data);
+        if self.clears {
+            rigid.solver_contacts.clear();
+        }
+    }
+}
+
+/// The user data of a manifold lasts as long as the body lies there, whether its contacts are measured in every step or kept,
+/// and whether the hook leaves them to the solver.
+#[test]
+fn user_data_of_manifolds_lasts() -> TestResult {
+    for clears in [false, true] {
+        for deforms in [false, true] {
+            let mut scene = CubeOnFloor::new(ActiveHooks::MODIFY_SOLVER_CONTACTS);
+            let body = &mut scene.world.bodies[scene.body];
+            body.set_gravity_scale(0.0, true);
+            *body.activation_mut() = RigidBodyActivation::cannot_sleep();
+            let counting = Counting {
+                clears,
+                counts: Mutex::default(),
+            };
+            scene.run(deforms, &counting)?;
+            let counts = counting.counts.into_inner()?;
+            let expected: Vec<u32> = (1..=60).collect();
+            assert_eq!(counts, expected, "clears {clears}, deforms {deforms}");
+        }
+    }
+    Ok(())
+}
+
 /// A hook that takes the contacts away lets the body fall, and is asked although only the user wants it.
 #[test]
 fn cleared_contacts_hold_nothing() -> TestResult {
