@@ -10,8 +10,8 @@ use tldi::{CloudError, PointCloud};
 impl TldiPipeline {
     /// Replaces the points and, where given, the normals (one for each point) of a cloud's
     /// collider, and tells rapier, which wakes the body and what it touches; see
-    /// [`PointCloud::set_points`] for radii, and normals that are not given. The mass of a body whose
-    /// collider has a density is computed anew. For the frames of a sensor there is
+    /// [`PointCloud::set_points`] for radii, and normals that are not given. The body keeps its mass
+    /// ([`PointCloudShape::refresh_mass`] lets it follow the points). For the frames of a sensor there is
     /// [`CloudStream`](crate::CloudStream).
     ///
     /// Called with other points in every step, it keeps what touches the collider awake for ever;
