@@ -10,7 +10,7 @@ use rapier3d::prelude::*;
 
 #[test]
 fn a_character_on_a_cloud_is_warned_about() -> TestResult {
-    warnings::listen();
+    warnings::listen("TldiPipeline::attach");
     let (mut world, mut tldi) = attached();
     insert_floor(&mut world, 0.8);
     tldi.step(&mut world)?;

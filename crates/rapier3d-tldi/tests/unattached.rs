@@ -9,7 +9,7 @@ use rapier3d::prelude::*;
 
 #[test]
 fn a_world_without_a_pipeline_is_warned_about() {
-    warnings::listen();
+    warnings::listen("TldiPipeline::attach");
     let fill = |world: &mut PhysicsWorld| {
         insert_floor(world, 0.8);
         world.insert(

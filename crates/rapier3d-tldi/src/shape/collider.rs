@@ -10,8 +10,9 @@ use rapier3d::pipeline::ActiveHooks;
 /// The collider has [`ActiveHooks::FILTER_INTERSECTION_PAIR`] set: rapier then asks for its
 /// contacts in every step. Without any hook flag rapier keeps a pair's contacts while the relative
 /// pose drifts by less than 5 cm (`normalized_contact_recycle_distance`), which for a body of
-/// 15 cm means deep penetration. Of the flags this one has the fewest side effects: user hooks see
-/// the pairs of the collider only where one is a sensor.
+/// 15 cm means deep penetration. For a cloud in a collider of another make, such as a compound, set the
+/// flag yourself; a pipeline warns once in the [`log`] where it is missing. Of the flags this one has the
+/// fewest side effects: user hooks see the pairs of the collider only where one is a sensor.
 ///
 /// ```
 /// use rapier3d::prelude::*;

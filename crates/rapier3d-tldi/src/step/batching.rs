@@ -9,8 +9,8 @@ use crate::step::prepared::{Batch, PreparedPair, Question};
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet};
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, Once};
 
 /// All that a batch is made from.
 pub(crate) struct Frame<'a> {
@@ -49,6 +49,7 @@ impl<'a> Frame<'a> {
             pos12,
             prediction,
         };
+        self.warn_of_recycling(collider1, collider2);
         let question = match collider1.is_sensor() || collider2.is_sensor() {
             true => Question::Crossing,
             false => Question::Contacts(prediction),
@@ -82,6 +83,25 @@ impl<'a> Frame<'a> {
             },
             &pos12,
         );
+    }
+
+    /// Warns once, in the log: rapier does not ask about a pair without hooks that moves by less than its own distance for
+    /// recycling, whatever the points say.
+    fn warn_of_recycling(&self, collider1: &Collider, collider2: &Collider) {
+        let has_hooks = !(collider1.active_hooks() | collider2.active_hooks()).is_empty();
+        let is_sensor = collider1.is_sensor() || collider2.is_sensor();
+        if has_hooks || is_sensor || !self.integration.contact_recycling {
+            return;
+        }
+        static WARNING: Once = Once::new();
+        WARNING.call_once(|| {
+            log::warn!(
+                "a cloud's collider has no active hooks: rapier keeps its contacts while it moves by less than {} m, so that \
+                 small bodies sink in. Make it by cloud_collider, set ActiveHooks::FILTER_INTERSECTION_PAIR, or switch off \
+                 IntegrationParameters::contact_recycling",
+                self.integration.contact_recycle_distance()
+            );
+        });
     }
 
     fn push_parts(

@@ -1,9 +1,13 @@
 //! A logger that counts the crate's warnings. One test a binary: the log is one for a process.
 
 use log::{Level, LevelFilter, Log, Metadata, Record};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 static COUNT: AtomicUsize = AtomicUsize::new(0);
+
+/// What each warning has to name.
+static REMEDY: OnceLock<&str> = OnceLock::new();
 
 struct Counter;
 
@@ -14,7 +18,8 @@ impl Log for Counter {
 
     fn log(&self, record: &Record<'_>) {
         if self.enabled(record.metadata()) {
-            assert!(record.args().to_string().contains("TldiPipeline::attach"));
+            let remedy = REMEDY.get().expect("set before the logger");
+            assert!(record.args().to_string().contains(remedy));
             COUNT.fetch_add(1, Ordering::Relaxed);
         }
     }
@@ -22,8 +27,9 @@ impl Log for Counter {
     fn flush(&self) {}
 }
 
-/// Counts from now on.
-pub(crate) fn listen() {
+/// Counts from now on warnings, all of which name `remedy`.
+pub(crate) fn listen(remedy: &'static str) {
+    REMEDY.set(remedy).expect("one test a binary");
     log::set_logger(&Counter).expect("one test a binary");
     log::set_max_level(LevelFilter::Warn);
 }
