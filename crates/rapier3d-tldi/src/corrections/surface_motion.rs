@@ -9,7 +9,8 @@
 
 use crate::PointCloudShape;
 use crate::corrections::sampled_motion::{Snapshot, way_along};
-use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodyHandle};
+use crate::step::candidates::pose_of;
+use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodyHandle, RigidBodySet};
 use rapier3d::geometry::{ColliderHandle, ColliderSet, SolverFlags};
 use rapier3d::math::Vector;
 use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
@@ -200,7 +201,7 @@ impl SurfaceMotions {
     pub(crate) fn at(
         &self,
         collider: ColliderHandle,
-        colliders: &ColliderSet,
+        (bodies, colliders): (&RigidBodySet, &ColliderSet),
         point: Vector,
         normal: Vector,
     ) -> Vector {
@@ -210,7 +211,7 @@ impl SurfaceMotions {
         let Some(shape) = found.shape().as_shape::<PointCloudShape>() else {
             return Vector::ZERO;
         };
-        let pose = found.position();
+        let pose = pose_of(found, bodies);
         let local = pose.inverse_transform_point(point);
         if let Some(motion) = self.motions.iter().find(|m| m.collider == collider) {
             if motion.revision != shape.revision() {
@@ -295,7 +296,7 @@ impl PhysicsHooks for TldiHooks<'_> {
 
     fn modify_solver_contacts(&self, context: &mut ContactModificationContext<'_>) {
         let (collider1, collider2) = (context.collider1, context.collider2);
-        let colliders = context.colliders;
+        let sets = (context.bodies, context.colliders);
         let moves = |handle: Option<RigidBodyHandle>| {
             let body = handle.and_then(|handle| context.bodies.get(handle));
             body.is_some_and(RigidBody::is_dynamic)
@@ -312,8 +313,7 @@ impl PhysicsHooks for TldiHooks<'_> {
         {
             for contact in rigid.solver_contacts.iter_mut() {
                 // Inside a hook the anchors are in world space.
-                let of =
-                    |collider, anchor| self.motions.at(collider, colliders, anchor, *rigid.normal);
+                let of = |collider, anchor| self.motions.at(collider, sets, anchor, *rigid.normal);
                 let velocity = of(collider1, contact.anchor1) - of(collider2, contact.anchor2);
                 let closing = velocity.dot(*rigid.normal).max(0.0);
                 contact.tangent_velocity += velocity;

@@ -51,8 +51,14 @@ pub(crate) fn push(
         let pose1 = pose_of(collider1, bodies);
         let parts = &batch.parts[pair.parts.clone()];
         for (on_surface, normal, gap) in contacts(parts, &batch.results, &pose1) {
-            let velocity =
-                |k: usize| motions.at(pair.colliders[k], colliders, on_surface[k], normal);
+            let velocity = |k: usize| {
+                motions.at(
+                    pair.colliders[k],
+                    (bodies, colliders),
+                    on_surface[k],
+                    normal,
+                )
+            };
             let point = on_surface[0].midpoint(on_surface[1]);
             let speed = (velocity(0) - velocity(1)).dot(normal);
             let closing =

@@ -267,6 +267,27 @@ fn fast_floors_push_only_what_they_touch() -> TestResult {
     Ok(())
 }
 
+/// It pushes along where its body was turned to since the last step.
+#[test]
+fn fast_floors_push_as_their_bodies_were_turned() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let upright = Rotation::from_rotation_z(0.5 * std::f32::consts::PI);
+    let (ground, floor) = world.insert(
+        RigidBodyBuilder::fixed().rotation(upright.to_scaled_axis()),
+        tldi.collider(cloud(&square(0.8))),
+    );
+    let body = dynamic_at(HALF).gravity_scale(0.0);
+    let (body, _) = world.insert(body, tldi.collider(cloud(&cube(HALF))));
+    world.bodies[ground].set_rotation(Rotation::IDENTITY, true);
+    let rise = Vector::Y * 6.0 * world.integration_parameters.dt;
+    let risen: Vec<Vector> = square(0.8).iter().map(|p| *p + rise).collect();
+    tldi.deform(&mut world, floor, &risen, None)?;
+    tldi.step(&mut world)?;
+    let speed = world.bodies[body].linvel().y;
+    assert!(speed > 5.0, "{speed} m/s");
+    Ok(())
+}
+
 /// So does one that a sensor sees in every second step only: it is not taken to be twice as fast, nor
 /// for one that stands still in between.
 #[test]
