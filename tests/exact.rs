@@ -137,6 +137,66 @@ fn clouds_against_exact_surfaces() {
     }
 }
 
+/// The half-space, as a part of a terrain with hills: its bounds leave out no point.
+struct Valley;
+
+impl RaySurface for Valley {
+    fn bounds(&self) -> Aabb {
+        Aabb {
+            min: Vec3::NEG_INFINITY,
+            max: Vec3::INFINITY,
+        }
+    }
+
+    fn crossings(&self, origin: Vec3, direction: Vec3, max_distance: f32, hits: &mut Vec<RayHit>) {
+        HalfSpace.crossings(origin, direction, max_distance, hits);
+    }
+
+    fn project(&self, point: Vec3) -> (f32, Vec3) {
+        HalfSpace.project(point)
+    }
+
+    fn is_closed(&self) -> bool {
+        true
+    }
+}
+
+/// A plate rests on a floor as deep as without stray points, some of them above it. With many, the cells of the space that
+/// is left of the gaps between them hold points of the plate and strays.
+#[test]
+fn stray_points_do_not_hide_a_floor() {
+    for seed in 0..8 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let half = Vec3::new(0.1, 0.03, 0.1);
+        let plate = sampled_box(half, R, &mut rng).points;
+        for strays in [0, 5, 20, 50, 200] {
+            let mut points: Vec<Vec3> = (0..strays)
+                .map(|k| {
+                    let distance = 10.0f32.powf(3.0 * rng.f32());
+                    let place = distance * random_unit(&mut rng);
+                    match k % 4 {
+                        0 => (half * random_unit(&mut rng)).with_y(distance),
+                        _ => place.with_y(0.5 + place.y.abs()),
+                    }
+                })
+                .collect();
+            points.extend(&plate);
+            let cloud = PointCloud::builder(points).radius(R).build();
+            let result = compare(
+                Surface::Exact(&Valley),
+                Surface::Cloud(&cloud.expect("a valid cloud")),
+                Pose3::translation(0.0, half.y - 0.5 * R, 0.0),
+                Params::for_radius(R),
+            );
+            let case = format!("seed {seed}, {strays} strays");
+            let (gap, _) = deepest_point(&result).expect(&case);
+            assert!((gap + 0.5 * R).abs() < 0.2 * R, "{case}: {gap}");
+            assert!(result.patches[0].normal.y > 0.999, "{case}");
+            assert_eq!(result.patches[0].points.len(), 4, "{case}");
+        }
+    }
+}
+
 /// What cannot be compared is refused with the place in the batch.
 #[test]
 fn unsupported_pairs_are_named() {

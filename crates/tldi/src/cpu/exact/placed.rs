@@ -15,12 +15,28 @@ const LEAST_FREE: f32 = 0.05;
 /// Half as many draw a few columns more in which nothing meets; twice as many cost as much again.
 pub(crate) const MOST_STEPS: usize = 64;
 
-/// For each cell, the least distance that a point in it can have, metres. It is not a number until it is asked for. Kept
-/// from call to call.
+/// How far the cells of a grid are from the surface; kept from call to call.
 #[derive(Default)]
 pub(crate) struct CellDistances {
-    pub(crate) least: Vec<f32>,
+    pub(crate) cells: Vec<CellDistance>,
     pub(crate) fold: SpaceFold,
+}
+
+/// Of one cell.
+#[derive(Clone, Copy)]
+pub(crate) struct CellDistance {
+    /// Of the cell, where its points are: before gaps were folded.
+    pub(crate) middle: Vec3,
+    /// The least that a point in the cell can have, metres.
+    pub(crate) least: f32,
+}
+
+impl CellDistance {
+    /// Of a cell that was not asked for: no point is in it.
+    pub(crate) const UNKNOWN: Self = Self {
+        middle: Vec3::INFINITY,
+        least: f32::INFINITY,
+    };
 }
 
 /// An exact surface where a pair has it.
