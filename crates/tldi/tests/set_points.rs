@@ -353,3 +353,28 @@ fn unoriented_normals_have_the_side_of_the_viewpoint() {
     let outward = outward.viewpoint(3.0 * Vec3::Y).build().expect("valid");
     assert_eq!(outward.normals().map(|n| n[1]), Some(-Vec3::Y));
 }
+
+/// Errors name points by the index that the caller knows, dropped ones included.
+#[test]
+fn errors_count_dropped_points() {
+    let mut rng = Rng::with_seed(12);
+    let mut cloud = PointCloud::builder(random_points(&mut rng, 100))
+        .radius(0.5)
+        .build()
+        .expect("valid");
+    let mut points = random_points(&mut rng, 100);
+    for index in [3, 50, 51] {
+        points[index] = Vec3::NAN;
+    }
+    for index in [0, 4, 49, 52, 99] {
+        let mut points = points.clone();
+        points[index].y = 1e9;
+        let found = cloud.set_points(&points, None).expect_err("too far");
+        let expected = CloudError::CoordinateTooLarge {
+            index,
+            coordinate: 1e9,
+            radius: 0.5,
+        };
+        assert_eq!(found, expected);
+    }
+}

@@ -338,7 +338,10 @@ impl<'a> PointCloud<'a> {
         .of(new_points)?;
         let new_radii = rule.map(|_| Radii::PerPoint(found.radii.into()));
         let radii = new_radii.as_ref().unwrap_or(&self.radii);
-        let given_index = |i: usize| order.map_or(i, |order| order[i] as usize);
+        let given_index = |i: usize| {
+            let kept = order.map_or(i, |order| order[i] as usize);
+            index_before_drop(kept, &gathered.dropped)
+        };
         check_radii(radii, given_index)?;
         check_coordinates(new_points, bounds, radii, given_index)?;
         if let Some(normals) = normals {
