@@ -1,8 +1,9 @@
 //! What the CPU backend cannot compare it refuses with an error, and does not try.
 
-use tldi::glamx::{Pose3, Vec3};
+use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi::{
-    Backend, BackendError, CpuBackend, PairQuery, Params, PointCloud, Surface, View, VirtualCamera,
+    Backend, BackendError, CpuBackend, ImpactQuery, PairQuery, Params, Penetration, PointCloud,
+    Projection, Surface, View, VirtualCamera,
 };
 
 /// The reason why two clouds of two points, 1 m apart with radii of 1 cm, are not compared.
@@ -63,4 +64,112 @@ fn perspective_images_without_a_size() {
             "{reason:?}"
         );
     }
+}
+
+fn refused(reason: Option<&str>, word: &str) {
+    assert!(
+        reason.is_some_and(|r| r.contains(word)),
+        "{word}: {reason:?}"
+    );
+}
+
+#[test]
+fn fixed_cameras_that_show_nothing() {
+    let of_camera = |camera| refusal(View::Fixed(camera), Params::for_radius(0.01));
+    let camera = VirtualCamera::along(Vec3::Z, 0.01);
+    assert_eq!(of_camera(camera), None);
+    for pixel_size in [0.0, -0.01, f32::NAN, f32::INFINITY, 1e-20] {
+        let projection = Projection::Orthographic { pixel_size };
+        let of_pixels = of_camera(VirtualCamera {
+            projection,
+            ..camera
+        });
+        refused(of_pixels, "pixel_size");
+    }
+    for pose in [
+        Pose3::from_translation(f32::NAN * Vec3::X),
+        Pose3::from_rotation(Quat::from_xyzw(f32::NAN, 0.0, 0.0, 1.0)),
+        Pose3::from_rotation(Quat::from_xyzw(0.0, 0.0, 0.0, 0.0)),
+        Pose3::from_rotation(Quat::from_xyzw(0.0, 0.0, 0.0, 2.0)),
+    ] {
+        let view_from_frame = pose;
+        let of_pose = of_camera(VirtualCamera {
+            view_from_frame,
+            ..camera
+        });
+        refused(of_pose, "unit quaternion");
+    }
+    let perspective = |focal_px, near, far| VirtualCamera {
+        projection: Projection::Perspective {
+            focal_px,
+            near,
+            far,
+        },
+        size: Some([64, 64]),
+        ..camera
+    };
+    assert_eq!(of_camera(perspective(50.0, 0.1, 9.0)), None);
+    let [inf, nan] = [f32::INFINITY, f32::NAN];
+    for [focal_px, near, far] in [
+        [0.0, 0.1, 9.0],
+        [-50.0, 0.1, 9.0],
+        [nan, 0.1, 9.0],
+        [inf, 0.1, 9.0],
+        [50.0, 0.0, 9.0],
+        [50.0, nan, 9.0],
+        [50.0, 9.0, 0.1],
+        [50.0, 0.1, nan],
+        [50.0, 0.1, inf],
+    ] {
+        refused(of_camera(perspective(focal_px, near, far)), "focal_px");
+    }
+}
+
+#[test]
+fn shares_are_from_0_to_1() {
+    let params = Params::for_radius(0.01);
+    for share in [-0.1, 1.1, f32::NAN, f32::INFINITY] {
+        let damped = Params {
+            slope_damping: share,
+            ..params
+        };
+        refused(refusal(aim(), damped), "slope_damping");
+        let compressed = Params {
+            rho: share,
+            ..params
+        };
+        refused(refusal(aim(), compressed), "rho");
+    }
+    let ends = Params {
+        slope_damping: 0.0,
+        rho: 1.0,
+        ..params
+    };
+    assert_eq!(refusal(aim(), ends), None);
+}
+
+#[test]
+fn penetrations_are_finite() {
+    let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.01);
+    let cloud = cloud.build().expect("the points are valid");
+    let cast = |normal, depth| {
+        let query = ImpactQuery {
+            a: Surface::Cloud(&cloud),
+            b: Surface::Cloud(&cloud),
+            a_from_b: Pose3::IDENTITY,
+            motion: Vec3::X,
+            touching: 0.0,
+            core_only: false,
+            penetration: Some(Penetration { normal, depth }),
+            params: Params::for_radius(0.01),
+        };
+        match CpuBackend::new().impact(&query) {
+            Ok(_) => None,
+            Err(BackendError::Unsupported { reason, .. }) => Some(reason),
+            Err(other) => panic!("{other}"),
+        }
+    };
+    assert_eq!(cast(Vec3::Y, 0.1), None);
+    refused(cast(Vec3::NAN, 0.1), "penetration");
+    refused(cast(Vec3::Y, f32::INFINITY), "penetration");
 }

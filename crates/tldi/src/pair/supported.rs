@@ -1,7 +1,10 @@
 //! Which pairs can be compared, and why others cannot.
 
 use crate::pair::pixels::least_pixel;
-use crate::{ImpactQuery, PairQuery, Params, Projection, Surface, Variant, View, paper};
+use crate::{
+    ImpactQuery, PairQuery, Params, Penetration, Projection, Surface, Variant, View, VirtualCamera,
+    paper,
+};
 use glamx::Vec3;
 use std::ops::RangeInclusive;
 
@@ -24,8 +27,9 @@ impl PairQuery<'_> {
         if !(is_view_finite && self.a_from_b.is_finite()) {
             return Err("a_from_b, motion and last_axis must be finite");
         }
-        if matches!(self.view, View::Aim { .. }) {
-            is_countable([self.a, self.b], self.params.pixel_size)?;
+        match self.view {
+            View::Aim { .. } => is_countable([self.a, self.b], self.params.pixel_size)?,
+            View::Fixed(camera) => camera.check([self.a, self.b])?,
         }
         let exact = matches!(self.a, Surface::Exact(_)) || matches!(self.b, Surface::Exact(_));
         if exact && self.params.variant() == Variant::Paper {
@@ -76,6 +80,30 @@ fn is_countable(surfaces: [Surface; 2], pixel_size: f32) -> Result<(), &'static 
     }
 }
 
+impl VirtualCamera {
+    /// Whether it shows these surfaces in pixels that can be counted; if not, why.
+    fn check(&self, surfaces: [Surface; 2]) -> Result<(), &'static str> {
+        let pose = self.view_from_frame;
+        if !(pose.is_finite() && pose.rotation.is_normalized()) {
+            return Err("view_from_frame must be finite, with a unit quaternion: normalise it");
+        }
+        match self.projection {
+            Projection::Orthographic { pixel_size } if !Params::LENGTHS.contains(&pixel_size) => {
+                Err("the camera's pixel_size must be 1e-14 to 1e14: choose another")
+            }
+            Projection::Orthographic { pixel_size } => is_countable(surfaces, pixel_size),
+            Projection::Perspective {
+                focal_px,
+                near,
+                far,
+            } => match [focal_px, near, far].map(|c| c.is_finite() && c > 0.0) {
+                [true, true, true] if near < far => Ok(()),
+                _ => Err("focal_px, near and far must be finite and above 0, near less than far"),
+            },
+        }
+    }
+}
+
 impl ImpactQuery<'_> {
     /// Whether the CPU can find the impact; if not, why, and what to do instead.
     pub(crate) fn check(&self) -> Result<(), &'static str> {
@@ -83,6 +111,10 @@ impl ImpactQuery<'_> {
         self.params.check()?;
         if !(self.a_from_b.is_finite() && self.motion.is_finite() && self.touching.is_finite()) {
             return Err("a_from_b, motion and touching must be finite");
+        }
+        let is_finite = |p: Penetration| p.normal.is_finite() && p.depth.is_finite();
+        if !self.penetration.is_none_or(is_finite) {
+            return Err("normal and depth of the penetration must be finite");
         }
         is_countable([self.a, self.b], self.params.pixel_size)
     }
@@ -97,13 +129,16 @@ impl Params {
     pub fn check(&self) -> Result<(), &'static str> {
         let lengths = [self.pixel_size, self.merge_gap, self.thickness];
         let are_valid = lengths.iter().all(|length| Self::LENGTHS.contains(length));
-        if are_valid && (0.0..=*Self::LENGTHS.end()).contains(&self.prediction) {
-            Ok(())
-        } else {
-            Err(
+        if !(are_valid && (0.0..=*Self::LENGTHS.end()).contains(&self.prediction)) {
+            return Err(
                 "pixel_size, merge_gap and thickness must be 1e-14 to 1e14, prediction 0 to 1e14: choose others, \
                  or another unit of length",
-            )
+            );
+        }
+        let are_shares = [self.slope_damping, self.rho].map(|share| (0.0..=1.0).contains(&share));
+        match are_shares {
+            [true, true] => Ok(()),
+            _ => Err("slope_damping and rho are shares: they must be 0 to 1"),
         }
     }
 }
