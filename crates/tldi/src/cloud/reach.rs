@@ -172,11 +172,10 @@ impl Place {
         }
     }
 
-    /// The parameters there.
+    /// The parameters there. The merge gap is that of each surface, see [`Self::merging`].
     pub(crate) fn params(&self, params: &Params) -> Params {
         Params {
             pixel_size: self.coarser * params.pixel_size,
-            merge_gap: self.coarser * params.merge_gap,
             thickness: self.coarser * params.thickness,
             ..*params
         }

@@ -111,6 +111,8 @@ impl Scratch {
         if let Some(coarser) = self.room.take_wanted() {
             self.room.put_back(left);
             self.compare_coarser(query, coarser, result);
+            // Than those of `query`, which are as large as the place asks for.
+            result.coarser = result.coarser.map(|coarser| place.coarser * coarser);
             return false;
         }
         result.collides = self.crossings.are_enough();
