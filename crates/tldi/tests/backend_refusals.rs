@@ -3,7 +3,7 @@
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi::{
     Backend, BackendError, CpuBackend, ImpactQuery, PairQuery, Params, Penetration, PointCloud,
-    Projection, Surface, View, VirtualCamera,
+    Projection, Surface, View, VirtualCamera, build,
 };
 
 /// The reason why two clouds of two points, 1 m apart with radii of 1 cm, are not compared.
@@ -80,11 +80,16 @@ fn fixed_cameras_that_show_nothing() {
     assert_eq!(of_camera(camera), None);
     for pixel_size in [0.0, -0.01, f32::NAN, f32::INFINITY, 1e-20] {
         let projection = Projection::Orthographic { pixel_size };
-        let of_pixels = of_camera(VirtualCamera {
+        let camera = VirtualCamera {
             projection,
             ..camera
-        });
-        refused(of_pixels, "pixel_size");
+        };
+        refused(of_camera(camera), "pixel_size");
+        let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.01);
+        let cloud = cloud.build().expect("the points are valid");
+        let params = Params::for_radius(0.01);
+        let image = build(&cloud, &Pose3::IDENTITY, &camera, &params);
+        assert_eq!(image.pixel_count(), 0);
     }
     for pose in [
         Pose3::from_translation(f32::NAN * Vec3::X),

@@ -30,7 +30,7 @@ pub(crate) mod zone;
 use crate::cloud::reach::Ring;
 use crate::{
     Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,
-    Tldi, Variant, VirtualCamera, Work, paper,
+    Surface, Tldi, Variant, VirtualCamera, Work, paper,
 };
 use cull::Region;
 use glamx::{Pose3, Vec3};
@@ -259,7 +259,8 @@ impl Backend for CpuBackend {
 ///
 /// With an orthographic camera of no fixed size the image follows the cloud, in larger pixels ([`Tldi::camera`] says
 /// which) where these would be more than 4 Mi and 16 for each point. Allocates; the
-/// backends reuse their memory instead. Cost: linear in points and fragments.
+/// backends reuse their memory instead. Cost: linear in points and fragments. An image without pixels where a backend
+/// refuses the parameters ([`Params::check`]) or the camera.
 ///
 /// ```
 /// use tldi::{Params, PointCloud, VirtualCamera, build, glamx::{Pose3, Vec3}};
@@ -276,6 +277,13 @@ pub fn build(
     params: &Params,
 ) -> Tldi {
     let mut out = Tldi::default();
+    let are_valid = [
+        params.check(),
+        camera.check([Surface::Cloud(cloud), Surface::Cloud(cloud)]),
+    ];
+    if are_valid.iter().any(Result::is_err) {
+        return out;
+    }
     if params.variant() == Variant::Paper {
         paper::build(
             cloud,

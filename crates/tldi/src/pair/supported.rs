@@ -82,7 +82,7 @@ fn is_countable(surfaces: [Surface; 2], pixel_size: f32) -> Result<(), &'static 
 
 impl VirtualCamera {
     /// Whether it shows these surfaces in pixels that can be counted; if not, why.
-    fn check(&self, surfaces: [Surface; 2]) -> Result<(), &'static str> {
+    pub(crate) fn check(&self, surfaces: [Surface; 2]) -> Result<(), &'static str> {
         let pose = self.view_from_frame;
         if !(pose.is_finite() && pose.rotation.is_normalized()) {
             return Err("view_from_frame must be finite, with a unit quaternion: normalise it");
