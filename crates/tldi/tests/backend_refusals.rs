@@ -178,3 +178,12 @@ fn penetrations_are_finite() {
     refused(cast(Vec3::NAN, 0.1), "penetration");
     refused(cast(Vec3::Y, f32::INFINITY), "penetration");
 }
+
+/// Farther apart, depths would all count as the last one that can be told.
+#[test]
+fn predictions_of_more_than_2_to_the_17_thicknesses() {
+    let params = Params::for_radius(0.01);
+    let most = 131_072.0 * params.thickness;
+    assert_eq!(refusal(aim(), params.with_prediction(0.999 * most)), None);
+    refused(refusal(aim(), params.with_prediction(1.001 * most)), "2^17");
+}

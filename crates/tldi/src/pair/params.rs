@@ -39,7 +39,7 @@ pub struct Params {
     /// their depths differ by no more than this. A body that is no deeper than this in a surface
     /// touches it. Two balls of radius r̄ overlap in depth up to 2 r̄.
     pub thickness: f32,
-    /// Contacts with a gap up to this are reported, in metres (rapier's prediction distance).
+    /// Contacts with a gap up to this are reported, in metres (rapier's prediction distance). At most 2¹⁷ thicknesses.
     pub prediction: f32,
     /// Share of a splat's slope that extrapolates its depth to the pixel centre, 0 to 1.
     pub slope_damping: f32,

@@ -1,6 +1,7 @@
 //! Which pairs can be compared, and why others cannot.
 
 use crate::pair::pixels::least_pixel;
+use crate::pair::plan::DepthScale;
 use crate::{
     ImpactQuery, PairQuery, Params, Penetration, Projection, Surface, Variant, View, VirtualCamera,
     paper,
@@ -133,6 +134,11 @@ impl Params {
             return Err(
                 "pixel_size, merge_gap and thickness must be 1e-14 to 1e14, prediction 0 to 1e14: choose others, \
                  or another unit of length",
+            );
+        }
+        if self.prediction > DepthScale::reach(self) {
+            return Err(
+                "prediction must be at most 2^17 times the thickness: depths farther apart are not told apart",
             );
         }
         let are_shares = [self.slope_damping, self.rho].map(|share| (0.0..=1.0).contains(&share));
