@@ -277,11 +277,8 @@ pub fn build(
     params: &Params,
 ) -> Tldi {
     let mut out = Tldi::default();
-    let are_valid = [
-        params.check(),
-        camera.check([Surface::Cloud(cloud), Surface::Cloud(cloud)]),
-    ];
-    if are_valid.iter().any(Result::is_err) {
+    let surface = Surface::Cloud(cloud);
+    if params.check().is_err() || camera.check(&[surface]).is_err() {
         return out;
     }
     if params.variant() == Variant::Paper {

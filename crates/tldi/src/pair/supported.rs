@@ -29,8 +29,8 @@ impl PairQuery<'_> {
             return Err("a_from_b, motion and last_axis must be finite");
         }
         match self.view {
-            View::Aim { .. } => is_countable([self.a, self.b], self.params.pixel_size)?,
-            View::Fixed(camera) => camera.check([self.a, self.b])?,
+            View::Aim { .. } => is_countable(&[self.a, self.b], self.params.pixel_size)?,
+            View::Fixed(camera) => camera.check(&[self.a, self.b])?,
         }
         let exact = matches!(self.a, Surface::Exact(_)) || matches!(self.b, Surface::Exact(_));
         if exact && self.params.variant() == Variant::Paper {
@@ -68,12 +68,12 @@ pub(crate) fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static 
     }
 }
 
-fn is_countable(surfaces: [Surface; 2], pixel_size: f32) -> Result<(), &'static str> {
-    let is_less = |surface| match surface {
+fn is_countable(surfaces: &[Surface], pixel_size: f32) -> Result<(), &'static str> {
+    let is_less = |surface: &Surface| match surface {
         Surface::Cloud(cloud) => pixel_size < least_pixel(cloud),
         Surface::Exact(_) | Surface::Device(_) => false,
     };
-    match surfaces.into_iter().any(is_less) {
+    match surfaces.iter().any(is_less) {
         true => {
             Err("pixel_size is less than 2^-28 of the farthest coordinate: choose a larger one")
         }
@@ -83,7 +83,7 @@ fn is_countable(surfaces: [Surface; 2], pixel_size: f32) -> Result<(), &'static 
 
 impl VirtualCamera {
     /// Whether it shows these surfaces in pixels that can be counted; if not, why.
-    pub(crate) fn check(&self, surfaces: [Surface; 2]) -> Result<(), &'static str> {
+    pub(crate) fn check(&self, surfaces: &[Surface]) -> Result<(), &'static str> {
         let pose = self.view_from_frame;
         if !(pose.is_finite() && pose.rotation.is_normalized()) {
             return Err("view_from_frame must be finite, with a unit quaternion: normalise it");
@@ -117,7 +117,7 @@ impl ImpactQuery<'_> {
         if !self.penetration.is_none_or(is_finite) {
             return Err("normal and depth of the penetration must be finite");
         }
-        is_countable([self.a, self.b], self.params.pixel_size)
+        is_countable(&[self.a, self.b], self.params.pixel_size)
     }
 }
 
