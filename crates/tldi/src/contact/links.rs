@@ -7,7 +7,7 @@ use std::ops::Range;
 /// of 636 stability rows fail instead of 3, and normals are 29 % worse; twice: no change in any suite.
 const SAME_SURFACE_PX: f32 = 3.0;
 
-/// Linked neighbours, of eight, that confirm a penetration of a layer's thickness (the merge gap).
+/// Linked neighbours, of eight, that confirm a penetration of a layer's thickness.
 /// Fewer confirm proportionally less. At the rim of a body, a ray runs along its side, whose depth
 /// is uncertain, or misses a layer and seems to run inside up to the next one. Such pixels are
 /// alone or follow the rim in rows of one or two. Surfaces that really are so deep in each other
@@ -394,7 +394,7 @@ mod tests {
         let lone = confirmed(contacts(&[[0, 0]], PIXEL), true);
         assert_eq!(lone.contacts.len(), 1);
         assert_eq!(lone.contacts[0].gap, 0.0);
-        // Two neighbours of five confirm two fifths of a merge gap of two pixels.
+        // Two neighbours of five confirm two fifths of a thickness of two pixels.
         let middle = confirmed(contacts(&[[0, 0], [1, 0], [2, 0]], PIXEL), true).contacts[1];
         assert!((middle.gap + 0.8 * PIXEL).abs() < 1e-6, "{}", middle.gap);
     }

@@ -105,10 +105,7 @@ impl PatchScratch {
         if are_lone_points {
             self.links.find(&result.contacts, &query.params);
         }
-        let tells_inside = query.a.is_oriented() || query.b.is_oriented();
-        self.reduce_linked(result, &query.params, tells_inside);
-        let fitted = self.smooth.iter().map(|pixel| pixel.gap);
-        allow_for_noise(result, fitted.reduce(f32::min), query);
+        self.finish(result, query);
         are_lone_points
     }
 
@@ -118,10 +115,7 @@ impl PatchScratch {
         let _stage = stage!("patches");
         result.collides = true;
         self.link(result, &query.params);
-        let tells_inside = query.a.is_oriented() || query.b.is_oriented();
-        self.reduce_linked(result, &query.params, tells_inside);
-        let fitted = self.smooth.iter().map(|pixel| pixel.gap);
-        allow_for_noise(result, fitted.reduce(f32::min), query);
+        self.finish(result, query);
     }
 
     fn link(&mut self, result: &mut PairResult, params: &Params) {
@@ -129,6 +123,14 @@ impl PatchScratch {
         drop_between_faces(result);
         self.way_out.keep_least(result, params);
         self.links.find(&result.contacts, params);
+    }
+
+    /// Reduces linked contact pixels by what is known of both surfaces.
+    fn finish(&mut self, result: &mut PairResult, query: &PairQuery) {
+        let tells_inside = query.a.is_oriented() || query.b.is_oriented();
+        self.reduce_linked(result, &query.params, tells_inside);
+        let fitted = self.smooth.iter().map(|pixel| pixel.gap);
+        allow_for_noise(result, fitted.reduce(f32::min), query);
     }
 
     fn reduce_linked(&mut self, result: &mut PairResult, params: &Params, tells_inside: bool) {

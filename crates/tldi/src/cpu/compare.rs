@@ -391,7 +391,7 @@ mod tests {
         assert!(pierces(&at_edge, &sheet, [2, 1], &params));
     }
 
-    /// Where a ray entered what it leaves last, and left what it enters first, for a merge gap of 2.
+    /// Where a ray entered what it leaves last, and left what it enters first, for a thickness of 2.
     #[test]
     fn rays_that_missed_a_layer_tell_nothing_of_the_inside() {
         let params = Params::for_radius(1.0);

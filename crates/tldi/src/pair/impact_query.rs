@@ -12,7 +12,7 @@ pub struct ImpactQuery<'a> {
     pub b: Surface<'a>,
     /// From the frame of `b` into the frame of `a`, before the motion.
     pub a_from_b: Pose3,
-    /// The motion of `b` in the frame of `a`, metres, without a turn. Up to 2¹⁷ merge gaps (2.6 km
+    /// The motion of `b` in the frame of `a`, metres, without a turn. Up to 2¹⁷ thicknesses (2.6 km
     /// for radii of 1 cm) are resolved.
     pub motion: Vec3,
     /// Surfaces that are nearer than this along the motion at its beginning, metres, touch already.

@@ -29,7 +29,7 @@ pub enum Variant {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Params {
     /// Edge of a pixel at the surface, in metres. Larger pixels than r̄ lose detail. Smaller ones
-    /// cost time and let noise through. r̄ was best (design notes, "What was tried", 3).
+    /// cost time and let noise through. r̄ was best.
     pub pixel_size: f32,
     /// Largest distance in depth between successive fragments of one layer, in metres. It is larger
     /// for clouds with given noise, and a thickness where the surface is steep. Sheets farther

@@ -23,8 +23,13 @@ pub fn is_aim_sample(index: u32, step: u32) -> bool {
 /// With radii of 0.65 × the distance of the 7th neighbour there are 0.94 (pixel / r̄)² points to a
 /// pixel.
 pub fn stride(mean_radius: f32, pixel_size: f32) -> usize {
+    stride_for(POINTS_PER_PIXEL, mean_radius, pixel_size)
+}
+
+/// The same where so many points are enough for a pixel of a surface seen face on.
+pub(crate) fn stride_for(points_per_pixel: f32, mean_radius: f32, pixel_size: f32) -> usize {
     let per_pixel = 0.94 * (pixel_size / mean_radius).powi(2);
-    ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
+    ((per_pixel / points_per_pixel) as usize).clamp(1, BLOCK)
 }
 
 /// The first point that is taken of a cloud's `block`-th block, less than `stride`. It differs from

@@ -13,10 +13,10 @@ use crate::cpu::scratch::{CommonPixels, Scratch};
 use crate::cpu::side::{CloudView, Side};
 use crate::pair::pixels::largest_pixel;
 use crate::pair::plan::PairPlan;
-use crate::pair::sampling::stride;
+use crate::pair::sampling::{stride, stride_for};
 use crate::stage::stage;
 use crate::view::camera_policy::MAX_VIEWS;
-use crate::{BLOCK, PairQuery, PairResult, Params, Surface, Tldi, Variant, View, VirtualCamera};
+use crate::{PairQuery, PairResult, Params, Surface, Tldi, Variant, View, VirtualCamera};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
 
@@ -75,12 +75,6 @@ fn large_pixel(query: &PairQuery, depth: f32, deep: f32) -> Option<f32> {
     let resolving = extents.map(|extents| largest_pixel(extents, pixels[LARGE.len() - 1]));
     let largest = resolving[0].min(resolving[1]).min(depth / deep);
     pixels.into_iter().find(|pixel| *pixel <= largest)
-}
-
-/// Every how many points of a cloud are enough for the first look.
-fn coarse_stride(mean_radius: f32, pixel_size: f32) -> usize {
-    let per_pixel = 0.94 * (pixel_size / mean_radius).powi(2);
-    ((per_pixel / POINTS_PER_PIXEL) as usize).clamp(1, BLOCK)
 }
 
 /// The two clouds of a pair as `camera` looks at them, with normals sharpened or not.
@@ -158,7 +152,8 @@ impl Scratch {
             return 0.0;
         };
         let pixel = query.params.pixel_size;
-        let strides = [query.a, query.b].map(|s| coarse_stride(s.mean_radius(), pixel));
+        let strides = [query.a, query.b]
+            .map(|surface| stride_for(POINTS_PER_PIXEL, surface.mean_radius(), pixel));
         let thinned = PairPlan {
             zone_reach: plan.zone_reach * (strides[0].max(strides[1]) as f32).sqrt(),
             ..plan.clone()

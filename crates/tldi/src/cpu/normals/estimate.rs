@@ -64,7 +64,6 @@ pub(crate) fn estimate(
     let mut grid = scratch.sorted.grid(radius);
     if is_coarse(grid.inv_cell, radius) {
         let mut fold = std::mem::take(&mut scratch.fold);
-        fold.clear();
         fold.find(radius, support.iter().map(|&id| position(id)));
         scratch
             .sorted

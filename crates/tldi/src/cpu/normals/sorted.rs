@@ -151,9 +151,9 @@ impl Sorted {
     }
 
     /// Tells `put` which points are in a cell and its neighbours: all, or of more than
-    /// [`MAX_CANDIDATES`] an even selection. Returns how many.
+    /// [`MAX_CANDIDATES`] an even selection.
     #[inline(always)]
-    pub(crate) fn around(&self, cell: usize, mut put: impl FnMut(usize)) -> usize {
+    pub(crate) fn around(&self, cell: usize, mut put: impl FnMut(usize)) {
         let rows = self.rows(cell);
         let total: usize = rows.iter().map(|row| row.len()).sum();
         let step = total.div_ceil(MAX_CANDIDATES).max(1);
@@ -166,7 +166,6 @@ impl Sorted {
             }
             skip = k - row.end;
         }
-        total.div_ceil(step)
     }
 
     /// The points in a cell and its neighbours: three cells in a row along x are consecutive.
