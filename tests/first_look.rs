@@ -100,3 +100,22 @@ fn what_lies_between_two_sheets_does_not_collide() {
         }
     }
 }
+
+/// Two boxes with normals, half to four fifths in each other along x, are pushed apart along x only. Large pixels do not look
+/// at the other side of the first box: their planes at walls that are seen edge-on told contacts sideways in one of six.
+#[test]
+fn boxes_in_each_other_have_no_contacts_sideways() {
+    let (half, spacing) = (0.1, 0.02);
+    for seed in (0..100).step_by(2) {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let [a, b] = [0, 1].map(|_| sampled_box(Vec3::splat(half), spacing, &mut rng));
+        let depth = 2.0 * half * (0.5 + 0.3 * rng.f32());
+        let pose = Pose3::from_translation((2.0 * half - depth) * Vec3::X);
+        let result = compare_clouds(&a.cloud(spacing), &b.cloud(spacing), pose, spacing);
+        assert!(result.coarser.is_some(), "{seed}: settled by large pixels");
+        assert!(!result.patches.is_empty(), "{seed}");
+        for patch in &result.patches {
+            assert!(patch.normal.x > 0.9, "{seed}, {depth} m: {patch:?}");
+        }
+    }
+}
