@@ -3,8 +3,8 @@
 use crate::Aabb;
 use glamx::{Pose3, Quat, Vec3};
 
-/// Least weight of the direction to `b`, see [`Approach::plainness`]. Half: 16 of 636 stability rows fail instead of 3, all new ones of a ball
-/// in a groove; twice: no change in any suite.
+/// Least weight of the direction to `b`, see [`Approach::plainness`]. Half: 16 of 636 stability rows fail instead of 3, all
+/// new ones of a ball in a groove; twice: no change in any suite.
 const LEAST_PLAIN: f32 = 0.2;
 
 /// Share of its half extent by which the middle of the smaller surface is plainly on one side of the
