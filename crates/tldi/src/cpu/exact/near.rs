@@ -5,7 +5,7 @@
 //! The camera is aimed by an even selection of the points in cells that may be near. If that finds few near points,
 //! all points are asked: no contact is too small to be found.
 
-use crate::cpu::exact::placed::{CellDistance, CellDistances, Placed};
+use crate::cpu::exact::placed::{CellDistances, Placed};
 use crate::cpu::fold::is_coarse;
 use crate::cpu::normals;
 use crate::cpu::side::{NearSamples, Side};
@@ -68,7 +68,11 @@ impl Side {
     /// with those within `beyond` metres more; with coarser ones of cells farther away.
     fn in_near_cells(&mut self, exact: &Placed, reach: f32, beyond: f32) {
         let points = (0..self.points.len()).map(|i| self.points.point(i));
-        let CellDistances { cells, fold } = &mut self.cell_distances;
+        let CellDistances {
+            least,
+            fold,
+            middles,
+        } = &mut self.cell_distances;
         fold.clear();
         let count = points.len() as f32;
         let mut bounds = points.clone().fold(Aabb::EMPTY, Aabb::including);
@@ -80,8 +84,12 @@ impl Side {
             grid = ZoneGrid::with_cells(&bounds, reach, count);
         }
         let half_diagonal = 0.5 * 3.0f32.sqrt() / grid.inv_cell;
-        cells.clear();
-        cells.resize(grid.dims.iter().product(), CellDistance::UNKNOWN);
+        least.clear();
+        least.resize(grid.dims.iter().product(), f32::NAN);
+        middles.clear();
+        if !fold.is_identity() {
+            middles.resize(least.len(), Vec3::INFINITY);
+        }
         self.support.clear();
         self.kept.clear();
         for i in 0..self.points.len() {
@@ -90,23 +98,25 @@ impl Side {
             let at = ((folded - bounds.min) * grid.inv_cell).floor();
             let cell = [at.x, at.y, at.z];
             let [x, y, z] = [0, 1, 2].map(|k| (cell[k] as usize).min(grid.dims[k] - 1));
-            let cell = &mut cells[(z * grid.dims[1] + y) * grid.dims[0] + x];
+            let cell = (z * grid.dims[1] + y) * grid.dims[0] + x;
+            let least = &mut least[cell];
             // A cell that is wider than what is left of a gap holds points from both sides of it: of the others, nothing is
             // known yet.
-            if cell.middle.distance(point) > half_diagonal {
-                let folded_middle = Vec3::new(x as f32, y as f32, z as f32) + 0.5;
-                let middle = bounds.min + folded_middle / grid.inv_cell;
-                // Of the unfolded cell.
-                cell.middle = match folded == point {
-                    true => middle,
-                    false => middle + (point - folded),
-                };
-                cell.least = exact.project(cell.middle).0 - half_diagonal;
+            let is_beyond_gap =
+                (middles.get(cell)).is_some_and(|middle| middle.distance(point) > half_diagonal);
+            if least.is_nan() || is_beyond_gap {
+                let middle = Vec3::new(x as f32, y as f32, z as f32) + 0.5;
+                let mut middle = bounds.min + middle / grid.inv_cell;
+                if let Some(unfolded) = middles.get_mut(cell) {
+                    middle += point - folded;
+                    *unfolded = middle;
+                }
+                *least = exact.project(middle).0 - half_diagonal;
             }
             let further = self.points.further(i);
-            if cell.least <= reach + beyond + (1.0 + normals::SUPPORT) * further {
+            if *least <= reach + beyond + (1.0 + normals::SUPPORT) * further {
                 self.support.push(i as u32);
-                if cell.least <= reach + further {
+                if *least <= reach + further {
                     self.kept.push(i as u32);
                 }
             }

@@ -18,25 +18,11 @@ pub(crate) const MOST_STEPS: usize = 64;
 /// How far the cells of a grid are from the surface; kept from call to call.
 #[derive(Default)]
 pub(crate) struct CellDistances {
-    pub(crate) cells: Vec<CellDistance>,
+    /// The least distance that a point in each cell can have, metres. It is not a number until it is asked for.
+    pub(crate) least: Vec<f32>,
     pub(crate) fold: SpaceFold,
-}
-
-/// Of one cell.
-#[derive(Clone, Copy)]
-pub(crate) struct CellDistance {
-    /// Of the cell, where its points are: before gaps were folded.
-    pub(crate) middle: Vec3,
-    /// The least that a point in the cell can have, metres.
-    pub(crate) least: f32,
-}
-
-impl CellDistance {
-    /// Of a cell that was not asked for: no point is in it.
-    pub(crate) const UNKNOWN: Self = Self {
-        middle: Vec3::INFINITY,
-        least: f32::INFINITY,
-    };
+    /// Middles of the cells that were asked for, before gaps were folded. None where nothing is folded.
+    pub(crate) middles: Vec<Vec3>,
 }
 
 /// An exact surface where a pair has it.
