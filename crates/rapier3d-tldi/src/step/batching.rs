@@ -7,7 +7,7 @@ use crate::step::candidates::{Candidate, contact_reach, effective_prediction, pa
 use crate::step::measured::Measured;
 use crate::step::prepared::{Batch, PreparedPair, Question};
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet};
-use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
+use rapier3d::geometry::{Aabb, Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, Once};
@@ -128,7 +128,7 @@ impl<'a> Frame<'a> {
                 let a_from_world = world_from_a.rotation.inverse();
                 let middle = world_from_a * middle;
                 let motion = self.motion(collider2, middle) - self.motion(collider1, middle);
-                let last_axis = self.memory.axis(colliders, parts);
+                let last_axis = self.memory.axis(colliders, parts, &pair, pose1);
                 Hint {
                     motion: a_from_world * motion,
                     last_axis: last_axis.map(|axis| a_from_world * axis),
@@ -172,14 +172,51 @@ const MOST_LOST: u32 = 6;
 struct LastAxis {
     /// Unit vector in world space: bodies that roll turn under their contacts.
     axis: Vector,
+    /// Pose of the second collider in the frame of the first, after the last step.
+    pos12: Pose,
     /// Steps without contact since.
     lost_for: u32,
 }
 
 impl LastAxis {
-    fn lost(self) -> Option<Self> {
+    /// Whether the smaller shape was moved since the last step so far that its middle may have passed what it touched:
+    /// by more than half its width along the axis. Rapier did not do so.
+    fn is_outdated(&self, pair: &ShapePair, pose1: &Pose) -> bool {
+        let (before, now) = (self.pos12, pair.pos12);
+        if before == now {
+            return false;
+        }
+        let axis1 = pose1.rotation.inverse() * self.axis;
+        let axis2 = now.rotation.inverse() * axis1;
+        let [aabb1, aabb2] = [pair.shape1, pair.shape2].map(|shape| shape.compute_local_aabb());
+        let size = |aabb: &Aabb| aabb.half_extents().length();
+        let (moved, half_width) = if size(&aabb1) < size(&aabb2) {
+            let (before, now) = (
+                before.inverse() * aabb1.center(),
+                now.inverse() * aabb1.center(),
+            );
+            (
+                (now - before).dot(axis2),
+                aabb1.half_extents().dot(axis1.abs()),
+            )
+        } else {
+            let (before, now) = (before * aabb2.center(), now * aabb2.center());
+            (
+                (now - before).dot(axis1),
+                aabb2.half_extents().dot(axis2.abs()),
+            )
+        };
+        moved.abs() > half_width
+    }
+
+    /// After another step without contact.
+    fn lost(self, pos12: Pose) -> Option<Self> {
         let lost_for = self.lost_for + 1;
-        (lost_for <= MOST_LOST).then_some(Self { lost_for, ..self })
+        (lost_for <= MOST_LOST).then_some(Self {
+            pos12,
+            lost_for,
+            ..self
+        })
     }
 }
 
@@ -200,8 +237,16 @@ pub(crate) struct PairMemory {
 }
 
 impl PairMemory {
-    fn axis(&self, colliders: [ColliderHandle; 2], parts: [u32; 2]) -> Option<Vector> {
-        axis_of(&self.axes, (pair_id(colliders), parts)).map(|last| last.axis)
+    fn axis(
+        &self,
+        colliders: [ColliderHandle; 2],
+        parts: [u32; 2],
+        pair: &ShapePair,
+        pose1: &Pose,
+    ) -> Option<Vector> {
+        axis_of(&self.axes, (pair_id(colliders), parts))
+            .filter(|last| !last.is_outdated(pair, pose1))
+            .map(|last| last.axis)
     }
 
     fn measured(&self, colliders: [ColliderHandle; 2]) -> Option<Measured> {
@@ -211,7 +256,13 @@ impl PairMemory {
     }
 
     /// After a step: what its batch measured, if rapier took it. What sleeps stays as it is.
-    pub(crate) fn update(&mut self, candidates: &[Candidate], batch: &Batch) {
+    pub(crate) fn update(
+        &mut self,
+        candidates: &[Candidate],
+        batch: &Batch,
+        bodies: &RigidBodySet,
+        colliders: &ColliderSet,
+    ) {
         std::mem::swap(&mut self.axes, &mut self.older_axes);
         std::mem::swap(&mut self.measured, &mut self.older_measured);
         self.axes.clear();
@@ -224,6 +275,11 @@ impl PairMemory {
                 .extend(found.ok().map(|at| self.older_measured[at]));
         }
         for pair in &batch.pairs {
+            let [Some(collider1), Some(collider2)] = pair.colliders.map(|c| colliders.get(c))
+            else {
+                continue;
+            };
+            let pos12 = pose_of(collider1, bodies).inv_mul(&pose_of(collider2, bodies));
             let id = pair_id(pair.colliders);
             let was_used = pair.used.load(Ordering::Relaxed);
             self.measured.extend(
@@ -232,7 +288,11 @@ impl PairMemory {
                     .map(|measured| (id, measured)),
             );
             if pair.is_kept {
+                let first = self.axes.len();
                 self.retain_axes(id);
+                self.axes[first..]
+                    .iter_mut()
+                    .for_each(|(_, last)| last.pos12 = pos12);
                 continue;
             }
             for part in &batch.parts[pair.parts.clone()] {
@@ -247,10 +307,11 @@ impl PairMemory {
                         let in_collider = part.poses[0].map_or(axis, |pose| pose.rotation * axis);
                         LastAxis {
                             axis: pair.poses[0].rotation * in_collider,
+                            pos12,
                             lost_for: 0,
                         }
                     }),
-                    true => axis_of(&self.older_axes, key).and_then(LastAxis::lost),
+                    true => axis_of(&self.older_axes, key).and_then(|last| last.lost(pos12)),
                 };
                 self.axes.extend(axis.map(|axis| (key, axis)));
             }
@@ -272,6 +333,7 @@ impl PairMemory {
 mod tests {
     use super::*;
     use crate::PointCloudShape;
+    use rapier3d::geometry::ColliderBuilder;
     use tldi::{ContactPixel, PairResult, PointCloud};
 
     /// The axis of points that came near without touching says nothing of the side of a body.
@@ -283,7 +345,8 @@ mod tests {
         let cloud = PointCloud::builder(points).radius(0.1).build().unwrap();
         let shape: rapier3d::geometry::SharedShape =
             rapier3d::geometry::SharedShape::new(PointCloudShape::new(cloud));
-        let colliders = [1, 2].map(|index| ColliderHandle::from_raw_parts(index, 0));
+        let mut set = ColliderSet::new();
+        let colliders = [(); 2].map(|()| set.insert(ColliderBuilder::new(shape.clone())));
         // A quarter turn about z: from x in the collider to y in the world.
         let turned = Pose::rotation(0.5 * std::f32::consts::PI * Vector::Z);
         let mut memory = PairMemory::default();
@@ -317,8 +380,8 @@ mod tests {
                 shapes: [shape.clone(), shape.clone()],
             };
             batch.push(prepared, &pair.pos12);
-            memory.update(&[], &batch);
-            memory.axis(colliders, [0, 0])
+            memory.update(&[], &batch, &RigidBodySet::new(), &set);
+            memory.axis(colliders, [0, 0], &pair, &turned)
         };
         assert_eq!(remembered(Vector::Z, vec![]), None);
         let touching = ContactPixel {

@@ -347,7 +347,8 @@ impl TldiPipeline {
                 .into_iter()
                 .chain(batch.coarser_pixels());
             report.coarser_pixels = coarser.reduce(f32::max);
-            self.memory.update(self.search.candidates(), &batch);
+            let candidates = self.search.candidates();
+            self.memory.update(candidates, &batch, bodies, colliders);
             batch.clear();
         }
         self.motions.clear();

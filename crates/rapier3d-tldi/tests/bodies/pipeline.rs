@@ -70,6 +70,24 @@ fn teleport_after_the_batch_is_a_miss() -> TestResult {
     Ok(())
 }
 
+/// A body that is put under the floor it rests on is below it, not above and deep in it.
+#[test]
+fn side_is_forgotten_where_a_body_is_put_elsewhere() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    insert_floor(&mut world, 0.8);
+    let (body, _) = world.insert(dynamic_at(HALF), tldi.collider(cloud(&cube(HALF))));
+    for _ in 0..5 {
+        tldi.step(&mut world)?;
+    }
+    let depth = 0.005;
+    world.bodies[body].set_translation(Vector::Y * (depth - HALF), true);
+    let report = tldi.step(&mut world)?;
+    assert_eq!(report.pairs_in_contact, 1);
+    let told = report.max_penetration;
+    assert!(told < depth + REST_TOLERANCE, "{told} m");
+    Ok(())
+}
+
 /// Without `prepare` everything is compared on the spot and the outcome is the same.
 #[test]
 fn plain_rapier_step_works_too() -> TestResult {
