@@ -61,7 +61,9 @@ pub fn sample_shape(shape: &dyn Shape, spacing: f32) -> Result<PointCloud<'stati
     let mut scatter = Scatter::new(spacing);
     for (part, patches) in parts.iter().enumerate() {
         for patch in patches {
-            scatter.cover(patch, |p, n| patch::hidden_depth(shape, part, p, n));
+            scatter.cover(patch, |piece, at| {
+                patch::hidden_around(shape, part, patch, piece, at)
+            });
         }
     }
     let (points, normals) = scatter.finish();

@@ -190,9 +190,16 @@ fn around(solid: &dyn Shape, pose: Pose) -> Result<Vec<Patch<'_>>, SampleError> 
     Ok(patches)
 }
 
-/// How deep in another part than `own` a place of the surface with this outward normal lies, metres; 0 if it
-/// does not. Where two parts touch face to face there is no surface.
-pub(super) fn hidden_depth(shape: &dyn Shape, own: usize, place: Vec3, normal: Vec3) -> f32 {
+/// How much of a piece of a part's surface other parts of the shape hide: all that is within so many metres of `place`, a
+/// place of the piece with this outward normal. 0 where the place is not hidden. Where two parts touch face to face
+/// there is no surface.
+pub(super) fn hidden_around(
+    shape: &dyn Shape,
+    own: usize,
+    patch: &Patch<'_>,
+    piece: &[Vec3; 3],
+    (place, normal): (Vec3, Vec3),
+) -> f32 {
     let mut depth = 0.0_f32;
     for other in (0..part_count(shape)).filter(|i| *i as usize != own) {
         let (Some(pose), part) = part(shape, other) else {
@@ -203,12 +210,23 @@ pub(super) fn hidden_depth(shape: &dyn Shape, own: usize, place: Vec3, normal: V
             continue;
         }
         let touching = TOUCHING * part.compute_local_bounding_sphere().radius;
-        let (distance, outward) = surface.project(pose.inverse_transform_point(place));
-        if distance < -touching {
-            depth = depth.max(-distance);
-        } else if distance <= touching && (pose.rotation * outward).dot(normal) < -0.99 {
-            depth = depth.max(f32::MIN_POSITIVE);
+        let project = |place: Vec3| surface.project(pose.inverse_transform_point(place));
+        let (distance, outward) = project(place);
+        let is_inside = distance < -touching;
+        let touches = distance <= touching && (pose.rotation * outward).dot(normal) < -0.99;
+        if !(is_inside || touches) {
+            continue;
         }
+        // A convex part holds all of a flat piece if it holds its corners.
+        let holds = |corner: &Vec3| project(patch.at(*corner).0).0 <= touching;
+        if part.is_convex() && matches!(patch.kind, Kind::Flat { .. }) && piece.iter().all(holds) {
+            return f32::INFINITY;
+        }
+        depth = depth.max(if is_inside {
+            -distance
+        } else {
+            f32::MIN_POSITIVE
+        });
     }
     depth
 }

@@ -43,14 +43,18 @@ impl Scatter {
         (self.points, self.normals)
     }
 
-    /// Adds points until all of the patch is within a spacing of one on its side, but what `hidden_depth`
-    /// says to be hidden, by so many metres.
+    /// Adds points until all of the patch is within a spacing of one on its side, but what `hidden_around`
+    /// says to be hidden: how far around a place, with its normal, of a piece.
     ///
     /// A dart is a place of a piece. All other places of the piece are within `reach` of it, since the patch's map
     /// lengthens nothing. So a dart that is near enough to a point tells that the piece is covered. Else
     /// the piece is halved. The dart becomes a point where none is near. A dart that does not is
     /// within [`LEAST_DISTANCE`] of a point: small pieces are covered, and it comes to an end.
-    pub(super) fn cover(&mut self, patch: &Patch<'_>, hidden_depth: impl Fn(Vec3, Vec3) -> f32) {
+    pub(super) fn cover(
+        &mut self,
+        patch: &Patch<'_>,
+        hidden_around: impl Fn(&[Vec3; 3], (Vec3, Vec3)) -> f32,
+    ) {
         let mut pieces = vec![patch.corners];
         while let Some(piece) = pieces.pop() {
             let dart = self.place_in(piece);
@@ -59,9 +63,9 @@ impl Scatter {
                 .into_iter()
                 .fold(0.0, f32::max);
             let (place, normal) = patch.at(dart);
-            let depth = hidden_depth(place, normal);
-            let is_done = if depth > 0.0 {
-                depth >= reach || reach <= FINEST * self.spacing
+            let hidden = hidden_around(&piece, (place, normal));
+            let is_done = if hidden > 0.0 {
+                hidden >= reach || reach <= FINEST * self.spacing
             } else {
                 let mut distance = self.distance(place, normal);
                 if distance >= LEAST_DISTANCE * self.spacing {
