@@ -31,7 +31,7 @@
 //! All else is refused ([`SourceErrorKind::UnnamedColumns`]): a guess could take colours for normals.
 //!
 //! PLY files of Gaussian splats have the properties `scale_0` to `scale_2` (logarithms of standard
-//! deviations), `rot_0` to `rot_3` (quaternion, w first), `opacity` (logit) and `f_dc_0` to `f_dc_2`. A
+//! deviations; flat splats lack the last one), `rot_0` to `rot_3` (quaternion, w first), `opacity` (logit) and `f_dc_0` to `f_dc_2`. A
 //! splat of at least [`ReadOptions::least_opacity`] becomes a point: its radius is √(σ₁ σ₂) of its two
 //! longer axes, its normal the shortest one, of either sign, and its colour ½ + `f_dc` / (2 √π).
 //!
