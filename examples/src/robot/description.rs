@@ -169,7 +169,7 @@ fn link_mesh(
     for parts in [collision.collect::<Vec<_>>(), visual.collect()] {
         let mut whole = Mesh::default();
         for (geometry, origin) in parts {
-            match mesh_of(geometry, folders, warnings) {
+            match mesh_of(geometry, folders) {
                 Ok(mesh) => whole.append(&mesh, &pose_of(origin)),
                 Err(Problem::Missing(name)) if missing.contains(&name) => {}
                 Err(Problem::Missing(name)) => missing.push(name),
