@@ -4,7 +4,7 @@ use anyhow::{Context, bail};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tldi::glamx::{DVec3, Pose3, Vec3};
+use tldi::glamx::{Pose3, Vec3};
 use tldi::{KdTree, PointCloud};
 use tldi_examples::cli::{Common, UpChoice};
 use tldi_examples::lidar::{LidarReport, LidarScene, LidarSimulation, Scanner, Sweep, SweepSource};
@@ -89,7 +89,12 @@ fn run(args: &Args) -> anyhow::Result<()> {
     bar.finish_and_clear();
     let report = simulation.report();
     let json = args.common.json.as_deref();
-    output::publish(&report, DVec3::ZERO, |out| report.write_table(out), json)?;
+    output::publish(
+        &report,
+        source.origin(),
+        |out| report.write_table(out),
+        json,
+    )?;
     if !args.common.no_pictures {
         draw(args, &simulation, &report)?;
     }

@@ -43,7 +43,7 @@ struct Args {
     )]
     robot: BuiltIn,
     /// Generated rough ground with all the faults of a scan; the robot stands, walks and is measured
-    #[arg(long, value_enum, conflicts_with_all = ["scan", "place", "own_camera"])]
+    #[arg(long, value_enum, conflicts_with_all = ["scan", "up", "place", "own_camera"])]
     terrain: Option<Ground>,
     #[command(flatten)]
     source: ScanSource,

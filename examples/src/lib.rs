@@ -2,6 +2,7 @@
 //! spots to drop bodies on, the simulation, pictures and reports.
 
 pub mod cli;
+mod collada;
 pub mod contact_kinds;
 pub mod depth;
 pub mod devices;

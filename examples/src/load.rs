@@ -55,9 +55,6 @@ fn read(path: &Path, spacing: impl Fn(Vec3) -> f32) -> anyhow::Result<RawCloud> 
     let is_mesh = mesh::is_mesh_file(path);
     let mut raw = if is_mesh {
         let Mesh { points, faces } = mesh::read_mesh(path)?;
-        if let Some(doubt) = mesh::doubt_about(path) {
-            eprintln!("warning: {doubt}");
-        }
         RawCloud {
             points,
             faces,

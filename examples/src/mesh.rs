@@ -1,5 +1,6 @@
 //! Triangle meshes, and their files.
 
+use crate::collada;
 use rapier3d_meshloader::mesh_loader;
 use std::panic;
 use std::path::{Path, PathBuf};
@@ -84,8 +85,25 @@ pub fn read_mesh(path: &Path) -> Result<Mesh, MeshError> {
             faces: raw.faces,
         }
     } else {
-        let bytes = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
-        load(&with_named_solid(bytes), path).map_err(bad)?
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        // The loader tells files apart by an extension of small letters.
+        let named = path.with_extension(&extension);
+        let bytes = || std::fs::read(path).map_err(|error| error.to_string());
+        let mesh = match extension.to_str() {
+            Some("dae") => bytes().and_then(|b| collada::placed(&b, |b| load(b, &named))),
+            Some("stl" | "obj") => {
+                let parts = bytes().and_then(|bytes| load(&with_named_solid(bytes), &named));
+                parts.map(|parts| {
+                    let mut mesh = Mesh::default();
+                    for (_, part) in parts {
+                        mesh.append(&part, &Pose3::IDENTITY);
+                    }
+                    mesh
+                })
+            }
+            _ => Err("only STL, OBJ, DAE and PLY are read: save it as one of these".to_owned()),
+        };
+        mesh.map_err(bad)?
     };
     if mesh.faces.is_empty() {
         return Err(bad("it has no faces".to_owned()));
@@ -93,41 +111,8 @@ pub fn read_mesh(path: &Path) -> Result<Mesh, MeshError> {
     Ok(mesh)
 }
 
-/// What may be wrong with a mesh that was read, for people: nodes within nodes of COLLADA files, and nodes that are used from
-/// elsewhere, are not always put where they belong.
-pub fn doubt_about(path: &Path) -> Option<String> {
-    let extension = path.extension()?;
-    let bytes = (extension.eq_ignore_ascii_case("dae")).then(|| std::fs::read(path).ok())??;
-    has_placed_parts(&String::from_utf8_lossy(&bytes)).then(|| {
-        format!(
-            "mesh {} has nodes within nodes: its parts may be in wrong places; if so, save it as STL, OBJ or PLY",
-            path.display()
-        )
-    })
-}
-
-fn has_placed_parts(dae: &str) -> bool {
-    let mut depth = 0;
-    for tag in dae.split('<') {
-        let name = tag.split(|c: char| c.is_whitespace() || c == '/' || c == '>');
-        let is_empty = tag
-            .split('>')
-            .next()
-            .is_some_and(|head| head.ends_with('/'));
-        match name.into_iter().next() {
-            Some("instance_node") => return true,
-            Some("node") if !is_empty => depth += 1,
-            _ if tag.starts_with("/node>") => depth -= 1,
-            _ => {}
-        }
-        if depth > 1 {
-            return true;
-        }
-    }
-    false
-}
-
-fn load(bytes: &[u8], path: &Path) -> Result<Mesh, String> {
+/// The parts of a file with their names.
+fn load(bytes: &[u8], path: &Path) -> Result<Vec<(String, Mesh)>, String> {
     // Damaged files, and parts of COLLADA that it does not know, make the loader panic.
     let loaded =
         panic::catch_unwind(|| mesh_loader::Loader::default().load_from_slice(bytes, path));
@@ -141,14 +126,13 @@ fn load(bytes: &[u8], path: &Path) -> Result<Mesh, String> {
             );
         }
     };
-    let mut mesh = Mesh::default();
-    for part in scene.meshes {
+    let parts = scene.meshes.into_iter().map(|part| {
         let points: Vec<Vec3> = part.vertices.iter().map(|p| Vec3::from(*p)).collect();
         let in_range = |face: &[u32; 3]| face.iter().all(|i| (*i as usize) < points.len());
         let faces = part.faces.iter().copied().filter(in_range).collect();
-        mesh.append(&Mesh { points, faces }, &Pose3::IDENTITY);
-    }
-    Ok(mesh)
+        (part.name, Mesh { points, faces })
+    });
+    Ok(parts.collect())
 }
 
 /// STL as text whose first line is a bare `solid` gets a name for its solid: the loader wants one.
@@ -181,6 +165,16 @@ mod tests {
         mesh
     }
 
+    #[test]
+    fn only_known_kinds_of_meshes_are_read() {
+        let text = format!("solid a\n{FACET}endsolid\n");
+        assert_eq!(read_text("a.Stl", text.as_bytes()).unwrap().faces.len(), 1);
+        let triangle = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        assert_eq!(read_text("a.Obj", triangle).unwrap().faces.len(), 1);
+        let error = read_text("a.glb", b"glTF\x02\0\0\0").unwrap_err();
+        assert!(error.reason.contains("save it as one of these"), "{error}");
+    }
+
     const FACET: &str = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
 
     #[test]
@@ -211,31 +205,45 @@ mod tests {
         }
     }
 
+    /// In centimetres, the same triangle twice, each moved: through the loader.
     #[test]
-    fn nodes_within_nodes_are_told() {
-        for (dae, is_told) in [
-            (
-                "<node id=\"a\"><instance_geometry/></node><node><matrix/></node>",
-                false,
-            ),
-            ("<node/><node name='b'/><nodes><node></node></nodes>", false),
-            ("<node><node><instance_geometry/></node></node>", true),
-            ("<node><instance_node url=\"#a\"/></node>", true),
-        ] {
-            assert_eq!(has_placed_parts(dae), is_told, "{dae}");
-        }
+    fn nodes_of_collada_place_its_geometries() {
+        let nodes = [200, -300].map(|x| {
+            format!("<node><matrix>1 0 0 {x} 0 1 0 0 0 0 1 0 0 0 0 1</matrix><instance_geometry url=\"#g\"/></node>")
+        });
+        let dae = collada(&nodes.concat(), "0 1 2")
+            .replace("<up_axis>", "<unit meter=\"0.01\"/><up_axis>");
+        let mesh = read_text("placed.dae", dae.as_bytes()).unwrap();
+        let mut corners: Vec<Vec3> = mesh
+            .faces
+            .iter()
+            .map(|f| mesh.points[f[0] as usize])
+            .collect();
+        corners.sort_by(|a, b| a.x.total_cmp(&b.x));
+        assert_eq!(corners, [-3.0 * Vec3::X, 2.0 * Vec3::X]);
+        assert!((mesh.points[1].distance(mesh.points[0]) - 0.01).abs() < 1e-6);
+    }
+
+    /// A triangle with these corners as the geometry `g`, and a scene.
+    fn collada(nodes: &str, corners: &str) -> String {
+        format!(
+            r##"<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="9">0 0 0 1 0 0 0 1 0</float_array><technique_common>
+<accessor source="#a" count="3" stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s">{nodes}</visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"##
+        )
     }
 
     /// COLLADA with an index that no position has: the loader panics at it.
     #[test]
     fn a_panic_of_the_loader_is_an_error() {
-        let dae = r##"<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="a" count="9">0 0 0 1 0 0 0 1 0</float_array><technique_common>
-<accessor source="#a" count="3" stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 9</p></triangles>
-</mesh></geometry></library_geometries></COLLADA>"##;
+        let dae = collada("", "0 1 9");
         let error = read_text("broken.dae", dae.as_bytes()).unwrap_err();
         assert!(
             error.to_string().contains("broken.dae cannot be read"),

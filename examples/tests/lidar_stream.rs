@@ -91,17 +91,18 @@ fn a_folder_of_sweeps_is_read_with_its_poses() {
     assert_on_ground(&report, 0.02);
 }
 
-/// Files that are numbered without zeros in front have the poses of their numbers.
+/// Files that are numbered without zeros in front have the poses of their numbers, packed ones among them.
 #[test]
 fn numbered_sweeps_have_their_poses() {
     let folder = folder("lidar_numbered");
     write_sweeps(&folder, 12);
     for k in 0..12 {
-        fs::rename(
-            folder.join(format!("{k:06}.bin")),
-            folder.join(format!("{k}.bin")),
-        )
-        .unwrap();
+        let name = if k == 7 {
+            "7.bin.gz"
+        } else {
+            &format!("{k}.bin")
+        };
+        fs::rename(folder.join(format!("{k:06}.bin")), folder.join(name)).unwrap();
     }
     let poses = fs::read_to_string(folder.join("poses.txt")).unwrap();
     fs::write(
@@ -121,6 +122,47 @@ fn numbered_sweeps_have_their_poses() {
             "{k}: {first}"
         );
     }
+}
+
+/// The same sweeps in coordinates of a map, where a step of `f32` is half a metre: they have the same places, relative to an
+/// origin that the report tells.
+#[test]
+fn poses_may_be_those_of_a_map() {
+    let map = [691_000.0_f64, 5_336_000.0, 520.0];
+    let folder = folder("lidar_map");
+    write_sweeps(&folder, 3);
+    let poses: String = (0..3)
+        .map(|k| {
+            let [x, y, z] = map;
+            format!(
+                "1 0 0 {}  0 1 0 {}  0 0 1 {}\n",
+                x + 0.25,
+                y + 0.125,
+                z + 0.1 * f64::from(k)
+            )
+        })
+        .collect();
+    fs::write(folder.join("poses.txt"), poses).unwrap();
+    let source = SweepSource::open(&folder).unwrap();
+    assert_eq!(source.origin().to_array(), map);
+    for k in 0..3 {
+        let sweep = source.sweep(k).unwrap();
+        let first = sweep.world_from_scanner * sweep.points[0];
+        assert!(
+            first.distance(Vec3::new(3.25, 1.625, -3.0)) < 1e-5,
+            "{k}: {first}"
+        );
+    }
+    let options = ["--sweeps", ".", "--bodies", "1", "--size", "0.6"];
+    let report = report(BINARY, &folder, &options);
+    assert_eq!(report["origin"], serde_json::json!(map));
+    let place: Vec<f64> = (report["bodies"][0]["translation"]
+        .as_array()
+        .unwrap()
+        .iter())
+    .map(number)
+    .collect();
+    assert!(place.iter().all(|c| c.abs() < 10.0), "{place:?}");
 }
 
 #[test]

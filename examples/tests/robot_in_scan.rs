@@ -344,8 +344,13 @@ fn what_is_wrong_is_said() {
     let report = common::report_with_pictures(BINARY, &folder, &options);
     assert_eq!(report["driven_joints"], 0);
     assert_pictures(&folder.join("out/robot_in_scan"), &["motion.png"]);
-    let cases: [(&[&str], i32, &str); 6] = [
+    let cases: [(&[&str], i32, &str); 7] = [
         (&["--backend", "fast"], 2, "is no backend"),
+        (
+            &["--terrain", "ramp", "--up", "0,1,0"],
+            2,
+            "cannot be used with",
+        ),
         (&["--scan-scale", "0"], 2, "greater than 0"),
         (&["--scan-scale", "0.001"], 2, "--scan <FILE>"),
         (&["--packages", "."], 2, "--urdf <FILE>"),

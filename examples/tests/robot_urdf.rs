@@ -137,6 +137,32 @@ fn what_a_urdf_leaves_out_does_not_end_it() {
     assert_eq!(robot.warnings.len(), 2, "{warnings}");
 }
 
+/// A joint that turns or slides needs limits; without them it stands still, which is said.
+#[test]
+fn joints_without_room_are_told() {
+    let joint = |kind: &str, limit: &str| {
+        let text = format!(
+            r#"<robot name="r">{BASE}<link name="arm"/><joint name="elbow" type="{kind}"><parent link="base"/>
+               <child link="arm"/><axis xyz="0 0 1"/>{limit}</joint></robot>"#
+        );
+        let folders = MeshFolders::new(Path::new(""), &[]);
+        Description::from_text(&text, &folders).unwrap().warnings
+    };
+    for kind in ["revolute", "prismatic"] {
+        for limit in ["", r#"<limit effort="5" velocity="1"/>"#] {
+            let warnings = joint(kind, limit);
+            assert_eq!(warnings.len(), 1, "{warnings:?}");
+            assert!(warnings[0].contains("elbow cannot move"), "{warnings:?}");
+        }
+        let warnings = joint(kind, r#"<limit lower="-1" upper="0" effort="5"/>"#);
+        assert!(warnings.is_empty(), "{warnings:?}");
+    }
+    for kind in ["continuous", "fixed"] {
+        let warnings = joint(kind, "");
+        assert!(warnings.is_empty(), "{warnings:?}");
+    }
+}
+
 #[test]
 fn xacro_is_named_only_where_it_is() {
     let folders = MeshFolders::new(Path::new(""), &[]);

@@ -92,7 +92,7 @@ impl Sample {
         normal: [0.0; 3],
         color: [0.0, 0.0, 0.0, f32::NAN],
         radius: 0.0,
-        splat: [0.0; splat::PARTS],
+        splat: splat::EMPTY,
     };
 
     /// Sets the column from its bytes.

@@ -14,7 +14,8 @@
 //! Columns of text: one point a line, columns separated by semicolons (then a comma may be the
 //! decimal mark), else commas, else blanks, as the first line of data shows. Lines that start with
 //! `#` or `//` are comments. Columns are named by a header line, which may be a comment: `x y z`,
-//! and any of `nx ny nz`, `r g b a` (or `red` …), `radius`; others are skipped. A first line with
+//! and any of `nx ny nz`, `r g b a` (or `red` …), `radius`; others are skipped. Each column has a name: a
+//! comment with another number of words is a sentence, and any other line of names is refused. A first line with
 //! nothing but the count is passed over, before the header or behind it. Without a header, `xyzrgb`
 //! files have the columns x y z r g b, and `xyzn` files x y z nx ny nz, as Open3D writes them. In
 //! all others, number and values decide:
@@ -30,7 +31,7 @@
 //! All else is refused ([`SourceErrorKind::UnnamedColumns`]): a guess could take colours for normals.
 //!
 //! PLY files of Gaussian splats have the properties `scale_0` to `scale_2` (logarithms of standard
-//! deviations), `rot_0` to `rot_3` (quaternion, w first), `opacity` (logit) and `f_dc_0` to `f_dc_2`. A
+//! deviations; flat splats lack the last one), `rot_0` to `rot_3` (quaternion, w first), `opacity` (logit) and `f_dc_0` to `f_dc_2`. A
 //! splat of at least [`ReadOptions::least_opacity`] becomes a point: its radius is √(σ₁ σ₂) of its two
 //! longer axes, its normal the shortest one, of either sign, and its colour ½ + `f_dc` / (2 √π).
 //!

@@ -3,7 +3,7 @@
 use crate::{ReadOptions, SourceError, numbered_order};
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 use tldi::glamx::Vec3;
@@ -206,7 +206,7 @@ fn read_npy(path: &Path) -> Result<MovingPoints, MovingError> {
         reason: reason.to_owned(),
     };
     let mut raw = BufReader::new(File::open(path).map_err(io)?);
-    let is_packed = path.extension().is_some_and(|extension| extension == "gz");
+    let is_packed = raw.fill_buf().map_err(io)?.starts_with(&[0x1f, 0x8b]);
     let mut source: Box<dyn Read> = if is_packed {
         Box::new(MultiGzDecoder::new(&mut raw))
     } else {

@@ -143,7 +143,12 @@ impl PointCloud2<'_> {
         let mut kept = Vec::new();
         for field in &self.fields {
             let name = excerpt(field.name.as_bytes());
+            let slot = Slot::from_name(&field.name);
             let Some(scalar) = field.scalar() else {
+                // PCL has numbers of its own for types that ROS lacks, such as stamps of 64 bits.
+                if slot.is_none() {
+                    continue;
+                }
                 let datatype = field.datatype;
                 return Err(format!(
                     "the field `{name}` has the unknown datatype {datatype}"
@@ -158,7 +163,7 @@ impl PointCloud2<'_> {
                 ));
             }
             if count == 1
-                && let Some(slot) = Slot::from_name(&field.name)
+                && let Some(slot) = slot
                 && (scalar.size() == 4 || !slot.is_packed())
             {
                 kept.push(Column {

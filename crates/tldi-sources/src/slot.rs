@@ -83,14 +83,14 @@ impl Columns {
         } else {
             columns.0.retain(|c| !c.slot.is_packed());
         }
-        let has_all = |needed: bool| {
+        let has_all = |are_asked: fn(usize) -> bool| {
             (0..splat::PARTS)
-                .filter(|part| splat::is_needed(*part) == needed)
+                .filter(|part| are_asked(*part))
                 .all(|part| columns.has(Slot::Splat(part)))
         };
-        let (is_splat, has_color) = (has_all(true), has_all(false));
+        let (is_splat, has_color) = (has_all(splat::is_needed), has_all(splat::is_color));
         columns.0.retain(|c| match c.slot {
-            Slot::Splat(part) => is_splat && (splat::is_needed(part) || has_color),
+            Slot::Splat(part) => is_splat && (!splat::is_color(part) || has_color),
             // A splat's come from its axes; files have zeros there.
             Slot::Normal(_) | Slot::Radius => !is_splat,
             _ => true,

@@ -9,6 +9,8 @@ use tldi::glamx::{Quat, Vec3};
 /// Values of a splat: three of size, four of rotation, opacity, three of colour.
 pub(crate) const PARTS: usize = 11;
 
+/// The third size, along the normal of a flat splat (Huang et al. 2024, doi:10.1145/3641519.3657428), whose files lack it.
+const THICKNESS: usize = 2;
 const ROTATION: usize = 3;
 const OPACITY: usize = 7;
 const COLOR: usize = 8;
@@ -16,9 +18,21 @@ const COLOR: usize = 8;
 /// The constant spherical harmonic, 1 / (2 √π).
 const CONSTANT_HARMONIC: f32 = 0.282_094_8;
 
+/// Values of a splat of which the file has none: it is flat.
+pub(crate) const EMPTY: [f32; PARTS] = {
+    let mut parts = [0.0; PARTS];
+    parts[THICKNESS] = f32::NEG_INFINITY;
+    parts
+};
+
 /// Values that a splat cannot do without.
 pub(crate) fn is_needed(part: usize) -> bool {
-    part < COLOR
+    part < COLOR && part != THICKNESS
+}
+
+/// Values of its colour.
+pub(crate) fn is_color(part: usize) -> bool {
+    part >= COLOR
 }
 
 /// The part that a property of the name, in lower case, stands for.

@@ -152,7 +152,7 @@ fn columns_of_text_without_names() {
 
 #[test]
 fn columns_of_text_with_names() {
-    let cloud = text("//X Y Z Intensity Nx Ny Nz\n1 2 3 word 0 1 0 extra\n");
+    let cloud = text("//X Y Z Intensity Nx Ny Nz Label\n1 2 3 word 0 1 0 extra\n");
     assert_eq!(cloud.points, [Vec3::new(1.0, 2.0, 3.0)]);
     assert_eq!(cloud.normals, Some(vec![Vec3::Y]));
     let cloud = text("x y z nx ny r g a\n1 2 3 0 1 0 5 5\n");

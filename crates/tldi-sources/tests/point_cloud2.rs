@@ -94,6 +94,19 @@ fn rows_fields_and_byte_orders_are_those_of_the_message() {
     }
 }
 
+/// PCL numbers types that ROS lacks: 9 and 10 for integers of 64 bits, 11 for truth values.
+#[test]
+fn fields_that_are_passed_over_may_have_any_type() {
+    let (mut fields, data) = organised(Order::Little);
+    for datatype in [0, 9, 10, 11, 255] {
+        fields.push(field("timestamp", 0, datatype, 1));
+    }
+    let cloud = message(&fields, &data, Order::Little)
+        .read(&options())
+        .expect("sound");
+    assert_eq!(cloud.points[1], Vec3::new(1.25, -1.0, -0.5));
+}
+
 #[test]
 fn empty_messages_are_clouds_without_points() {
     let (fields, _) = organised(Order::Little);
@@ -129,7 +142,7 @@ fn what_does_not_fit_is_refused_with_its_reason() {
         (
             "unknown type",
             PointCloud2 {
-                fields: with(field("t", 0, 9, 1)),
+                fields: with(field("radius", 0, 9, 1)),
                 ..sound.clone()
             },
             "datatype 9",

@@ -221,6 +221,31 @@ fn splats_become_discs() {
     );
 }
 
+/// Files of 2D Gaussian splatting have two sizes only; the normal is the third axis.
+#[test]
+fn flat_splats_become_discs() {
+    let mut rng = Rng::with_seed(6);
+    let splats: Vec<Splat> = (0..300)
+        .map(|_| Splat {
+            sigmas: Vec3::new(0.02 + 0.02 * rng.f32(), 0.02 + 0.02 * rng.f32(), 1e-9),
+            ..Splat::random(&mut rng)
+        })
+        .collect();
+    let properties: Vec<&str> = (SPLAT_PROPERTIES.into_iter())
+        .filter(|name| *name != "scale_2")
+        .collect();
+    let header = splat_header("binary_little_endian", 300, &properties);
+    let mut file = Bytes::after(&header, Order::Little);
+    for splat in &splats {
+        for (name, value) in SPLAT_PROPERTIES.into_iter().zip(splat.values()) {
+            if name != "scale_2" {
+                file.f32(value);
+            }
+        }
+    }
+    assert_is_splats(&parse(&file.bytes, Format::Ply).expect("sound"), &splats);
+}
+
 /// Splats without extent, direction or opacity are left out and counted; half a splat is none.
 #[test]
 fn broken_splats_are_left_out() {

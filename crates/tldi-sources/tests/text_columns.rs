@@ -194,7 +194,7 @@ fn a_count_may_follow_the_names() {
         assert_eq!(cloud.colors.as_deref(), Some(&colors[..]), "{file}");
     }
     // A second count, or one among the points, is no count.
-    for file in ["//X Y Z\n2\n2\n1 2 3\n", "//X Y Z\n1 2 3\n2\n"] {
+    for file in ["X Y Z\n2\n2\n1 2 3\n", "//X Y Z\n1 2 3\n2\n"] {
         let error = parse(file.as_bytes(), Format::Text).expect_err(file);
         assert!(
             matches!(error.kind, SourceErrorKind::Value { .. }),
@@ -215,4 +215,58 @@ fn names_of_cloudcompare() {
     // Tabs and blanks mixed: words are names.
     let cloud = text("x\ty z nx  ny\tnz\n1 2\t3 0 1 0\n", Format::Text);
     assert_eq!(cloud.normals, Some(vec![Vec3::Y]));
+}
+
+/// A comment about the points is no header, whatever words are in it.
+#[test]
+fn sentences_name_no_columns() {
+    for comment in [
+        "# columns: x y z intensity",
+        "# columns: x y z",
+        "# in metres, x y z of the map",
+        "// the axes are x y z and the unit is m",
+        "# x y z",
+    ] {
+        let cloud = text(&format!("{comment}\n1 2 3 77\n"), Format::Text);
+        assert_eq!(cloud.points, [Vec3::new(1.0, 2.0, 3.0)], "{comment}");
+    }
+    let cloud = text(
+        "# fields: x y z label nx ny nz\n1 2 3 7 0 1 0\n",
+        Format::Text,
+    );
+    assert_eq!(cloud.normals, Some(vec![Vec3::Y]));
+    let cloud = text("# an x y z file\n1 2 3 10 20 30\n", Format::Text);
+    assert_eq!(cloud.colors, Some(vec![[10, 20, 30, 255]]));
+}
+
+/// A column of words may be the first, and a line of names follow a comment that has such words, too.
+#[test]
+fn a_first_column_may_have_words() {
+    for file in [
+        "id,x,y,z\np1,1,2,3\n",
+        "# id x y z\np1 1 2 3\n",
+        "# x y z of marks\nname x y z\np1 1 2 3\n",
+    ] {
+        let cloud = text(file, Format::Text);
+        assert_eq!(cloud.points, [Vec3::new(1.0, 2.0, 3.0)], "{file}");
+    }
+}
+
+/// pandas writes the number of the row before the columns, and R does. Between blanks it has no name.
+#[test]
+fn columns_without_a_name_are_not_taken_for_the_next() {
+    let points = [Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 5.0, 6.0)];
+    let comma = text(",x,y,z\n0,1,2,3\n1,4,5,6\n", Format::Text);
+    assert_eq!(comma.points, points);
+    for file in [
+        " x y z\n0 1 2 3\n1 4 5 6\n",
+        "\tx\ty\tz\n0\t1\t2\t3\n1\t4\t5\t6\n",
+        "x;y;z\n0;1;2;3\n",
+        "GPS time x y z intensity\n0 1 2 3 4\n",
+    ] {
+        assert_unclear(file);
+    }
+    // Empty at the end.
+    let cloud = text("x,y,z,label,note\n1,2,3,,\n4,5,6,a,b\n", Format::Text);
+    assert_eq!(cloud.points, points);
 }

@@ -50,7 +50,7 @@ pub struct LidarBodyReport {
     pub name: String,
     /// Number of points.
     pub points: usize,
-    /// Position in the frame of the world, metres.
+    /// Position in the frame of the world, less the origin, metres.
     pub translation: [f32; 3],
     /// Height of its lowest point above the place that it was dropped on, metres.
     pub height: f32,

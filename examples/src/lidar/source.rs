@@ -4,10 +4,10 @@ use super::Scanner;
 use anyhow::{Context, bail, ensure};
 use rapier3d_tldi::{CloudRecipe, RadiusRule, SeenPoints};
 use std::path::{Path, PathBuf};
-use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
+use tldi::glamx::{DMat3, DPose3, DQuat, DVec3, Pose3, Vec3};
 use tldi::{CloudError, PointCloud};
 use tldi_sources::depth::{OrganizedCloud, SensorModel};
-use tldi_sources::{ReadOptions, read};
+use tldi_sources::{Format, ReadOptions, read};
 
 /// Standard deviation of ranges, metres: what an HDL-64E is said to have at half of its reach. With half as much, noise
 /// counts as an edge here and there; with twice as much, normals are smoothed over twice as many columns.
@@ -15,7 +15,7 @@ const DEVIATION: f32 = 0.01;
 /// Neighbours for radii and normals: so many that there are some of the rings beside.
 const NEIGHBORS: usize = 24;
 /// Largest deviation of a pose's rotation from an orthonormal matrix: files round.
-const ROUNDING: f32 = 0.01;
+const ROUNDING: f64 = 0.01;
 
 /// One turn of a scanner.
 pub struct Sweep {
@@ -25,7 +25,7 @@ pub struct Sweep {
     pub points: Vec<Vec3>,
     /// Columns and rows of the points, if they come in rows.
     pub size: Option<[usize; 2]>,
-    /// From the frame of the scanner into that of the world.
+    /// From the frame of the scanner into that of the world, less [the origin](SweepSource::origin).
     pub world_from_scanner: Pose3,
 }
 
@@ -112,8 +112,8 @@ impl SeenSweep {
 
 /// Sweeps in order.
 pub enum SweepSource {
-    /// Files of a folder, with the pose of the scanner.
-    Folder(Vec<(PathBuf, Pose3)>),
+    /// Files of a folder, with the pose of the scanner, and where they count from in the world, metres.
+    Folder(Vec<(PathBuf, Pose3)>, DVec3),
     /// Computed.
     Generated(Scanner),
 }
@@ -123,7 +123,7 @@ impl SweepSource {
     /// with a line for each, twelve numbers: the upper rows of the matrix from the scanner's frame into that of the
     /// world. Lines that start with `#` are comments. Where there is a
     /// `calib.txt` with a line `Tr:`, poses are those of a camera, and `Tr` goes from the scanner to it: KITTI's
-    /// odometry data.
+    /// odometry data. Places count from the first pose, in whole metres: coordinates of a map are too large for `f32`.
     ///
     /// # Errors
     /// What is missing or cannot be understood, with the file and the line.
@@ -138,7 +138,8 @@ impl SweepSource {
         let mut files = Vec::new();
         for entry in entries {
             let path = entry?.path();
-            if path.extension().is_some_and(|extension| extension == "bin") {
+            let format = Format::from_extension(&path);
+            if matches!(format, Some(Format::Kitti | Format::NuScenes)) {
                 files.push(path);
             }
         }
@@ -149,7 +150,7 @@ impl SweepSource {
             let line = line.context("calib.txt has no line `Tr:`")?;
             pose(line).context("calib.txt, the line `Tr:`")?
         } else {
-            Pose3::IDENTITY
+            DPose3::IDENTITY
         };
         let text = read_text("poses.txt")?;
         let says_something = |line: &str| !line.is_empty() && !line.starts_with('#');
@@ -175,13 +176,29 @@ impl SweepSource {
             files.len(),
             poses.len()
         );
-        Ok(Self::Folder(files.into_iter().zip(poses).collect()))
+        let origin = poses[0].translation.round();
+        let near_origin = poses.into_iter().map(|pose| {
+            let near = DPose3::from_parts(pose.translation - origin, pose.rotation);
+            Pose3::from(near)
+        });
+        Ok(Self::Folder(
+            files.into_iter().zip(near_origin).collect(),
+            origin,
+        ))
+    }
+
+    /// Where all places count from in the world, metres.
+    pub fn origin(&self) -> DVec3 {
+        match self {
+            Self::Folder(_, origin) => *origin,
+            Self::Generated(_) => DVec3::ZERO,
+        }
     }
 
     /// Number of sweeps.
     pub fn len(&self) -> usize {
         match self {
-            Self::Folder(sweeps) => sweeps.len(),
+            Self::Folder(sweeps, _) => sweeps.len(),
             Self::Generated(scanner) => scanner.len(),
         }
     }
@@ -197,7 +214,7 @@ impl SweepSource {
     /// Those of reading its file.
     pub fn sweep(&self, index: usize) -> anyhow::Result<Sweep> {
         match self {
-            Self::Folder(sweeps) => {
+            Self::Folder(sweeps, _) => {
                 let (path, world_from_scanner) = &sweeps[index];
                 Ok(Sweep {
                     name: crate::load::stem(path),
@@ -217,20 +234,20 @@ impl SweepSource {
 }
 
 /// A pose from the upper three rows of its matrix.
-fn pose(text: &str) -> anyhow::Result<Pose3> {
+fn pose(text: &str) -> anyhow::Result<DPose3> {
     let numbers = (text.split_whitespace())
-        .map(|word| match word.parse::<f32>() {
-            Ok(number) if number.is_finite() => Ok(number),
+        .map(|word| match word.parse::<f64>() {
+            Ok(number) if (number as f32).is_finite() => Ok(number),
             _ => bail!("`{word}` is not a finite number"),
         })
         .collect::<anyhow::Result<Vec<_>>>()?;
     let count = numbers.len();
-    let Ok(m) = <[f32; 12]>::try_from(numbers) else {
+    let Ok(m) = <[f64; 12]>::try_from(numbers) else {
         bail!("{count} numbers where 12 belong");
     };
-    let column = |k: usize| Vec3::new(m[k], m[4 + k], m[8 + k]);
-    let rotation = Mat3::from_cols(column(0), column(1), column(2));
-    let skew = rotation.transpose() * rotation - Mat3::IDENTITY;
+    let column = |k: usize| DVec3::new(m[k], m[4 + k], m[8 + k]);
+    let rotation = DMat3::from_cols(column(0), column(1), column(2));
+    let skew = rotation.transpose() * rotation - DMat3::IDENTITY;
     let is_rotation = skew
         .to_cols_array()
         .iter()
@@ -240,8 +257,8 @@ fn pose(text: &str) -> anyhow::Result<Pose3> {
         is_rotation,
         "the matrix is no pose: its left part must be a rotation"
     );
-    Ok(Pose3::from_parts(
+    Ok(DPose3::from_parts(
         column(3),
-        Quat::from_mat3(&rotation).normalize(),
+        DQuat::from_mat3(&rotation).normalize(),
     ))
 }

@@ -98,7 +98,7 @@ impl Description {
             kind(error.to_string())
         })?;
         let mut warnings = Vec::new();
-        swap_limits(&mut urdf, &mut warnings);
+        check_limits(&mut urdf, &mut warnings);
         let kinematics = kinematics_of(&urdf, &mut warnings)?;
         let mut missing = Vec::new();
         let meshes: Vec<Mesh> = (urdf.links.iter())
@@ -128,13 +128,22 @@ pub(super) fn pose_of(origin: &urdf_rs::Pose) -> Pose3 {
     )
 }
 
-/// Lower limits above upper ones are swapped.
-fn swap_limits(urdf: &mut urdf_rs::Robot, warnings: &mut Vec<String>) {
+/// Lower limits above upper ones are swapped, and joints without room between them are told.
+fn check_limits(urdf: &mut urdf_rs::Robot, warnings: &mut Vec<String>) {
+    use urdf_rs::JointType::{Prismatic, Revolute};
     for joint in &mut urdf.joints {
         let limit = &mut joint.limit;
-        if joint.joint_type != urdf_rs::JointType::Continuous && limit.lower > limit.upper {
+        if ![Prismatic, Revolute].contains(&joint.joint_type) {
+            continue;
+        }
+        if limit.lower > limit.upper {
             warnings.push(format!("joint {}: its limits are swapped", joint.name));
             std::mem::swap(&mut limit.lower, &mut limit.upper);
+        } else if limit.lower == limit.upper {
+            warnings.push(format!(
+                "joint {} cannot move: its <limit> is missing, or `lower` and `upper` are equal",
+                joint.name
+            ));
         }
     }
 }
@@ -169,7 +178,7 @@ fn link_mesh(
     for parts in [collision.collect::<Vec<_>>(), visual.collect()] {
         let mut whole = Mesh::default();
         for (geometry, origin) in parts {
-            match mesh_of(geometry, folders, warnings) {
+            match mesh_of(geometry, folders) {
                 Ok(mesh) => whole.append(&mesh, &pose_of(origin)),
                 Err(Problem::Missing(name)) if missing.contains(&name) => {}
                 Err(Problem::Missing(name)) => missing.push(name),

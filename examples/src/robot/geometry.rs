@@ -1,7 +1,7 @@
 //! The surfaces of a URDF's geometries as triangles.
 
 use super::packages::MeshFolders;
-use crate::mesh::{Mesh, doubt_about, read_mesh};
+use crate::mesh::{Mesh, read_mesh};
 use rapier3d::geometry::{Ball, Capsule, Cuboid, Cylinder};
 use rapier3d_urdf::urdf_rs::Geometry;
 use std::f32::consts::FRAC_PI_2;
@@ -18,12 +18,8 @@ pub(super) enum Problem {
     Unusable(String),
 }
 
-/// The surface of a geometry in its own frame; what may be wrong with it goes to the warnings.
-pub(super) fn mesh_of(
-    geometry: &Geometry,
-    folders: &MeshFolders,
-    warnings: &mut Vec<String>,
-) -> Result<Mesh, Problem> {
+/// The surface of a geometry in its own frame.
+pub(super) fn mesh_of(geometry: &Geometry, folders: &MeshFolders) -> Result<Mesh, Problem> {
     let positive = |what: &str, sizes: &[f64]| {
         if sizes.iter().all(|size| size.is_finite() && *size > 0.0) {
             Ok(())
@@ -63,7 +59,6 @@ pub(super) fn mesh_of(
             let path = path.ok_or_else(|| Problem::Missing(filename.clone()))?;
             let mesh = read_mesh(&path);
             let mesh = mesh.map_err(|error| Problem::Unusable(format!("its {error}")))?;
-            warnings.extend(doubt_about(&path));
             return Ok(mesh.scaled(scale));
         }
     };

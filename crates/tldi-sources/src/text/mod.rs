@@ -3,14 +3,16 @@
 //! The parser is our own because the csv crate neither takes runs of blanks as one separator nor
 //! bounds the length of a record.
 
+mod header;
 mod triple;
 
 use crate::collector::{Collector, Layout, Sample};
 use crate::error::Result;
 use crate::input::Input;
-use crate::scalar::{Scalar, excerpt, parse_number};
-use crate::slot::{Column, Columns, Slot};
+use crate::scalar::{excerpt, parse_number};
+use crate::slot::Columns;
 use crate::{Format, RawCloud, ReadOptions, SourceErrorKind};
+use header::{Header, named_columns};
 use triple::Triple;
 
 type Outcome<T> = std::result::Result<T, SourceErrorKind>;
@@ -45,8 +47,7 @@ struct State<'a> {
     options: &'a ReadOptions,
     /// Names of the columns where there is no header.
     assumed: &'a [&'a str],
-    /// Names of the columns.
-    header: Option<Vec<String>>,
+    header: Option<Header>,
     /// From the first line of data on.
     table: Option<Table>,
     /// Whether a count was passed over.
@@ -63,9 +64,10 @@ impl State<'_> {
         }
         let comment = line.strip_prefix(b"#").or(line.strip_prefix(b"//"));
         if let Some(comment) = comment {
-            let names = names(comment);
-            if self.table.is_none() && is_header(&names) {
-                self.header = Some(names);
+            if self.table.is_none()
+                && let Some(header) = Header::of(comment, true)
+            {
+                self.header = Some(header);
             }
             return Ok(());
         }
@@ -76,71 +78,49 @@ impl State<'_> {
         let fields = separator.fields(line).count();
         let first = separator.fields(line).next().unwrap_or_default();
         if separator.number(first).is_err() {
-            return self.take_header(line);
+            let is_named = |header: &Header| !header.is_comment;
+            match (Header::of(line, false), &self.header) {
+                (Some(header), found) if !found.as_ref().is_some_and(is_named) => {
+                    self.header = Some(header);
+                    return Ok(());
+                }
+                // The first column has words.
+                (None, Some(_)) => {}
+                _ => return Err(no_header(line)),
+            }
         }
         // CloudCompare writes the count behind the names.
         if fields == 1 && !self.counted {
             self.counted = true;
             return Ok(());
         }
-        let mut table = match &self.header {
-            Some(names) => Table::named(separator, names, self.options),
+        // A comment with another number of words is a sentence.
+        let is_sentence = |header: &Header| header.is_comment && !header.names_all(fields);
+        let header = self.header.as_ref().filter(|header| !is_sentence(header));
+        let mut table = match header {
+            Some(header) => Table::named(separator, &header.names, self.options),
             None if self.assumed.is_empty() => Table::unnamed(separator, fields, self.options)?,
             None => Table::assumed(separator, self.assumed, self.options),
         };
         table.line(line)?;
+        if let Some(header) = header.filter(|header| !header.names_all(fields)) {
+            let names = header.names.len();
+            let what = format!("{names} names stand over {fields} columns");
+            return Err(SourceErrorKind::UnnamedColumns { what });
+        }
         self.table = Some(table);
         Ok(())
     }
+}
 
-    fn take_header(&mut self, line: &[u8]) -> Outcome<()> {
-        let names = names(line);
-        if self.header.is_some() || !is_header(&names) {
-            return Err(SourceErrorKind::Header {
-                format: Format::Text,
-                reason: format!(
-                    "expected numbers, or the names of columns with x, y and z among them, found `{}`",
-                    excerpt(line)
-                ),
-            });
-        }
-        self.header = Some(names);
-        Ok(())
+fn no_header(line: &[u8]) -> SourceErrorKind {
+    SourceErrorKind::Header {
+        format: Format::Text,
+        reason: format!(
+            "expected numbers, or the names of columns with x, y and z among them, found `{}`",
+            excerpt(line)
+        ),
     }
-}
-
-/// The words of a header line, without quotes. Between tabs, a name may have blanks.
-fn names(line: &[u8]) -> Vec<String> {
-    let separator = Separator::of(line);
-    if separator == Separator::Blanks && line.contains(&b'\t') {
-        let names: Vec<String> = line.split(|b| *b == b'\t').map(name).collect();
-        if is_header(&names) {
-            return names;
-        }
-    }
-    separator.fields(line).map(name).collect()
-}
-
-fn name(field: &[u8]) -> String {
-    let name = String::from_utf8_lossy(field);
-    name.trim_matches(|c: char| c == '"' || c == '\'' || c.is_whitespace())
-        .to_owned()
-}
-
-fn is_header(names: &[String]) -> bool {
-    named_columns(names).has_position()
-}
-
-fn named_columns(names: &[String]) -> Columns {
-    Columns::new(names.iter().enumerate().filter_map(|(place, name)| {
-        let slot = Slot::from_name(name)?;
-        let packed = matches!(slot, Slot::PackedRgb | Slot::PackedRgba);
-        (!packed).then_some(Column {
-            slot,
-            scalar: Scalar::F64,
-            place,
-        })
-    }))
 }
 
 /// What is between columns.
