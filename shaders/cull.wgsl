@@ -12,6 +12,11 @@ var<workgroup> kept: atomic<u32>;
 var<workgroup> radii: atomic<u32>;
 var<workgroup> first: u32;
 
+// Whether all are numbers, and none is infinite, by their bits: of comparisons, a driver may take it that they are.
+fn are_finite(v: vec4f) -> bool {
+    return all((bitcast<vec4u>(v) & vec4u(0x7fffffffu)) < vec4u(0x7f800000u));
+}
+
 fn is_within(p: vec3f, low: vec3f, high: vec3f) -> bool {
     return all(p >= low) && all(p <= high);
 }
@@ -38,11 +43,15 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
         if ((*facts).flags & RADII_DIFFER) != 0u {
             radius = points[at + 3u];
         }
+        // The host does not know the points that only the device has.
+        let in_cloud = vec3f(points[at], points[at + 1u], points[at + 2u]);
+        is_kept = are_finite(vec4f(in_cloud, radius)) && radius > 0.0;
+        radius = min(radius, (*facts).max_radius);
         position = moved(
             (*facts).frame_from_cloud_x,
             (*facts).frame_from_cloud_y,
             (*facts).frame_from_cloud_z,
-            vec3f(points[at], points[at + 1u], points[at + 2u]),
+            in_cloud,
         );
         let in_other = moved(
             (*facts).other_from_frame_x,
@@ -50,7 +59,7 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
             (*facts).other_from_frame_z,
             position,
         );
-        is_kept = is_within(position, pairs[pair_index].overlap_min, pairs[pair_index].overlap_max)
+        is_kept = is_kept && is_within(position, pairs[pair_index].overlap_min, pairs[pair_index].overlap_max)
             && is_within(in_other, (*facts).other_min, (*facts).other_max);
     }
     var own = 0u;

@@ -81,11 +81,18 @@ fn sharpened(i: u32, is_second: bool) -> Plane {
     let weight = f32(weights);
     if weight > 0.0 && dot(normal, normal) > 0.0 {
         let share = ramp(own.variance / most, 1.0, OFF_PLANE) * min(weight / WEIGHT_STEPS, 1.0);
+        let mean = vec2f(offs) / weight * vec2f(flat * flat, flat);
+        if share >= 1.0 {
+            // Nothing of its own is left. It may be INFINITE, beside which some drivers' `mix` loses all else.
+            own.normal = normalize(normal);
+            own.variance = mean.x;
+            own.height = mean.y;
+            return own;
+        }
         let between = mix(own.normal, normalize(normal), share);
         if dot(between, between) > 0.0 {
             own.normal = normalize(between);
         }
-        let mean = vec2f(offs) / weight * vec2f(flat * flat, flat);
         own.variance = mix(own.variance, mean.x, share);
         own.height = mix(own.height, mean.y, share);
     }

@@ -15,6 +15,6 @@ fn normals_sort(
     }
     let place = atomicAdd(&work[batch.cells_at + batch.cells + survivors[i].cell], 1u);
     if place < arrayLength(&entries) {
-        entries[place] = Entry(survivors[i].position, i | survivors[i].is_near * NEAR);
+        entries[place] = Entry(survivors[i].position, i | (survivors[i].is_near * NEAR));
     }
 }

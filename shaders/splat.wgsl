@@ -31,7 +31,7 @@ fn splat(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
             let weight = truncated(1.0 + (MAX_WEIGHT - 1.0) * max(share, 0.0) * splat.facing, MAX_WEIGHT);
             let place = atomicAdd(&work[end_at(s, row + u32(x))], 1u);
             if place < batch.fragments {
-                fragments[place] = vec2u(splat.class_bits | (depth & ~1u), k << WEIGHT_BITS | weight);
+                fragments[place] = vec2u(splat.class_bits | (depth & ~1u), (k << WEIGHT_BITS) | weight);
             }
         }
     }

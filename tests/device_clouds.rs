@@ -3,10 +3,10 @@
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
     Aabb, Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult, Params,
-    PointCloud, Radii, Surface,
+    PointCloud, Radii, Surface, View, VirtualCamera,
 };
-use tldi_tests::{aimed, gpu_backend, sampled_plane, sampled_sphere};
-use tldi_wgpu::{DepthCamera, GpuError, wgpu};
+use tldi_tests::{aimed, compare_on, gpu_backend, sampled_plane, sampled_sphere};
+use tldi_wgpu::{AutoBackend, DepthCamera, GpuError, WgpuBackend, wgpu};
 
 const R: f32 = 0.02;
 
@@ -168,6 +168,13 @@ fn a_depth_image_is_a_cloud() {
         &compared(&mut CpuBackend::new(), query(Surface::Cloud(&host))),
         &compared(&mut backend, query(Surface::Device(&wall))),
     );
+    // The next image, as if the wall were nearer: what was told of the last one is not true of it.
+    let nearer: Vec<u16> = image.iter().map(|depth| depth / 2).collect();
+    let next = backend.set_depth(id, &nearer).expect("a valid image");
+    let refused = backend.compare(&[query(Surface::Device(&wall))], &mut Vec::new());
+    let error = refused.expect_err("it is gone").to_string();
+    assert!(error.contains("last image"), "{error}");
+    compared(&mut backend, query(Surface::Device(&next)));
     // The CPU cannot, and says so.
     let error = CpuBackend::new()
         .compare(&[query(Surface::Device(&wall))], &mut Vec::new())
@@ -199,11 +206,19 @@ fn bad_sources_are_refused() {
         mean_radius,
         max_radius: 0.1,
     };
+    let endless = DeviceCloud {
+        bounds: Aabb {
+            min: Vec3::NEG_INFINITY,
+            max: Vec3::INFINITY,
+        },
+        ..cloud(8, 0.1)
+    };
     for bad in [
         cloud(9, 0.1),
         cloud(0, 0.1),
         cloud(8, f32::NAN),
         cloud(8, 0.2),
+        endless,
     ] {
         let error = backend.adopt(&points, bad).expect_err("it makes no sense");
         assert!(matches!(error, GpuError::BadSource { .. }), "{error}");
@@ -251,4 +266,154 @@ fn bad_sources_are_refused() {
         "{refused:?}"
     );
     assert!(backend.set_depth(id, &[1000; 8]).is_ok());
+}
+
+/// The points of a ball of 15 cm in a buffer, with a radius of `R`.
+fn ball_points() -> Vec<[f32; 4]> {
+    let points = sampled_sphere(0.15, R).points;
+    points.iter().map(|p| p.extend(R).to_array()).collect()
+}
+
+/// Such points, taken by a backend.
+fn adopted(backend: &mut WgpuBackend, points: &[[f32; 4]]) -> DeviceCloud {
+    let (device, queue) = (
+        backend.gpu().device().clone(),
+        backend.gpu().queue().clone(),
+    );
+    let told = DeviceCloud {
+        id: 0,
+        len: points.len(),
+        bounds: Aabb {
+            min: Vec3::splat(-0.2),
+            max: Vec3::splat(0.2),
+        },
+        mean_radius: R,
+        max_radius: R,
+    };
+    let adopted = backend.adopt(&buffer(&device, &queue, points), told);
+    adopted.expect("the buffer is valid")
+}
+
+fn on_floor<'a>(floor: &'a PointCloud<'a>, ball: &'a DeviceCloud) -> PairQuery<'a> {
+    let pose = Pose3::translation(0.02, 0.145, 0.03);
+    let (a, b) = (Surface::Cloud(floor), Surface::Device(ball));
+    aimed(a, b, pose, Params::for_radius(R))
+}
+
+/// Points that are none, or have no radius, do not take part; those of larger radii than any point has do, with that.
+#[test]
+fn points_that_are_none_are_left_out() {
+    let Some(mut backend) = gpu_backend() else {
+        return;
+    };
+    let mut rng = fastrand::Rng::with_seed(2);
+    let floor = sampled_plane(0.6, R, &mut rng).cloud(R);
+    let sound = ball_points();
+    let mut spoiled = sound.clone();
+    for [x, y, z, radius] in &sound[..400] {
+        spoiled.extend([
+            [f32::NAN, *y, *z, *radius],
+            [*x, f32::INFINITY, *z, *radius],
+            [0.9 * x, 1.1 * y, *z, f32::NAN],
+            [0.9 * x, 1.1 * y, *z, f32::INFINITY],
+            [0.9 * x, 1.1 * y, *z, 0.0],
+            [0.9 * x, 1.1 * y, *z, -R],
+        ]);
+    }
+    for point in &mut spoiled[..sound.len()] {
+        point[3] *= 3.0;
+    }
+    let [expected, found] = [sound, spoiled].map(|points| {
+        let ball = adopted(&mut backend, &points);
+        compared(&mut backend, on_floor(&floor, &ball))
+    });
+    assert!(expected.contacts.len() > 20, "{expected:?}");
+    assert!(expected == found, "{expected:?} {found:?}");
+}
+
+/// What is asked about points of the device is checked as for those of the host, and so is what is told of them; the
+/// device goes on.
+#[test]
+fn bad_queries_about_the_device_are_refused() {
+    let Some(mut backend) = gpu_backend() else {
+        return;
+    };
+    let mut rng = fastrand::Rng::with_seed(2);
+    let floor = sampled_plane(0.6, R, &mut rng).cloud(R);
+    let ball = adopted(&mut backend, &ball_points());
+    let good = on_floor(&floor, &ball);
+    let expected = compared(&mut backend, good);
+    let changed = |change: &dyn Fn(&mut DeviceCloud)| {
+        let mut changed = ball.clone();
+        change(&mut changed);
+        changed
+    };
+    let [longer, shorter, endless, unknown] = [
+        changed(&|cloud| cloud.len += 1),
+        changed(&|cloud| cloud.len -= 1),
+        changed(&|cloud| cloud.bounds.max.x = f32::INFINITY),
+        changed(&|cloud| cloud.id = 12),
+    ];
+    let mut camera = VirtualCamera::along(-Vec3::Y, R);
+    camera.view_from_frame.translation.x = f32::NAN;
+    let mut finer = good.params;
+    finer.pixel_size = 1e-12;
+    for (bad, expected) in [
+        (on_floor(&floor, &longer), "adopted with"),
+        (on_floor(&floor, &shorter), "adopted with"),
+        (on_floor(&floor, &endless), "bounds"),
+        (on_floor(&floor, &unknown), "released"),
+        (
+            PairQuery {
+                a_from_b: Pose3::translation(f32::NAN, 0.0, 0.0),
+                ..good
+            },
+            "a_from_b",
+        ),
+        (
+            PairQuery {
+                view: View::Fixed(camera),
+                ..good
+            },
+            "view_from_frame",
+        ),
+        (
+            PairQuery {
+                params: finer,
+                ..good
+            },
+            "pixel_size",
+        ),
+    ] {
+        match backend.compare(&[good, bad], &mut Vec::new()) {
+            Err(BackendError::Unsupported { pair: 1, reason }) => {
+                assert!(reason.contains(expected), "{expected}: {reason}");
+            }
+            other => panic!("{expected}: {other:?}"),
+        }
+    }
+    assert!(expected == compared(&mut backend, good));
+}
+
+/// What only the GPU can compare is its own, however small; a cloud that it does not have is no failure of it.
+#[test]
+fn small_batches_of_the_device_stay_there() {
+    let Some(mut backend) = gpu_backend() else {
+        return;
+    };
+    let mut rng = fastrand::Rng::with_seed(2);
+    let floor = sampled_plane(0.6, R, &mut rng).cloud(R);
+    let ball = adopted(&mut backend, &ball_points());
+    let query = on_floor(&floor, &ball);
+    let expected = compared(&mut backend, query);
+    let released = adopted(&mut backend, &ball_points());
+    backend.release(released.id);
+    let mut auto = AutoBackend::with_gpu(backend, usize::MAX);
+    for _ in 0..2 {
+        let gone = auto.compare(&[on_floor(&floor, &released)], &mut Vec::new());
+        let error = gone.expect_err("it is gone").to_string();
+        assert!(error.contains("released"), "{error}");
+        assert!(compare_on(&mut auto, &[query])[0] == expected);
+        assert_eq!((auto.name(), auto.fallback()), ("gpu", None));
+    }
 }

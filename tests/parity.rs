@@ -4,7 +4,7 @@
 //! of a pixel's border may fall to either side. Bounds are in mean radii, and how many pixels differ
 //! is counted.
 
-use tldi::glamx::{Pose3, Vec3};
+use tldi::glamx::{Pose3, Rot3, Vec3};
 use tldi::{
     Backend, CameraPolicy, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View,
     VirtualCamera,
@@ -406,6 +406,17 @@ fn bad_queries_are_refused_as_by_the_cpu() {
         },
         PairQuery {
             a_from_b: Pose3::translation(f32::INFINITY, 0.0, 0.0),
+            ..good[1]
+        },
+        PairQuery {
+            a_from_b: Pose3::from_rotation(Rot3::from_xyzw(0.0, 0.0, 0.0, 1.001)),
+            ..good[1]
+        },
+        PairQuery {
+            view: View::Fixed(VirtualCamera {
+                size: Some([0, 8]),
+                ..VirtualCamera::along(Vec3::Z, good[1].params.pixel_size)
+            }),
             ..good[1]
         },
     ] {

@@ -3,8 +3,8 @@
 use tldi::glamx::Vec3;
 use tldi::{CloudError, PointCloud};
 
-/// Every `step`-th point of a cloud, with its normal, its colour and another radius. All normals count as known
-/// to point outward: to be drawn, not to collide.
+/// Every `step`-th point of a cloud (0 counts as 1), with its normal, its colour and another radius. All normals count as
+/// known to point outward: to be drawn, not to collide.
 ///
 /// # Errors
 /// [`CloudError`] if the radii are refused.
@@ -14,6 +14,7 @@ use tldi::{CloudError, PointCloud};
 /// let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X, Vec3::Y]).radius(0.5).build()?;
 /// let half = tldi_pictures::thinned(&cloud, 2, |radius| 2.0 * radius)?;
 /// assert_eq!((half.len(), half.point(1), half.radius(1)), (2, Vec3::Y, 1.0));
+/// assert_eq!(tldi_pictures::thinned(&cloud, 0, |radius| radius)?.len(), 3);
 /// # Ok::<(), tldi::CloudError>(())
 /// ```
 pub fn thinned(
@@ -21,7 +22,7 @@ pub fn thinned(
     step: usize,
     radius: impl Fn(f32) -> f32,
 ) -> Result<PointCloud<'static>, CloudError> {
-    let kept = || (0..cloud.len()).step_by(step);
+    let kept = || (0..cloud.len()).step_by(step.max(1));
     let points: Vec<Vec3> = kept().map(|i| cloud.point(i)).collect();
     let radii: Vec<f32> = kept().map(|i| radius(cloud.radius(i))).collect();
     let mut builder = PointCloud::builder(points).radii(radii);

@@ -53,7 +53,10 @@ impl FrontLayers {
     fn close_pinholes(&mut self) {
         let width = self.size[0] as usize;
         let inner = width + 1..self.pixels.len().saturating_sub(width + 1);
-        let mut empty: Vec<usize> = inner.filter(|&k| self.pixels[k].is_none()).collect();
+        // Beyond the ends of a row is the other side of the picture.
+        let is_inner = |k: usize| !matches!((k % width, (k + 1) % width), (0, _) | (_, 0));
+        let is_empty = |k: &usize| is_inner(*k) && self.pixels[*k].is_none();
+        let mut empty: Vec<usize> = inner.filter(is_empty).collect();
         for _ in 0..PINHOLE_ROUNDS {
             let closed: Vec<_> = (empty.iter())
                 .map(|&k| {
@@ -68,6 +71,42 @@ impl FrontLayers {
                 self.pixels[k] = layer;
             }
             empty.retain(|&k| self.pixels[k].is_none());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tldi::Facing;
+
+    /// A gap between two layers is closed in the middle of a row. At its ends there is one only on one side: the other
+    /// is in the next row.
+    #[test]
+    fn gaps_at_the_rim_stay() {
+        let size = [5, 4];
+        let layer = Layer {
+            near: 1.0,
+            far: 1.0,
+            depth: 1.0,
+            normal: -Vec3::Z,
+            facing: Facing::Unknown,
+            color: [0; 4],
+            agreement: 1.0,
+        };
+        for column in 0..5 {
+            let mut front = FrontLayers {
+                size,
+                pixels: vec![Some((0, layer)); 20],
+            };
+            let gap = 5 + column;
+            front.pixels[gap] = None;
+            front.close_pinholes();
+            assert_eq!(
+                front.pixels[gap].is_some(),
+                (1..4).contains(&column),
+                "{column}"
+            );
         }
     }
 }

@@ -5,6 +5,7 @@
 //! It knows [`tldi`] alone: no physics, and none of the stories that it illustrates.
 
 pub mod animation;
+mod camera;
 mod clouds;
 mod front_layers;
 mod picture;

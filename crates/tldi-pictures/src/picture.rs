@@ -1,5 +1,6 @@
 //! An image, the marks on it, and its file.
 
+use crate::camera::near_of;
 use tldi::VirtualCamera;
 use tldi::glamx::Vec3;
 
@@ -27,20 +28,19 @@ impl Picture {
     pub(crate) fn mark(&mut self, camera: &VirtualCamera, point: Vec3, is_hidden: bool) {
         let radius = (DOT_SHARE * self.size[1] as f32).max(LEAST_DOT);
         let view = camera.view_from_point(point);
-        if view.z <= 0.0 {
+        if view.z < near_of(camera) {
             return;
         }
         let [u, v] = camera.pixel_from_view(view);
-        let reach = (radius + DOT_RIM).ceil() as i32;
-        for y in v.floor() as i32 - reach..=v.floor() as i32 + reach {
-            for x in u.floor() as i32 - reach..=u.floor() as i32 + reach {
+        let reach = radius + DOT_RIM;
+        // In the picture, however far the point is from it: casts end at what a number holds.
+        let within = |middle: f32, count: u32| {
+            (middle - reach).floor() as u32..((middle + reach).ceil() as u32).min(count)
+        };
+        for y in within(v, self.size[1]) {
+            for x in within(u, self.size[0]) {
                 let distance = (x as f32 + 0.5 - u).hypot(y as f32 + 0.5 - v);
-                let inside =
-                    (0..self.size[0] as i32).contains(&x) && (0..self.size[1] as i32).contains(&y);
-                if !inside {
-                    continue;
-                }
-                let pixel = &mut self.rgb[(y as u32 * self.size[0] + x as u32) as usize];
+                let pixel = &mut self.rgb[(y * self.size[0] + x) as usize];
                 if is_hidden {
                     if (distance - radius).abs() < HIDDEN_RING {
                         *pixel = [0, 1, 2].map(|c| pixel[c].midpoint(CONTACT_COLOR[c]));

@@ -1,5 +1,6 @@
 //! Lights the front layers of a picture.
 
+use crate::camera::toward_camera;
 use crate::front_layers::FrontLayers;
 use crate::scene::{Paint, Scene};
 use tldi::glamx::Vec3;
@@ -131,7 +132,7 @@ impl<'a> Frame<'a> {
         let view = self
             .camera
             .view_at(x as f32 + 0.5, y as f32 + 0.5, layer.depth);
-        let to_camera = -view.normalize_or(Vec3::Z);
+        let to_camera = toward_camera(&self.camera, view);
         let normal = layer.normal.normalize_or(to_camera);
         let normal = if normal.dot(to_camera) < 0.0 {
             -normal

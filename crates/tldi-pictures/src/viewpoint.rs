@@ -1,8 +1,9 @@
 //! Chooses where to look at bodies from.
 
+use crate::camera::near_of;
 use crate::{Item, Paint, Scene, pixels_of, thinned};
 use tldi::glamx::{Pose3, Quat, Vec3};
-use tldi::{PointCloud, Projection, VirtualCamera};
+use tldi::{PointCloud, VirtualCamera};
 
 /// Horizontal field of view in radians (50°).
 const FIELD_OF_VIEW: f32 = 0.873;
@@ -123,14 +124,6 @@ impl Framing {
             0.05 * distance
         };
         VirtualCamera::perspective(eye, target, up, FIELD_OF_VIEW, size, near, 1e4 * distance)
-    }
-}
-
-/// Depth in metres from which a perspective camera sees.
-fn near_of(camera: &VirtualCamera) -> f32 {
-    match camera.projection {
-        Projection::Perspective { near, .. } => near,
-        Projection::Orthographic { .. } => f32::NEG_INFINITY,
     }
 }
 

@@ -136,6 +136,52 @@ fn contacts_that_something_hides_are_rings() {
     }
 }
 
+/// Parallel rays see the same from however far behind: lights, and marks of contacts.
+#[test]
+fn a_camera_of_parallel_rays_sees_the_same_from_everywhere() {
+    let (floor, tile) = (cloud(square(3.0)), cloud(square(0.4)));
+    let middle = Vec3::new(1.5, 0.75, 0.0);
+    let from_behind = |away: f32| {
+        let at = |height: f32| middle + (height - away) * Vec3::Z;
+        let items = [item(&floor, at(0.0), BLUE), item(&tile, at(0.3), RED)];
+        let mut camera = VirtualCamera::along(-Vec3::Z, 3.0 / SIZE[0] as f32);
+        camera.size = Some(SIZE);
+        // The image begins at the view frame's origin.
+        let seen = camera.view_from_point(middle);
+        let shift = Vec3::new(1.5 - seen.x, 0.75 - seen.y, 0.0);
+        camera.view_from_frame.translation += shift;
+        scene(&items).draw(&camera, &[at(0.31)])
+    };
+    // Depths below 0, and above it.
+    let [before, behind] = [-8.0, 8.0].map(from_behind);
+    assert!(before.rgb.contains(&[255, 230, 40]));
+    let differ = |(a, b): &(&[u8; 3], &[u8; 3])| (0..3).any(|c| a[c].abs_diff(b[c]) > 8);
+    let differing = before.rgb.iter().zip(&behind.rgb).filter(differ).count();
+    assert!(differing * 100 < before.rgb.len(), "{differing} pixels");
+}
+
+/// Contacts that a picture does not hold leave no mark, however far they are beside it.
+#[test]
+fn contacts_beside_the_picture_leave_no_mark() {
+    let tile = cloud(square(0.4));
+    let items = [item(&tile, 4.0 * Vec3::Z, RED)];
+    let camera = VirtualCamera::perspective(Vec3::ZERO, Vec3::Z, -Vec3::Y, 0.8, SIZE, 0.1, 100.0);
+    let plain = scene(&items).draw(&camera, &[]);
+    let beside = |aside: f32, depth: f32| {
+        [
+            Vec3::new(aside, -aside, depth),
+            Vec3::new(-aside, aside, depth),
+        ]
+    };
+    let contacts = [
+        beside(1.0, 1e-9),
+        beside(1e12, 1.0),
+        [Vec3::NAN, Vec3::splat(f32::MAX)],
+    ];
+    let picture = scene(&items).draw(&camera, contacts.as_flattened());
+    assert_eq!(picture, plain);
+}
+
 #[test]
 fn png_files_hold_the_picture() {
     let tile = cloud(square(0.4));

@@ -18,7 +18,9 @@ use crate::sources::{DepthCamera, Sources};
 use crate::upload::Upload;
 use crate::{Gpu, GpuError, StageTime, Traffic};
 use submit::Asked;
-use tldi::{Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult, PatchScratch};
+use tldi::{
+    Backend, BackendError, CpuBackend, DeviceCloud, PairQuery, PairResult, PatchScratch, Surface,
+};
 
 /// Compares batches on a GPU.
 ///
@@ -147,11 +149,13 @@ impl WgpuBackend {
     /// Takes points that already live in a buffer of this device, without a copy to the host: `x`,
     /// `y`, `z` in metres and the radius of each, four `f32`; `cloud` tells the rest, its number is
     /// set here. They are read anew in every batch that uses the cloud, by a copy on the device (16
-    /// bytes a point). Points that are not numbers are left out.
+    /// bytes a point); until a batch is finished they must stay as they are, since it may be compared in parts. Points
+    /// that are not finite, and those without a finite radius above 0, are left out; larger radii than the told largest
+    /// one count as that.
     ///
     /// # Errors
     /// [`GpuError::BadSource`] where the buffer is too small or cannot be copied from (it needs
-    /// [`wgpu::BufferUsages::COPY_SRC`]), or `cloud` makes no sense.
+    /// [`wgpu::BufferUsages::COPY_SRC`]), or [`DeviceCloud::check`] refuses `cloud`.
     pub fn adopt(
         &mut self,
         points: &wgpu::Buffer,
@@ -173,7 +177,7 @@ impl WgpuBackend {
     ///
     /// # Errors
     /// [`GpuError::BadSource`] where there is no such camera, or the image is not of its size or
-    /// holds no depth in its range.
+    /// holds no depth in its range, or [`DeviceCloud::check`] refuses its points.
     pub fn set_depth(&mut self, camera: u64, image: &[u16]) -> Result<DeviceCloud, GpuError> {
         self.sources.set_depth(&self.gpu, camera, image)
     }
@@ -204,8 +208,8 @@ impl WgpuBackend {
         self.traffic
     }
 
-    /// Compares the batch if at least so many points are in blocks that both sides of a pair reach;
-    /// else returns `false`.
+    /// Compares the batch if at least so many points are in blocks that both sides of a pair reach, or if only the
+    /// device has some of them; else returns `false`.
     pub(crate) fn compare_if_large(
         &mut self,
         least_points: usize,
@@ -213,7 +217,7 @@ impl WgpuBackend {
         results: &mut Vec<PairResult>,
     ) -> Result<bool, BackendError> {
         let left_to_cpu = self.select(batch)?;
-        if self.upload.points() < least_points {
+        if self.upload.points() < least_points && !batch.iter().any(lives_on_device) {
             return Ok(false);
         }
         let reused = std::mem::take(results);
@@ -226,18 +230,27 @@ impl WgpuBackend {
         let mut left_to_cpu = Vec::new();
         for (pair, query) in batch.iter().enumerate() {
             let is_for_device = is_for_device(query);
-            // The check refuses points that only the device has.
-            if !is_for_device || !lives_on_device(query) {
-                query
-                    .check()
-                    .map_err(|reason| BackendError::Unsupported { pair, reason })?;
-            }
+            let checked = match is_for_device && lives_on_device(query) {
+                true => self.check_on_device(query),
+                // It refuses points that only the device has.
+                false => query.check(),
+            };
+            checked.map_err(|reason| BackendError::Unsupported { pair, reason })?;
             if !is_for_device {
                 left_to_cpu.push(pair);
             }
         }
         self.upload.select(batch, 0..batch.len());
         Ok(left_to_cpu)
+    }
+
+    /// Whether the device can compare a pair of which it alone has points; if not, why.
+    fn check_on_device(&self, query: &PairQuery<'_>) -> Result<(), &'static str> {
+        query.check_numbers()?;
+        [query.a, query.b].iter().try_for_each(|side| match side {
+            Surface::Device(cloud) => self.sources.check(cloud),
+            _ => Ok(()),
+        })
     }
 }
 

@@ -56,10 +56,13 @@ impl Growable {
     }
 }
 
-/// Bytes of the largest buffer that the stages can use.
+/// Bytes of the largest buffer that the stages can use. They are whole words, though drivers tell 2³¹ - 1: no other buffer
+/// can be bound or copied. A stage is told them in a word.
 pub(crate) fn most_bytes(gpu: &Gpu) -> u64 {
     let limits = gpu.device.limits();
-    (limits.max_buffer_size).min(limits.max_storage_buffer_binding_size)
+    let most = (limits.max_buffer_size).min(limits.max_storage_buffer_binding_size);
+    let told = most.min(u64::from(u32::MAX));
+    told - told % wgpu::COPY_BUFFER_ALIGNMENT
 }
 
 /// A new buffer of at least `bytes` bytes, rounded up to a power of two.
@@ -90,5 +93,29 @@ pub(crate) fn create(
     match scope.and_then(|scope| pollster::block_on(scope.pop())) {
         Some(error) => Err(gpu.failed(format!("no memory for {size} bytes of `{name}`: {error}"))),
         None => Ok(buffer),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing;
+
+    /// The largest buffer can be copied as a whole, also where the device's limit is odd.
+    #[test]
+    fn an_odd_limit_gives_whole_words() {
+        let Some(gpu) = testing::open_small((1 << 16) - 1) else {
+            return;
+        };
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+        let [from, to] = [(); 2].map(|()| {
+            let largest = create(&gpu, "largest", usage, most_bytes(&gpu));
+            largest.expect("it is allowed")
+        });
+        assert!(from.size() > 65_528, "{}", from.size());
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&from, 0, &to, 0, from.size());
+        gpu.queue.submit([encoder.finish()]);
+        gpu.wait().expect("it is copied");
     }
 }

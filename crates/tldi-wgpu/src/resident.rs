@@ -67,8 +67,7 @@ impl Pool {
     /// Makes room for `count` more elements in a row, or for as many as the device allows; what is
     /// there stays where it is.
     fn grow(&mut self, gpu: &Gpu, count: u32) -> Result<(), GpuError> {
-        // The stages number the words of a pool in a word.
-        let most = most_bytes(gpu).min(4 * u64::from(u32::MAX)) / self.element_bytes;
+        let most = most_bytes(gpu) / self.element_bytes;
         let elements = (u64::from(self.capacity) + u64::from(count)).min(most);
         if elements <= u64::from(self.capacity) {
             return Ok(());

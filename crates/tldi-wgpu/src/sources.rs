@@ -46,6 +46,12 @@ pub struct DepthCamera {
     pub radius_px: f32,
 }
 
+impl DepthCamera {
+    fn pixels(&self) -> usize {
+        self.size[0] as usize * self.size[1] as usize
+    }
+}
+
 /// See `DepthCamera` in WGSL.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -62,11 +68,14 @@ struct CameraData {
 
 #[derive(Debug)]
 enum Source {
-    Buffer(wgpu::Buffer),
+    /// With so many points.
+    Buffer(wgpu::Buffer, usize),
     Depth {
         camera: DepthCamera,
         depths: Growable,
         uniform: Growable,
+        /// What was told of the last image.
+        told: Option<DeviceCloud>,
     },
 }
 
@@ -106,19 +115,24 @@ impl Sources {
                 ),
             });
         }
-        let is_usable = |r: f32| r.is_finite() && r > 0.0;
-        if cloud.len == 0
-            || cloud.len > u32::MAX as usize
-            || cloud.bounds.is_empty()
-            || !is_usable(cloud.mean_radius)
-            || !(is_usable(cloud.max_radius) && cloud.max_radius >= cloud.mean_radius)
-        {
-            return Err(GpuError::BadSource {
-                reason: format!("a cloud needs points, bounds and positive radii: {cloud:?}"),
-            });
-        }
-        cloud.id = self.add(Source::Buffer(points.clone()));
+        told(&cloud)?;
+        cloud.id = self.add(Source::Buffer(points.clone(), cloud.len));
         Ok(cloud)
+    }
+
+    /// Whether the points of a cloud are here; if not, why, and what to do.
+    pub(crate) fn check(&self, cloud: &DeviceCloud) -> Result<(), &'static str> {
+        match self.all.get(&cloud.id) {
+            Some(Source::Buffer(_, len)) if *len == cloud.len => Ok(()),
+            Some(Source::Buffer(..)) => {
+                Err("the cloud has not as many points as it was adopted with: adopt it anew")
+            }
+            Some(Source::Depth { told, .. }) if told.as_ref() == Some(cloud) => Ok(()),
+            Some(Source::Depth { .. }) => {
+                Err("the cloud is not that of its camera's last image: use what `set_depth` gave")
+            }
+            None => Err("the cloud is not of this backend, or was released: adopt it"),
+        }
     }
 
     /// A camera without an image yet.
@@ -147,6 +161,7 @@ impl Sources {
                 "depth camera",
                 BufferUsages::UNIFORM | BufferUsages::COPY_DST,
             ),
+            told: None,
         }))
     }
 
@@ -158,10 +173,16 @@ impl Sources {
         image: &[u16],
     ) -> Result<DeviceCloud, GpuError> {
         let bad = |reason: String| GpuError::BadSource { reason };
-        let Some(Source::Depth { camera, depths, .. }) = self.all.get_mut(&id) else {
+        let Some(Source::Depth {
+            camera,
+            depths,
+            told: last,
+            ..
+        }) = self.all.get_mut(&id)
+        else {
             return Err(bad(format!("there is no depth camera {id}")));
         };
-        let len = (camera.size[0] * camera.size[1]) as usize;
+        let len = camera.pixels();
         if image.len() != len {
             return Err(bad(format!(
                 "the image has {} depths, the camera {} x {}",
@@ -184,11 +205,6 @@ impl Sources {
                 "no depth of the image is in the camera's range".to_owned()
             ));
         }
-        let words: Vec<u32> = image
-            .chunks(2)
-            .map(|pair| u32::from(pair[0]) | u32::from(*pair.get(1).unwrap_or(&0)) << 16)
-            .collect();
-        depths.write(gpu, &words)?;
         let radius = |depth: f32| camera.radius_px * depth / camera.focal_px[0];
         let corner = |column: f32, row: f32, depth: f32| {
             let [fx, fy] = camera.focal_px;
@@ -201,13 +217,21 @@ impl Sources {
             bounds = bounds.including(corner(0.0, 0.0, depth));
             bounds = bounds.including(corner(columns, rows, depth));
         }
-        Ok(DeviceCloud {
+        let cloud = DeviceCloud {
             id,
             len,
             bounds,
             mean_radius: radius((sum / count) as f32),
             max_radius: radius(high),
-        })
+        };
+        told(&cloud)?;
+        let words: Vec<u32> = image
+            .chunks(2)
+            .map(|pair| u32::from(pair[0]) | u32::from(*pair.get(1).unwrap_or(&0)) << 16)
+            .collect();
+        depths.write(gpu, &words)?;
+        *last = Some(cloud.clone());
+        Ok(cloud)
     }
 
     /// Forgets a cloud.
@@ -219,18 +243,13 @@ impl Sources {
         self.used.clear();
     }
 
-    /// Where the points of a cloud will be.
+    /// Where the points of a cloud that was checked will be.
     pub(crate) fn place(
         &mut self,
         gpu: &Gpu,
         cloud: &DeviceCloud,
         resident: &mut Resident,
     ) -> Result<Place, GpuError> {
-        if !self.all.contains_key(&cloud.id) {
-            return Err(GpuError::BadSource {
-                reason: format!("cloud {} is not of this backend, or was released", cloud.id),
-            });
-        }
         let words = numbered("points", POINT_WORDS * cloud.len as u64)?;
         let (first, _) = resident.reserve(gpu, cloud.id, words, None)?;
         if !self.used.iter().any(|(id, ..)| *id == cloud.id) {
@@ -239,23 +258,24 @@ impl Sources {
         Ok(Place::interleaved(first))
     }
 
-    /// Encodes what brings the points of the batch to their places.
+    /// Encodes what brings the points of the batch to their places, once: later, they may be those of another frame.
     pub(crate) fn encode(
         &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         points: &wgpu::Buffer,
     ) -> Result<(), GpuError> {
-        for (id, first, len) in &self.used {
-            match self.all.get_mut(id) {
-                Some(Source::Buffer(source)) => {
-                    let (at, bytes) = (4 * u64::from(*first), 4 * POINT_WORDS * u64::from(*len));
+        for (id, first, len) in self.used.drain(..) {
+            match self.all.get_mut(&id) {
+                Some(Source::Buffer(source, _)) => {
+                    let (at, bytes) = (4 * u64::from(first), 4 * POINT_WORDS * u64::from(len));
                     encoder.copy_buffer_to_buffer(source, 0, points, at, bytes);
                 }
                 Some(Source::Depth {
                     camera,
                     depths,
                     uniform,
+                    ..
                 }) => {
                     let data = CameraData {
                         size: camera.size,
@@ -264,7 +284,7 @@ impl Sources {
                         metres_per_unit: camera.metres_per_unit,
                         range: camera.range,
                         radius_px: camera.radius_px,
-                        first_point: *first,
+                        first_point: first,
                         padding: 0,
                     };
                     uniform.write(gpu, &[data])?;
@@ -301,6 +321,13 @@ impl Sources {
         }
         Ok(())
     }
+}
+
+/// What is told of a cloud, if it can be true.
+fn told(cloud: &DeviceCloud) -> Result<(), GpuError> {
+    (cloud.check()).map_err(|reason| GpuError::BadSource {
+        reason: format!("{reason}: {cloud:?}"),
+    })
 }
 
 fn unproject(gpu: &Gpu) -> wgpu::ComputePipeline {

@@ -153,8 +153,9 @@ impl Upload {
         let beside = |bytes: u64, element: u64| {
             u32::try_from(allowed.saturating_sub(bytes) / element).unwrap_or(u32::MAX)
         };
+        // They are read back with the counters.
         let contacts = beside(
-            4 * u64::from(PAIR_WORDS) * pairs,
+            4 * (u64::from(COUNTERS) + u64::from(PAIR_WORDS) * pairs),
             4 * u64::from(CONTACT_WORDS),
         );
         let of_images =
@@ -220,6 +221,23 @@ impl Upload {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What comes back of contacts, with the counters and the pairs, has room in a buffer.
+    #[test]
+    fn contacts_have_room_where_they_are_read() {
+        let wanted = Counters {
+            contacts: u32::MAX,
+            ..Counters::LEAST
+        };
+        for allowed in (1 << 16)..(1 << 16) + 48 {
+            let contacts = Upload::default().fitted(wanted, allowed).contacts;
+            let bytes = 4 * u64::from(COUNTERS + CONTACT_WORDS * contacts);
+            assert!(
+                (allowed - 47..=allowed).contains(&bytes),
+                "{bytes} of {allowed}"
+            );
+        }
+    }
 
     /// Places in the arena that a word cannot number are refused, whichever part makes them so.
     #[test]

@@ -104,6 +104,13 @@ fn fixed_cameras_that_show_nothing() {
         });
         refused(of_pose, "unit quaternion");
     }
+    for size in [[0, 64], [64, 0], [64, u32::MAX]] {
+        let of_size = of_camera(VirtualCamera {
+            size: Some(size),
+            ..camera
+        });
+        refused(of_size, "size must be");
+    }
     let perspective = |focal_px, near, far| VirtualCamera {
         projection: Projection::Perspective {
             focal_px,
@@ -151,6 +158,40 @@ fn shares_are_from_0_to_1() {
         ..params
     };
     assert_eq!(refusal(aim(), ends), None);
+}
+
+/// Poses that scale, of pairs and of casts.
+#[test]
+fn poses_that_are_not_rigid() {
+    let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.01);
+    let cloud = cloud.build().expect("the points are valid");
+    let (a, b) = (Surface::Cloud(&cloud), Surface::Cloud(&cloud));
+    let params = Params::for_radius(0.01);
+    for w in [1.001, 0.0, f32::NAN] {
+        let a_from_b = Pose3::from_rotation(Quat::from_xyzw(0.0, 0.0, 0.0, w));
+        let pair = PairQuery {
+            a,
+            b,
+            a_from_b,
+            view: aim(),
+            params,
+        };
+        refused(pair.check().err(), "a_from_b must");
+        let cast = CpuBackend::new().impact(&ImpactQuery {
+            a,
+            b,
+            a_from_b,
+            motion: Vec3::X,
+            touching: 0.0,
+            core_only: false,
+            penetration: None,
+            params,
+        });
+        let Err(BackendError::Unsupported { reason, .. }) = cast else {
+            panic!("{cast:?}");
+        };
+        refused(Some(reason), "a_from_b must");
+    }
 }
 
 #[test]

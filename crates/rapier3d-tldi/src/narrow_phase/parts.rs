@@ -57,6 +57,14 @@ pub(crate) fn part(shape: &dyn Shape, index: u32) -> (Option<&Pose>, &dyn Shape)
     }
 }
 
+/// The pose with a unit quaternion: those of joints that turn for minutes drift, and rapier leaves them so.
+pub(crate) fn rigid(pose: Pose) -> Pose {
+    match pose.rotation.is_normalized() {
+        true => pose,
+        false => Pose::from_parts(pose.translation, pose.rotation.normalize()),
+    }
+}
+
 /// Whether contacts up to a gap of `prediction` metres are possible: the bounds meet in the frames
 /// of both shapes. `pos12` maps from the frame of shape 2 into that of shape 1.
 pub(crate) fn within_reach(
@@ -183,6 +191,7 @@ pub(crate) fn append_part_pairs<'a>(
             if let Some(pose1) = pose1 {
                 a_from_b = pose1.inv_mul(&a_from_b);
             }
+            let a_from_b = rigid(a_from_b);
             let is_near = within_reach(part1, part2, &a_from_b, prediction);
             if !(is_near && has_surface(part1) && has_surface(part2)) {
                 continue;

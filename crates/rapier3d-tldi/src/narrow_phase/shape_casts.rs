@@ -4,7 +4,9 @@ use super::moving::{Moving, TOUCHING, hit_of};
 use super::queries;
 use super::turning::Turning;
 use crate::corrections::sweeps::SweptPair;
-use crate::narrow_phase::parts::{ShapePair, has_cloud, has_surface, part, part_count, surface};
+use crate::narrow_phase::parts::{
+    ShapePair, has_cloud, has_surface, part, part_count, rigid, surface,
+};
 use crate::narrow_phase::straight_way::StraightWay;
 use crate::shape::exact::ExactShape;
 use crate::step::prepared::{Blocked, Shared};
@@ -217,7 +219,7 @@ fn straight_impact(
     let query = ImpactQuery {
         a: surface(&a),
         b: surface(&b),
-        a_from_b: way.begin(&a_from_b),
+        a_from_b: rigid(way.begin(&a_from_b)),
         motion: way.motion(),
         touching: match options.stop_at_penetration {
             true => 0.0,

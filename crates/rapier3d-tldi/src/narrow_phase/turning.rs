@@ -10,7 +10,7 @@
 //! [`Room`]. Once it is used up, no piece is cast again.
 
 use super::moving::{Moving, TOUCHING, hit_of};
-use super::parts::{ShapePair, surface};
+use super::parts::{ShapePair, rigid, surface};
 use super::straight_way::StraightWay;
 use crate::shape::exact::ExactShape;
 use crate::step::prepared::Shared;
@@ -168,7 +168,7 @@ impl Turning<'_> {
         let query = ImpactQuery {
             a: surface(&a),
             b: surface(&b),
-            a_from_b: way.begin(&frozen),
+            a_from_b: rigid(way.begin(&frozen)),
             motion: way.motion(),
             touching,
             core_only: true,

@@ -74,6 +74,54 @@ fn straight_casts() -> TestResult {
     Ok(())
 }
 
+/// A joint that turns for minutes leaves rapier a quaternion that is no unit any more: pairs and casts are answered as if it
+/// were one.
+#[test]
+fn rotations_that_have_drifted_are_answered() -> TestResult {
+    let tldi = TldiPipeline::new(TldiConfig::default())?;
+    let dispatcher = tldi.dispatcher();
+    let (cube, floor) = (shape(&cube(0.2)), shape(&square(0.8)));
+    let rotation = Rotation::from_rotation_y(0.3);
+    let at = |height: f32, drift: f32| {
+        Pose::from_parts(Vector::new(0.1, height, 0.0), rotation * (1.0 + drift))
+    };
+    let velocity = Vector::new(0.1, -2.0, 0.0);
+    let asked = |drift: f32| -> Result<[f32; 2], Box<dyn std::error::Error>> {
+        let (low, high) = (at(0.19, drift), at(1.2, drift));
+        let crossing = dispatcher.intersection_test(&low, &floor, &cube)?;
+        assert!(crossing.intersecting, "{drift}");
+        let hit = dispatcher.cast_shapes(&high, velocity, &floor, &cube, until(10.0))?;
+        let turning = |start, linvel| NonlinearRigidMotion {
+            start,
+            local_center: Vector::ZERO,
+            linvel,
+            angvel: Vector::ZERO,
+        };
+        let motions = [
+            turning(Pose::IDENTITY, Vector::ZERO),
+            turning(high, velocity),
+        ];
+        let swept = dispatcher.cast_shapes_nonlinear(
+            &motions[0],
+            &floor,
+            &motions[1],
+            &cube,
+            0.0,
+            10.0,
+            true,
+        )?;
+        Ok([
+            hit.ok_or("it falls on the floor")?.time_of_impact,
+            swept.ok_or("it falls on the floor")?.time_of_impact,
+        ])
+    };
+    let (unit, drifted) = (asked(0.0)?, asked(5e-4)?);
+    for (unit, drifted) in unit.into_iter().zip(drifted) {
+        assert!((unit - drifted).abs() < TOLERANCE / 2.0, "{unit} {drifted}");
+    }
+    Ok(())
+}
+
 /// As soon as a distance is left, and what is met at the start.
 #[test]
 fn target_distance_and_penetration() -> TestResult {

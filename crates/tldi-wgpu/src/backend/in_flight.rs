@@ -126,3 +126,66 @@ impl WgpuBackend {
         self.start(batch, Vec::new(), left_to_cpu)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing;
+    use tldi::glamx::{Pose3, Vec3};
+    use tldi::{Backend, DeviceCloud, Params, PointCloud, Surface, View};
+
+    const R: f32 = 0.05;
+
+    /// A part that is redone has the points that its batch began with, although the caller's buffer holds others by then.
+    #[test]
+    fn a_redone_part_keeps_its_points() {
+        let Some(gpu) = testing::open() else {
+            return;
+        };
+        let mut backend = WgpuBackend::new(gpu.clone()).expect("the stages fit");
+        let position = |i: usize| Vec3::new((i % 40) as f32, 0.0, (i / 40) as f32) * R;
+        let positions: Vec<Vec3> = (0..1600).map(position).collect();
+        let words = |height: f32| -> Vec<[f32; 4]> {
+            let raised = positions.iter().map(|p| *p + height * Vec3::Y);
+            raised.map(|p| p.extend(R).to_array()).collect()
+        };
+        let sheet = PointCloud::builder(&positions).radius(R).build();
+        let sheet = sheet.expect("the points are valid");
+        let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        let buffer = crate::buffers::create(&gpu, "points", usage, 16 * 1600);
+        let buffer = buffer.expect("there is room");
+        let write = |height: f32| {
+            let words = words(height);
+            gpu.queue
+                .write_buffer(&buffer, 0, bytemuck::cast_slice(&words));
+            gpu.queue.submit([]);
+        };
+        let told = DeviceCloud {
+            id: 0,
+            len: 1600,
+            bounds: sheet.bounds().loosened(R),
+            mean_radius: R,
+            max_radius: R,
+        };
+        let on_device = backend.adopt(&buffer, told).expect("it is valid");
+        let query = PairQuery {
+            a: Surface::Cloud(&sheet),
+            b: Surface::Device(&on_device),
+            a_from_b: Pose3::translation(0.0, 0.2 * R, 0.0),
+            view: View::aimed(),
+            params: Params::for_radius(R),
+        };
+        write(0.0);
+        let mut expected = Vec::new();
+        let outcome = backend.compare(&[query], &mut expected);
+        outcome.expect("the device takes it");
+
+        let batch = backend.begin(&[query]).expect("it is submitted");
+        // The next frame, and as if the contacts of this one had had no room.
+        write(0.5 * R);
+        batch.backend.capacities.contacts = 1;
+        let found = batch.finish().expect("nothing fails");
+        assert!(found == expected, "{:?}", found[0].gap);
+        assert_eq!(backend.traffic().redos, 1);
+    }
+}

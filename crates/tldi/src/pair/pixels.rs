@@ -1,6 +1,6 @@
 //! How large and how small pixels may be.
 
-use crate::PointCloud;
+use crate::{Aabb, PointCloud};
 use glamx::Vec3;
 
 /// Least number of pixels across the smaller body, in its second longest extent. With fewer, a
@@ -37,7 +37,11 @@ const MOST_PIXELS: f32 = (1 << 28) as f32;
 /// # Ok::<(), tldi::CloudError>(())
 /// ```
 pub fn least_pixel(cloud: &PointCloud) -> f32 {
-    let bounds = cloud.bounds();
+    least_pixel_within(cloud.bounds(), cloud.max_radius())
+}
+
+/// The same of points within these bounds, of no larger radius, metres.
+pub(crate) fn least_pixel_within(bounds: Aabb, max_radius: f32) -> f32 {
     let farthest = bounds.min.abs().max(bounds.max.abs()).max_element();
-    (farthest + cloud.max_radius()) / MOST_PIXELS
+    (farthest + max_radius) / MOST_PIXELS
 }

@@ -1,12 +1,13 @@
 //! Which pairs can be compared, and why others cannot.
 
-use crate::pair::pixels::least_pixel;
+use crate::cloud::radii;
+use crate::pair::pixels::{least_pixel, least_pixel_within};
 use crate::pair::plan::DepthScale;
 use crate::{
-    ImpactQuery, PairQuery, Params, Penetration, Projection, Surface, Variant, View, VirtualCamera,
-    paper,
+    DeviceCloud, ImpactQuery, PairQuery, Params, Penetration, Projection, Surface, Variant, View,
+    VirtualCamera, paper,
 };
-use glamx::Vec3;
+use glamx::{Pose3, Vec3};
 use std::ops::RangeInclusive;
 
 /// Why the CPU does not compare what lives on a device.
@@ -17,16 +18,30 @@ impl PairQuery<'_> {
     /// Whether the CPU can compare the pair, and with it every backend; if not, why, and what to do
     /// instead.
     pub fn check(&self) -> Result<(), &'static str> {
-        supported_surfaces(self.a, self.b)?;
+        self.check_numbers()?;
+        supported_surfaces(self.a, self.b)
+    }
+
+    /// Whether the numbers of the pair can be used, wherever its points are; if not, why, and what to do instead. It is
+    /// [`check`](Self::check) without where the surfaces are: what a backend asks of clouds that live on its device.
+    pub fn check_numbers(&self) -> Result<(), &'static str> {
         self.params.check()?;
+        for surface in [self.a, self.b] {
+            if let Surface::Device(cloud) = surface {
+                cloud.check()?;
+            }
+        }
         let is_view_finite = match self.view {
             View::Aim {
                 motion, last_axis, ..
             } => motion.is_finite() && last_axis.is_none_or(Vec3::is_finite),
             View::Fixed(_) => true,
         };
-        if !(is_view_finite && self.a_from_b.is_finite()) {
-            return Err("a_from_b, motion and last_axis must be finite");
+        if !is_view_finite {
+            return Err("motion and last_axis must be finite");
+        }
+        if !is_rigid(&self.a_from_b) {
+            return Err(NOT_RIGID);
         }
         match self.view {
             View::Aim { .. } => is_countable(&[self.a, self.b], self.params.pixel_size)?,
@@ -58,6 +73,46 @@ impl PairQuery<'_> {
     }
 }
 
+/// Why a pose of a query is refused.
+const NOT_RIGID: &str = "a_from_b must be finite, with a unit quaternion: normalise it";
+
+fn is_rigid(pose: &Pose3) -> bool {
+    pose.is_finite() && pose.rotation.is_normalized()
+}
+
+impl DeviceCloud {
+    /// Whether what is told of the points can be true of a cloud; if not, why.
+    ///
+    /// ```
+    /// use tldi::{Aabb, DeviceCloud, glamx::Vec3};
+    /// let told = DeviceCloud {
+    ///     id: 0,
+    ///     len: 1000,
+    ///     bounds: Aabb { min: -Vec3::ONE, max: Vec3::ONE },
+    ///     mean_radius: 0.01,
+    ///     max_radius: 0.02,
+    /// };
+    /// assert!(told.check().is_ok());
+    /// assert!(DeviceCloud { max_radius: 0.005, ..told }.check().is_err());
+    /// ```
+    pub fn check(&self) -> Result<(), &'static str> {
+        let Self { bounds, len, .. } = self;
+        if !(1..=u32::MAX as usize).contains(len) {
+            return Err("a cloud on a device must have 1 to 2^32 - 1 points");
+        }
+        if bounds.is_empty() || !(bounds.min.is_finite() && bounds.max.is_finite()) {
+            return Err("the bounds of a cloud on a device must be finite, and not empty");
+        }
+        let are_valid = [self.mean_radius, self.max_radius].map(radii::is_valid);
+        if are_valid != [true; 2] || self.mean_radius > self.max_radius {
+            return Err(
+                "the radii of a cloud on a device must be 1e-12 to 1e12, the mean at most the largest",
+            );
+        }
+        Ok(())
+    }
+}
+
 pub(crate) fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static str> {
     match (a, b) {
         (Surface::Device(_), _) | (_, Surface::Device(_)) => Err(ON_A_DEVICE),
@@ -71,7 +126,8 @@ pub(crate) fn supported_surfaces(a: Surface, b: Surface) -> Result<(), &'static 
 fn is_countable(surfaces: &[Surface], pixel_size: f32) -> Result<(), &'static str> {
     let is_less = |surface: &Surface| match surface {
         Surface::Cloud(cloud) => pixel_size < least_pixel(cloud),
-        Surface::Exact(_) | Surface::Device(_) => false,
+        Surface::Device(cloud) => pixel_size < least_pixel_within(cloud.bounds, cloud.max_radius),
+        Surface::Exact(_) => false,
     };
     match surfaces.iter().any(is_less) {
         true => {
@@ -84,9 +140,15 @@ fn is_countable(surfaces: &[Surface], pixel_size: f32) -> Result<(), &'static st
 impl VirtualCamera {
     /// Whether it shows these surfaces in pixels that can be counted; if not, why.
     pub(crate) fn check(&self, surfaces: &[Surface]) -> Result<(), &'static str> {
-        let pose = self.view_from_frame;
-        if !(pose.is_finite() && pose.rotation.is_normalized()) {
+        if !is_rigid(&self.view_from_frame) {
             return Err("view_from_frame must be finite, with a unit quaternion: normalise it");
+        }
+        let is_counted = |n: u32| (1..=i32::MAX as u32).contains(&n);
+        if !self
+            .size
+            .is_none_or(|size| size.into_iter().all(is_counted))
+        {
+            return Err("the camera's size must be 1 to 2^31 - 1 columns and rows");
         }
         match self.projection {
             Projection::Orthographic { pixel_size } if !Params::LENGTHS.contains(&pixel_size) => {
@@ -110,8 +172,11 @@ impl ImpactQuery<'_> {
     pub(crate) fn check(&self) -> Result<(), &'static str> {
         supported_surfaces(self.a, self.b)?;
         self.params.check()?;
-        if !(self.a_from_b.is_finite() && self.motion.is_finite() && self.touching.is_finite()) {
-            return Err("a_from_b, motion and touching must be finite");
+        if !is_rigid(&self.a_from_b) {
+            return Err(NOT_RIGID);
+        }
+        if !(self.motion.is_finite() && self.touching.is_finite()) {
+            return Err("motion and touching must be finite");
         }
         let is_finite = |p: Penetration| p.normal.is_finite() && p.depth.is_finite();
         if !self.penetration.is_none_or(is_finite) {
