@@ -7,7 +7,7 @@
 use crate::mesh::Mesh;
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
-use tldi::glamx::{DAffine3, DMat4, DQuat, DVec3};
+use tldi::glamx::{DAffine3, DMat4, DQuat, DVec3, Pose3};
 
 /// The mesh of all nodes of the scene, in metres. `load` gives the geometries of a file, by their ids, in its unit. The axis that
 /// the file calls up stays what it is, as in ROS.
@@ -136,17 +136,9 @@ fn transform(node: Node<'_, '_>) -> Option<DMat4> {
     Some(parent_from_node)
 }
 
-/// Adds a geometry. One that is mirrored winds the other way, so that its outside stays outside.
 fn append(mesh: &mut Mesh, geometry: &Mesh, frame: DMat4) {
-    let frame = DAffine3::from_mat4(frame);
-    let first = mesh.points.len() as u32;
-    let place = |p: &tldi::glamx::Vec3| frame.transform_point3(p.as_dvec3()).as_vec3();
-    mesh.points.extend(geometry.points.iter().map(place));
-    let is_mirrored = frame.matrix3.determinant() < 0.0;
-    mesh.faces.extend(geometry.faces.iter().map(|face| {
-        let [a, b, c] = face.map(|i| first + i);
-        if is_mirrored { [a, c, b] } else { [a, b, c] }
-    }));
+    let placed = geometry.clone().transformed(DAffine3::from_mat4(frame));
+    mesh.append(&placed, &Pose3::IDENTITY);
 }
 
 fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
@@ -195,13 +187,7 @@ mod tests {
             assert!(text.ends_with("</COLLADA>"), "{text}");
             Ok(triangle())
         })?;
-        let mut corners: Vec<Vec3> = mesh
-            .faces
-            .iter()
-            .map(|f| mesh.points[f[0] as usize])
-            .collect();
-        corners.sort_by(|a, b| a.x.total_cmp(&b.x));
-        Ok(corners)
+        Ok(mesh.first_corners())
     }
 
     const SHOWN: &str = r##"<instance_geometry url="#g"/>"##;

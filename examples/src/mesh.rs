@@ -5,7 +5,7 @@ use rapier3d_meshloader::mesh_loader;
 use std::panic;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-use tldi::glamx::{DVec3, Pose3, Vec3};
+use tldi::glamx::{DAffine3, DVec3, Pose3, Vec3};
 use tldi_sources::{Format, ReadOptions};
 
 /// Triangles; corners anticlockwise when seen from outside.
@@ -42,17 +42,31 @@ impl Mesh {
         corners.fold(tldi::Aabb::EMPTY, tldi::Aabb::including)
     }
 
-    /// The same, larger along each axis. A mirrored mesh winds the other way, so that its outside stays outside.
-    pub fn scaled(mut self, scale: Vec3) -> Self {
+    /// The same, larger along each axis.
+    pub fn scaled(self, scale: Vec3) -> Self {
+        self.transformed(DAffine3::from_scale(scale.as_dvec3()))
+    }
+
+    /// The same in another frame. A mirrored mesh winds the other way, so that its outside stays outside.
+    pub(crate) fn transformed(mut self, frame: DAffine3) -> Self {
         for point in &mut self.points {
-            *point *= scale;
+            *point = frame.transform_point3(point.as_dvec3()).as_vec3();
         }
-        if scale.x * scale.y * scale.z < 0.0 {
+        if frame.matrix3.determinant() < 0.0 {
             for face in &mut self.faces {
                 face.swap(1, 2);
             }
         }
         self
+    }
+
+    /// The first corner of each face, in ascending order along x.
+    #[cfg(test)]
+    pub(crate) fn first_corners(&self) -> Vec<Vec3> {
+        let corners = self.faces.iter().map(|face| self.points[face[0] as usize]);
+        let mut corners: Vec<Vec3> = corners.collect();
+        corners.sort_by(|a, b| a.x.total_cmp(&b.x));
+        corners
     }
 }
 
@@ -214,13 +228,7 @@ mod tests {
         let dae = collada(&nodes.concat(), "0 1 2")
             .replace("<up_axis>", "<unit meter=\"0.01\"/><up_axis>");
         let mesh = read_text("placed.dae", dae.as_bytes()).unwrap();
-        let mut corners: Vec<Vec3> = mesh
-            .faces
-            .iter()
-            .map(|f| mesh.points[f[0] as usize])
-            .collect();
-        corners.sort_by(|a, b| a.x.total_cmp(&b.x));
-        assert_eq!(corners, [-3.0 * Vec3::X, 2.0 * Vec3::X]);
+        assert_eq!(mesh.first_corners(), [-3.0 * Vec3::X, 2.0 * Vec3::X]);
         assert!((mesh.points[1].distance(mesh.points[0]) - 0.01).abs() < 1e-6);
     }
 

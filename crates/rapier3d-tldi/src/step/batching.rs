@@ -182,31 +182,22 @@ impl LastAxis {
     /// Whether the smaller shape was moved since the last step so far that its middle may have passed what it touched:
     /// by more than half its width along the axis. Rapier did not do so.
     fn is_outdated(&self, pair: &ShapePair, pose1: &Pose) -> bool {
-        let (before, now) = (self.pos12, pair.pos12);
-        if before == now {
+        let poses = [self.pos12, pair.pos12];
+        if poses[0] == poses[1] {
             return false;
         }
         let axis1 = pose1.rotation.inverse() * self.axis;
-        let axis2 = now.rotation.inverse() * axis1;
+        let axis2 = pair.pos12.rotation.inverse() * axis1;
         let [aabb1, aabb2] = [pair.shape1, pair.shape2].map(|shape| shape.compute_local_aabb());
         let size = |aabb: &Aabb| aabb.half_extents().length();
-        let (moved, half_width) = if size(&aabb1) < size(&aabb2) {
-            let (before, now) = (
-                before.inverse() * aabb1.center(),
-                now.inverse() * aabb1.center(),
-            );
-            (
-                (now - before).dot(axis2),
-                aabb1.half_extents().dot(axis1.abs()),
-            )
-        } else {
-            let (before, now) = (before * aabb2.center(), now * aabb2.center());
-            (
-                (now - before).dot(axis1),
-                aabb2.half_extents().dot(axis2.abs()),
-            )
+        // Of the smaller shape: its bounds and the axis in its own frame; its poses and the axis in that of the other.
+        let (bounds, own_axis, poses, axis) = match size(&aabb1) < size(&aabb2) {
+            true => (aabb1, axis1, poses.map(|pose| pose.inverse()), axis2),
+            false => (aabb2, axis2, poses, axis1),
         };
-        moved.abs() > half_width
+        let [before, now] = poses.map(|pose| pose * bounds.center());
+        let half_width = bounds.half_extents().dot(own_axis.abs());
+        (now - before).dot(axis).abs() > half_width
     }
 
     /// After another step without contact.
