@@ -8,6 +8,7 @@
 use crate::cloud::reach::Ring;
 use crate::contact::links::{Groups, Links};
 use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
+use crate::cpu::normals::sorted::{Grid, Sorted};
 use crate::cpu::zone::AroundPlaces;
 use crate::{Aabb, BLOCK, ContactPixel, PairQuery, PairResult, PointCloud, Surface};
 use glamx::{Pose3, Vec3};
@@ -30,13 +31,10 @@ const SAMPLES: usize = 9;
 /// known to stand alone. Half or twice: no row of any suite changes.
 const REACH: f32 = 32.0;
 
-/// Edge of a cell of [`Surroundings`] in mean radii: of points with the paper's radii (0.65 of the
-/// distance to the seventh neighbour), it reaches beyond the fourth. Half or twice: no row of any suite changes.
-const CELL: f32 = 2.0;
-
-/// Cells from a place to its point and on to a neighbour of that, around which points must be known. Half or twice:
-/// no row of any suite changes.
-const RIM: f32 = 2.0;
+/// How far neighbours are looked for among the points around first, in mean radii. Of points with the paper's radii
+/// (0.65 of the distance to the seventh neighbour) the fourth is at half of it, of those of an uneven mesh at most of it.
+/// Half or twice: no row of any suite changes.
+const CELL: f32 = 4.0;
 
 /// The points nearest to a place: squares of their distances in metres, and where they are.
 type Nearest = [(f32, Vec3); NEIGHBORS];
@@ -57,21 +55,17 @@ pub(crate) struct Culled<'a> {
     pub(crate) region: &'a Region,
 }
 
-/// The points of a cloud around some places, in a hashed grid; kept from call to call.
+/// The points of a cloud around some places, in a grid; kept from call to call.
 #[derive(Debug, Default)]
 struct Surroundings {
     frame_from_cloud: Pose3,
     /// Where points are known, around the places.
     region: Region,
     around: AroundPlaces,
-    /// Corner of a cell, and its edge, metres.
-    min: Vec3,
+    /// [`CELL`], metres, and the points sorted into cells as large or larger.
     cell: f32,
-    /// Points by bucket, and where each bucket starts, with an end. Cells may share a bucket.
-    points: Vec<Vec3>,
-    starts: Vec<u32>,
-    /// The bucket of each point, in the order of the cloud.
-    buckets: Vec<u32>,
+    grid: Grid,
+    sorted: Sorted,
     /// Points that were not culled before.
     culled: Survivors,
     scratch: CullScratch,
@@ -95,7 +89,7 @@ impl Surroundings {
             culled.points
         } else {
             let bounds = (places.iter().copied()).fold(Aabb::EMPTY, Aabb::including);
-            let bounds = bounds.loosened(2.0 * RIM * self.cell);
+            let bounds = bounds.loosened(2.0 * self.cell);
             self.region = Region {
                 overlap: bounds,
                 other_from_frame: Pose3::IDENTITY,
@@ -107,59 +101,22 @@ impl Surroundings {
             cull(cloud, frame_from_cloud, region, 1, scratch, &mut own);
             &own
         };
-        self.around.find(points, places, RIM * self.cell);
-        self.sort(points);
+        self.around.find(points, places, self.cell);
+        let found = &self.around.found;
+        (self.sorted).put(found.iter().map(|&k| points.point(k as usize)));
+        self.grid = self.sorted.grid(self.cell);
+        self.sorted.sort(found, |_| false, &self.grid);
         self.culled = own;
-    }
-
-    /// Sorts what was found into buckets, about as many as points.
-    fn sort(&mut self, culled: &Survivors) {
-        let count = self.around.found.len();
-        let point = |k: u32| culled.point(k as usize);
-        self.min = self.region.overlap.min;
-        self.starts.clear();
-        self.starts.resize(count.next_power_of_two() + 1, 0);
-        self.buckets.clear();
-        for &k in &self.around.found {
-            let bucket = self.bucket(self.cell_of(point(k)));
-            self.buckets.push(bucket as u32);
-            self.starts[bucket] += 1;
-        }
-        let mut end = 0;
-        for start in &mut self.starts {
-            end += *start;
-            *start = end;
-        }
-        // Filled from the end, so that each start ends up where it belongs.
-        self.points.clear();
-        self.points.resize(count, Vec3::ZERO);
-        for (&k, &bucket) in self.around.found.iter().zip(&self.buckets).rev() {
-            let slot = &mut self.starts[bucket as usize];
-            *slot -= 1;
-            self.points[*slot as usize] = point(k);
-        }
     }
 
     /// Whether all points within a cell's edge of `place` are in the grid.
     fn knows(&self, place: Vec3) -> bool {
         let is_inside = |place: Vec3, bounds: &Aabb| bounds.loosened(-self.cell).contains(place);
         let in_other = self.region.other_from_frame * place;
-        !self.points.is_empty()
+        !self.around.found.is_empty()
             && self.around.knows(place)
             && is_inside(place, &self.region.overlap)
             && is_inside(in_other, &self.region.other_bounds)
-    }
-
-    fn cell_of(&self, point: Vec3) -> [i32; 3] {
-        let place = (point - self.min) / self.cell;
-        place.to_array().map(|c| c.floor() as i32)
-    }
-
-    /// By the primes of Teschner et al. 2003, "Optimized Spatial Hashing".
-    fn bucket(&self, cell: [i32; 3]) -> usize {
-        let primes = [73_856_093, 19_349_663, 83_492_791];
-        let hashed = (cell.iter().zip(primes)).fold(0, |all, (c, p)| all ^ c.wrapping_mul(p));
-        hashed as usize & (self.starts.len() - 2)
     }
 
     /// The points of `cloud` nearest to `place`, from `beyond` to `reach` metres away, in ascending
@@ -168,17 +125,11 @@ impl Surroundings {
         let mut best: Nearest = [(f32::INFINITY, place); NEIGHBORS];
         let limits = beyond * beyond..=reach * reach;
         if self.knows(place) {
-            let middle = self.cell_of(place);
-            for k in 0..27 {
-                let offset = [k % 3, k / 3 % 3, k / 9];
-                let cell = [0, 1, 2].map(|axis| middle[axis].wrapping_add(offset[axis] - 1));
-                let bucket = self.bucket(cell);
-                let range = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
-                for &point in &self.points[range] {
-                    let squared = point.distance_squared(place);
-                    if limits.contains(&squared) && self.cell_of(point) == cell {
-                        offer(&mut best, squared, point);
-                    }
+            for k in (self.sorted.rows(self.grid.cell_of(place))).into_iter().flatten() {
+                let point = self.sorted.position(k);
+                let squared = point.distance_squared(place);
+                if limits.contains(&squared) {
+                    offer(&mut best, squared, point);
                 }
             }
             // What is not in these cells is farther than the edge of one.

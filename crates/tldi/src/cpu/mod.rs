@@ -72,7 +72,8 @@ use std::sync::Mutex;
 /// ```
 #[derive(Default)]
 pub struct CpuBackend {
-    pool: Mutex<Vec<Scratch>>,
+    /// Boxed: it is 100 kB large, and to move it took as long as all else of a pair that does not touch.
+    pool: Mutex<Vec<Box<Scratch>>>,
     is_without_first_look: bool,
 }
 

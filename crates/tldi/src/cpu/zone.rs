@@ -47,8 +47,6 @@ pub struct ZoneGrid {
     pub inv_cell: f32,
     /// Cells along x, y, z.
     pub dims: [usize; 3],
-    /// Length of a row along x, in words of 64 bits.
-    row_words: usize,
 }
 
 impl ZoneGrid {
@@ -74,12 +72,18 @@ impl ZoneGrid {
             min: bounds.min,
             inv_cell: 1.0 / cell,
             dims,
-            row_words: dims[0].div_ceil(64),
         }
     }
 
+    /// Bits from a cell to the next one along x, y and z. An empty cell after each row and an empty row after each plane
+    /// keep marks from growing into the next ones.
+    fn strides(&self) -> [usize; 3] {
+        let row = self.dims[0] + 1;
+        [1, row, row * (self.dims[1] + 1)]
+    }
+
     fn words(&self) -> usize {
-        self.row_words * self.dims[1] * self.dims[2]
+        (self.strides()[2] * self.dims[2]).div_ceil(64)
     }
 
     /// Bit of the cell that holds `point`; `None` outside.
@@ -88,7 +92,8 @@ impl ZoneGrid {
         let [lx, ly, lz] = self.dims.map(|n| n as f32);
         let is_inside = cell.cmpge(Vec3::ZERO).all() && cell.cmplt(Vec3::new(lx, ly, lz)).all();
         let [x, y, z] = cell.to_array().map(|c| c as usize);
-        is_inside.then(|| (z * self.dims[1] + y) * 64 * self.row_words + x)
+        let [_, row, plane] = self.strides();
+        is_inside.then(|| z * plane + y * row + x)
     }
 
     fn mark<'c>(&self, cells: impl Iterator<Item = &'c u32>, bits: &mut Vec<u64>) {
@@ -100,37 +105,33 @@ impl ZoneGrid {
     }
 
     /// Grows the marked cells by one cell in all 26 directions. `spare` is overwritten.
-    fn dilate(&self, bits: &mut [u64], spare: &mut Vec<u64>) {
-        spare.clear();
-        spare.resize(bits.len(), 0);
-        let w = self.row_words;
-        let [_, ny, nz] = self.dims;
-        // Along x, with carries between the words of a row.
-        for row in 0..ny * nz {
-            let src = &bits[row * w..(row + 1) * w];
-            for k in 0..w {
-                let below = if k > 0 { src[k - 1] >> 63 } else { 0 };
-                let above = if k + 1 < w { src[k + 1] << 63 } else { 0 };
-                spare[row * w + k] = src[k] | src[k] << 1 | src[k] >> 1 | below | above;
-            }
+    fn dilate(&self, bits: &mut Vec<u64>, spare: &mut Vec<u64>) {
+        for stride in self.strides() {
+            spare.clone_from(bits);
+            grow(bits, stride, spare);
+            std::mem::swap(bits, spare);
         }
-        // Along y, then z: rows are or-ed with their neighbours.
-        let neighbours = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
-        for z in 0..nz {
-            for y in 0..ny {
-                for k in 0..w {
-                    bits[(z * ny + y) * w + k] =
-                        neighbours(y, ny).fold(0, |acc, y| acc | spare[(z * ny + y) * w + k]);
-                }
-            }
-        }
-        for z in 0..nz {
-            for rest in 0..ny * w {
-                spare[z * ny * w + rest] =
-                    neighbours(z, nz).fold(0, |acc, z| acc | bits[z * ny * w + rest]);
-            }
-        }
-        bits.copy_from_slice(spare);
+    }
+}
+
+/// Sets the bits of `to` that are `stride` bits above or below one of `from`.
+fn grow(from: &[u64], stride: usize, to: &mut [u64]) {
+    let (words, shift) = (stride / 64, stride % 64);
+    let Some(rest) = from.len().checked_sub(words).filter(|rest| *rest > 0) else {
+        return;
+    };
+    // Two steps where a word gives its neighbour nothing: a shift by 64 bits is none.
+    let carry_up = |word: u64| word >> 1 >> (63 - shift);
+    let carry_down = |word: u64| word << 1 << (63 - shift);
+    let up = &mut to[words..];
+    up[0] |= from[0] << shift;
+    for (to, pair) in up[1..].iter_mut().zip(from.windows(2)) {
+        *to |= pair[1] << shift | carry_up(pair[0]);
+    }
+    let above = &from[words..];
+    to[rest - 1] |= above[rest - 1] >> shift;
+    for (to, pair) in to.iter_mut().zip(above.windows(2)) {
+        *to |= pair[0] >> shift | carry_down(pair[1]);
     }
 }
 
@@ -156,13 +157,13 @@ fn locate_cells(grid: &ZoneGrid, x: &[f32], y: &[f32], z: &[f32], cells: &mut [u
     let n = x.len().min(y.len()).min(z.len()).min(cells.len());
     let (x, y, z, cells) = (&x[..n], &y[..n], &z[..n], &mut cells[..n]);
     let [lx, ly, lz] = grid.dims.map(|n| (n - 1) as f32);
-    let (row_bits, rows) = (64 * grid.row_words as u32, grid.dims[1] as u32);
+    let [_, row, plane] = grid.strides().map(|stride| stride as u32);
     let (min, inv) = (grid.min, grid.inv_cell);
     for i in 0..n {
         let cx = truncated((x[i] - min.x) * inv, lx);
         let cy = truncated((y[i] - min.y) * inv, ly);
         let cz = truncated((z[i] - min.z) * inv, lz);
-        cells[i] = (cz * rows + cy) * row_bits + cx;
+        cells[i] = cz * plane + cy * row + cx;
     }
 }
 }

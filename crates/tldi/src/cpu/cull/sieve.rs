@@ -63,17 +63,18 @@ impl<'a> Sieve<'a> {
         let mut inside = [0; BLOCK];
         find_within(bounds, points, taken, &mut inside);
         let (words, _) = inside.as_chunks::<64>();
+        let mut at = self.count;
         for (word, flags) in words.iter().enumerate() {
             let mut mask = bits(flags);
             while mask != 0 {
                 let i = 64 * word + mask.trailing_zeros() as usize;
                 mask &= mask - 1;
-                let at = self.count;
                 [self.x[at], self.y[at], self.z[at]] = points[i].to_array();
                 self.index[at] = index_of(i);
-                self.count += 1;
+                at += 1;
             }
         }
+        self.count = at;
         if self.count >= BLOCK {
             self.empty(out);
         }

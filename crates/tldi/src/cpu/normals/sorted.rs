@@ -19,7 +19,7 @@ pub(super) const RUN: usize = 16;
 pub(crate) const CONSTANTS: [(&str, f64); 1] = [("MAX_CANDIDATES", MAX_CANDIDATES as f64)];
 
 /// Points in the order of their cells.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Sorted {
     /// Coordinates of the points in the order in which they came, and their cells.
     points: [Vec<f32>; 3],
@@ -35,7 +35,7 @@ pub(crate) struct Sorted {
 }
 
 /// A point in the order of the cells.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Entry {
     pub(super) id: u32,
     pub(crate) cell: u32,
@@ -43,7 +43,8 @@ pub(crate) struct Entry {
 }
 
 /// Cells of the neighbourhood's size; a rim of empty cells spares bounds checks.
-pub(super) struct Grid {
+#[derive(Debug, Default)]
+pub(crate) struct Grid {
     min: Vec3,
     pub(super) inv_cell: f32,
     dims: [usize; 3],
@@ -69,11 +70,26 @@ impl Grid {
     fn cells(&self) -> usize {
         self.dims.iter().product()
     }
+
+    /// The cell of a place; of one beside the points, the nearest of theirs.
+    pub(crate) fn cell_of(&self, place: Vec3) -> usize {
+        self.cell_at(place.to_array()) as usize
+    }
+
+    #[inline(always)]
+    fn cell_at(&self, [x, y, z]: [f32; 3]) -> u32 {
+        let most = self.dims.map(|d| d as f32 - 3.0);
+        let [width, height] = [self.dims[0] as u32, self.dims[1] as u32];
+        let x = 1 + truncated((x - self.min.x) * self.inv_cell, most[0]);
+        let y = 1 + truncated((y - self.min.y) * self.inv_cell, most[1]);
+        let z = 1 + truncated((z - self.min.z) * self.inv_cell, most[2]);
+        (z * height + y) * width + x
+    }
 }
 
 impl Sorted {
     /// Takes the coordinates of points.
-    pub(super) fn put(&mut self, points: impl ExactSizeIterator<Item = Vec3>) {
+    pub(crate) fn put(&mut self, points: impl ExactSizeIterator<Item = Vec3>) {
         let [x, y, z] = &mut self.points;
         for coordinate in [&mut *x, &mut *y, &mut *z] {
             coordinate.resize(points.len(), 0.0);
@@ -84,14 +100,14 @@ impl Sorted {
     }
 
     /// Cells of `support` metres over the points. Larger ones if there would be too many.
-    pub(super) fn grid(&self, support: f32) -> Grid {
+    pub(crate) fn grid(&self, support: f32) -> Grid {
         let [x, y, z] = self.points.each_ref().map(|c| bounds(c));
         let (min, max) = (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1));
         Grid::new(min, max, support, self.points[0].len())
     }
 
     /// Counting sort of the points by cell.
-    pub(super) fn sort(&mut self, support: &[u32], wanted: impl Fn(usize) -> bool, grid: &Grid) {
+    pub(crate) fn sort(&mut self, support: &[u32], wanted: impl Fn(usize) -> bool, grid: &Grid) {
         let Self {
             points,
             cells,
@@ -170,7 +186,7 @@ impl Sorted {
 
     /// The points in a cell and its neighbours: three cells in a row along x are consecutive.
     #[inline(always)]
-    pub(super) fn rows(&self, cell: usize) -> [Range<usize>; 9] {
+    pub(crate) fn rows(&self, cell: usize) -> [Range<usize>; 9] {
         let [row, slice] = [self.dims[0], self.dims[0] * self.dims[1]];
         std::array::from_fn(|k| {
             let first = cell + k / 3 * slice + k % 3 * row - slice - row - 1;
@@ -182,13 +198,8 @@ impl Sorted {
 multiversioned! {
 /// Finds the cells of points.
 fn locate(grid: &Grid, [x, y, z]: &[Vec<f32>; 3], cells: &mut [u32]) {
-    let (min, most) = (grid.min, grid.dims.map(|d| d as f32 - 3.0));
-    let [width, height] = [grid.dims[0] as u32, grid.dims[1] as u32];
     for (((x, y), z), cell) in x.iter().zip(y).zip(z).zip(cells) {
-        let x = 1 + truncated((x - min.x) * grid.inv_cell, most[0]);
-        let y = 1 + truncated((y - min.y) * grid.inv_cell, most[1]);
-        let z = 1 + truncated((z - min.z) * grid.inv_cell, most[2]);
-        *cell = (z * height + y) * width + x;
+        *cell = grid.cell_at([*x, *y, *z]);
     }
 }
 }
