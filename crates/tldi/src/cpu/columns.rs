@@ -15,6 +15,9 @@ use crate::{Projection, VirtualCamera};
 use glamx::{Mat3, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
 
+/// Places in which the depths of points out of view end up by turns. In a single one, each would wait for the one before.
+const OUT_OF_VIEW_PLACES: usize = 8;
+
 /// The culled points of one side in the view frame, metres.
 #[derive(Default)]
 pub(crate) struct Columns {
@@ -63,12 +66,14 @@ impl Columns {
         for coordinate in [&mut self.x, &mut self.y, &mut self.depth] {
             coordinate.resize(n, 0.0);
         }
-        let (mut lo, mut hi) = transform(
+        transform(
             &Mat3::from_quat(camera.view_from_frame.rotation),
             camera.view_from_frame.translation,
             [&points.x, &points.y, &points.z],
             [&mut self.x, &mut self.y, &mut self.depth],
         );
+        let [x, y, z] = [&self.x, &self.y, &self.depth].map(|c| bounds(c));
+        let (mut lo, mut hi) = (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1));
         let (mut first, mut last) = match camera.projection {
             Projection::Orthographic { .. } => {
                 (camera.pixel_from_view(lo), camera.pixel_from_view(hi))
@@ -169,9 +174,11 @@ impl Columns {
     /// the neighbouring tiles.
     pub(crate) fn reduce(&mut self, tiles: &Tiles, sign: f32) {
         self.depths.clear();
-        self.depths.resize(tiles.count() + 1, f32::INFINITY);
-        for (tile, depth) in self.tile.iter().zip(&self.depth) {
-            let least = &mut self.depths[*tile as usize];
+        (self.depths).resize(tiles.count() + OUT_OF_VIEW_PLACES, f32::INFINITY);
+        for (k, (&tile, depth)) in self.tile.iter().zip(&self.depth).enumerate() {
+            let is_out = tile == tiles.out_of_view();
+            let aside = if is_out { k % OUT_OF_VIEW_PLACES } else { 0 };
+            let least = &mut self.depths[tile as usize + aside];
             let depth = sign * depth;
             *least = if depth < *least { depth } else { *least };
         }
@@ -372,8 +379,8 @@ pub(crate) fn dilate<T: Copy>(
 }
 
 multiversioned! {
-/// Transforms points and returns their bounds.
-fn transform(r: &Mat3, t: Vec3, from: [&[f32]; 3], to: [&mut [f32]; 3]) -> (Vec3, Vec3) {
+/// Transforms points.
+fn transform(r: &Mat3, t: Vec3, from: [&[f32]; 3], to: [&mut [f32]; 3]) {
     let [x, y, z] = from;
     let [to_x, to_y, to_z] = to;
     let n = x.len();
@@ -383,8 +390,6 @@ fn transform(r: &Mat3, t: Vec3, from: [&[f32]; 3], to: [&mut [f32]; 3]) -> (Vec3
         to_y[i] = r.x_axis.y * x[i] + r.y_axis.y * y[i] + r.z_axis.y * z[i] + t.y;
         to_z[i] = r.x_axis.z * x[i] + r.y_axis.z * y[i] + r.z_axis.z * z[i] + t.z;
     }
-    let [x, y, z] = [bounds(to_x), bounds(to_y), bounds(to_z)];
-    (Vec3::new(x.0, y.0, z.0), Vec3::new(x.1, y.1, z.1))
 }
 }
 

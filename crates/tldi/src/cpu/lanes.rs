@@ -22,24 +22,29 @@ pub(super) use multiversioned;
 const LANES: usize = 16;
 
 /// Least and greatest value; infinite of none.
-#[inline(always)]
 pub(super) fn bounds(values: &[f32]) -> (f32, f32) {
-    let mut lo = [f32::INFINITY; LANES];
-    let mut hi = [f32::NEG_INFINITY; LANES];
-    let (chunks, rest) = values.as_chunks::<LANES>();
+    let (mut least, mut greatest) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let (chunks, rest) = values.as_chunks();
+    lane_bounds(chunks, &mut least, &mut greatest);
+    let all = |of: [f32; LANES], op: fn(f32, f32) -> f32| {
+        let values = of[1..].iter().chain(rest);
+        values.fold(of[0], |m, &v| op(m, v))
+    };
+    (all(least, f32::min), all(greatest, f32::max))
+}
+
+multiversioned! {
+/// The same of each lane, for chunks of values.
+fn lane_bounds(chunks: &[[f32; LANES]], least: &mut [f32; LANES], greatest: &mut [f32; LANES]) {
+    let (mut lo, mut hi) = (*least, *greatest);
     for chunk in chunks {
         for l in 0..LANES {
             lo[l] = if chunk[l] < lo[l] { chunk[l] } else { lo[l] };
             hi[l] = if chunk[l] > hi[l] { chunk[l] } else { hi[l] };
         }
     }
-    let all = |of: [f32; LANES], op: fn(f32, f32) -> f32, start: f32| {
-        of.iter().chain(rest).fold(start, |m, &v| op(m, v))
-    };
-    (
-        all(lo, f32::min, f32::INFINITY),
-        all(hi, f32::max, f32::NEG_INFINITY),
-    )
+    (*least, *greatest) = (lo, hi);
+}
 }
 
 /// Largest bound of [`truncated`], the largest `f32` below 2³¹.

@@ -54,7 +54,7 @@ pub(crate) fn cull(
     }
     let blocks = cloud.blocks().len();
     let tasks = blocks.div_ceil(TASK_BLOCKS);
-    if tasks <= 1 {
+    if tasks <= 1 || rayon::current_num_threads() == 1 {
         cull_blocks(cloud, frame_from_cloud, region, stride, 0..blocks, out);
         return;
     }
