@@ -10,18 +10,16 @@
 use super::cull::Survivors;
 use super::fold::{SpaceFold, is_coarse};
 use super::lanes::{multiversioned, truncated};
+use super::normals::sorted::{RUN, Sorted};
 use crate::Aabb;
 use crate::cloud::reach::{Class, classes};
 use crate::stage::stage;
 use glamx::Vec3;
+use std::ops::Range;
 
 /// Most cells of the grid. 4 Mi bits are 512 KiB, which stays in a core's cache; twice as many do not. Larger overlaps
 /// get larger cells, and the stage then keeps more points.
 const MAX_CELLS: f32 = (1 << 22) as f32;
-
-/// Most pairs of points, of two octaves, whose distance is measured: about a millisecond. Beyond it, cells alone decide,
-/// and a body may count as near at up to 3.5 times the reach of the points. Twice as many take twice the time.
-const MOST_PAIRS: usize = 1 << 20;
 
 /// The grid and its bits, kept from call to call.
 #[derive(Default)]
@@ -36,6 +34,9 @@ pub(crate) struct ZoneScratch {
     /// For each point 1 if it is near in some octave, else 0.
     is_near_a: Vec<u8>,
     is_near_b: Vec<u8>,
+    /// Points of an octave of one side, and by how much each reaches farther than the mean radius, metres.
+    sorted: Sorted,
+    further: Vec<f32>,
 }
 
 /// Cells of at least the zone's reach over the overlap of both bounds.
@@ -281,7 +282,7 @@ impl AroundPlaces {
     }
 }
 
-/// Cost: that of [`of_one_octave`], once for each pair of octaves among the culled points.
+/// Cost: that of [`of_one_octave`] and of two counting sorts, once for each pair of octaves among the culled points.
 fn of_all_octaves(
     [a, b]: [ZoneSide; 2],
     bounds: &Aabb,
@@ -297,6 +298,8 @@ fn of_all_octaves(
         cells_b,
         is_near_a,
         is_near_b,
+        sorted,
+        further,
         ..
     } = scratch;
     for (side, is_near) in [(a, &mut *is_near_a), (b, &mut *is_near_b)] {
@@ -314,21 +317,14 @@ fn of_all_octaves(
             grid.mark(b.of_class(class_b).map(|k| &cells_b[k]), bits);
             grid.dilate(bits, dilated);
             a.marked(class_a, cells_a, bits, near_a);
-            // Coarse cells are wide. A point in the next cell may lie far beyond the reach of the points.
-            let is_exact = class_a.further + class_b.further > 0.0
-                && near_a.len() * near_b.len() <= MOST_PAIRS;
-            let in_reach = |i: u32, j: u32| {
-                let [i, j] = [i as usize, j as usize];
-                let reach = reach + a.points.further(i) + b.points.further(j);
-                a.points.point(i).distance_squared(b.points.point(j)) <= reach * reach
-            };
-            for &i in near_a.iter() {
-                let is_near = !is_exact || near_b.iter().any(|&j| in_reach(i, j));
-                is_near_a[i as usize] |= u8::from(is_near);
-            }
-            for &j in near_b.iter() {
-                let is_near = !is_exact || near_a.iter().any(|&i| in_reach(i, j));
-                is_near_b[j as usize] |= u8::from(is_near);
+            if class_a.further + class_b.further > 0.0 {
+                // Coarse cells are wide: a point in the next one may lie far beyond the reach of both.
+                let (a, b) = ((a.points, &near_a[..]), (b.points, &near_b[..]));
+                mark_in_reach(a, b, reach, &grid, (sorted, further), is_near_a);
+                mark_in_reach(b, a, reach, &grid, (sorted, further), is_near_b);
+            } else {
+                near_a.iter().for_each(|&i| is_near_a[i as usize] = 1);
+                near_b.iter().for_each(|&j| is_near_b[j as usize] = 1);
             }
         }
     }
@@ -336,6 +332,68 @@ fn of_all_octaves(
         near.clear();
         near.extend((0..is_near.len() as u32).filter(|&k| is_near[k as usize] > 0));
     }
+}
+
+/// Marks those of some points that are in reach of one of `others`. None reaches farther than a cell of `grid`.
+fn mark_in_reach(
+    (points, some): (&Survivors, &[u32]),
+    (other_points, others): (&Survivors, &[u32]),
+    reach: f32,
+    grid: &ZoneGrid,
+    (sorted, further): (&mut Sorted, &mut Vec<f32>),
+    is_near: &mut [u8],
+) {
+    if others.is_empty() {
+        return;
+    }
+    sorted.put(others.iter().map(|&j| other_points.point(j as usize)));
+    let grid = sorted.grid(1.0 / grid.inv_cell);
+    sorted.sort(others, |_| false, &grid);
+    further.clear();
+    let ids = sorted.entries.iter().map(|entry| entry.id);
+    further.extend(ids.map(|j| other_points.further(j as usize)));
+    // Nothing is in reach of what has no meaning.
+    further.resize(sorted.entries.len() + RUN, f32::NAN);
+    for i in some.iter().map(|&i| i as usize) {
+        if is_near[i] == 0 {
+            let (point, reach) = (points.point(i), reach + points.further(i));
+            let rows = sorted.rows(grid.cell_of(point));
+            is_near[i] = u8::from(is_in_reach(point, reach, &rows, sorted, further));
+        }
+    }
+}
+
+/// Points that are tested at once, [`RUN`] at most.
+const LANES: usize = 8;
+
+multiversioned! {
+/// Whether one of the points in `rows`, or of those right behind a row, is in reach of `point`. These reach `further` than
+/// the `reach`.
+fn is_in_reach(
+    point: Vec3,
+    reach: f32,
+    rows: &[Range<usize>; 9],
+    sorted: &Sorted,
+    further: &[f32],
+) -> bool {
+    let [x, y, z] = sorted.coordinates.each_ref().map(|c| &c[..]);
+    for row in rows {
+        for first in row.clone().step_by(LANES) {
+            let run = first..first + LANES;
+            let (x, y, z, further) = (&x[run.clone()], &y[run.clone()], &z[run.clone()], &further[run]);
+            let mut found = 0;
+            for l in 0..LANES {
+                let (dx, dy, dz) = (x[l] - point.x, y[l] - point.y, z[l] - point.z);
+                let reach = reach + further[l];
+                found |= u32::from(dx * dx + dy * dy + dz * dz <= reach * reach);
+            }
+            if found > 0 {
+                return true;
+            }
+        }
+    }
+    false
+}
 }
 
 impl ZoneSide<'_> {

@@ -13,7 +13,7 @@ const CELLS_PER_POINT: usize = 16;
 pub(crate) const MAX_CANDIDATES: usize = 512;
 
 /// Coordinates that are copied at once, needed or not: as many as a row of cells has on a surface, or half of them.
-pub(super) const RUN: usize = 16;
+pub(crate) const RUN: usize = 16;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 1] = [("MAX_CANDIDATES", MAX_CANDIDATES as f64)];
@@ -25,9 +25,9 @@ pub(crate) struct Sorted {
     points: [Vec<f32>; 3],
     cells: Vec<u32>,
     /// What follows is in the order of the cells.
-    pub(super) entries: Vec<Entry>,
+    pub(crate) entries: Vec<Entry>,
     /// Coordinates, and [`RUN`] more of no meaning.
-    pub(super) coordinates: [Vec<f32>; 3],
+    pub(crate) coordinates: [Vec<f32>; 3],
     /// First point of each cell; one entry more than cells.
     offsets: Vec<u32>,
     /// Numbers of cells along x and y.
@@ -37,7 +37,7 @@ pub(crate) struct Sorted {
 /// A point in the order of the cells.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Entry {
-    pub(super) id: u32,
+    pub(crate) id: u32,
     pub(crate) cell: u32,
     pub(super) wanted: bool,
 }
