@@ -109,14 +109,22 @@ impl Surroundings {
         self.culled = own;
     }
 
-    /// Whether all points within `reach` metres of `place`, the edge of a cell at most, are in the grid.
-    fn knows(&self, place: Vec3, reach: f32) -> bool {
-        let is_inside = |place: Vec3, bounds: &Aabb| bounds.loosened(-reach).contains(place);
-        let in_other = self.region.other_from_frame * place;
-        !self.around.found.is_empty()
-            && self.around.knows(place)
-            && is_inside(place, &self.region.overlap)
-            && is_inside(in_other, &self.region.other_bounds)
+    /// Distance from `place`, metres, within which all points are in the grid: the edge of a cell at most.
+    fn known(&self, place: Vec3) -> f32 {
+        if self.around.found.is_empty() || !self.around.knows(place) {
+            return 0.0;
+        }
+        let depth =
+            |place: Vec3, bounds: &Aabb| (place - bounds.min).min(bounds.max - place).min_element();
+        let Region {
+            overlap,
+            other_from_frame,
+            other_bounds,
+            ..
+        } = &self.region;
+        self.cell
+            .min(depth(place, overlap))
+            .min(depth(*other_from_frame * place, other_bounds))
     }
 
     /// The points of `cloud` nearest to `place`, from `beyond` to `reach` metres away, in ascending
@@ -124,7 +132,8 @@ impl Surroundings {
     fn nearest(&self, cloud: &PointCloud, place: Vec3, beyond: f32, reach: f32) -> Nearest {
         let mut best: Nearest = [(f32::INFINITY, place); NEIGHBORS];
         let limits = beyond * beyond..=reach * reach;
-        if self.knows(place, reach.min(self.cell)) {
+        let known = self.known(place);
+        if known > 0.0 {
             for k in (self.sorted.rows(self.grid.cell_of(place)))
                 .into_iter()
                 .flatten()
@@ -135,8 +144,7 @@ impl Surroundings {
                     offer(&mut best, squared, point);
                 }
             }
-            // What is not in these cells is farther than the edge of one.
-            if reach.min(best[NEIGHBORS - 1].0.sqrt()) <= self.cell {
+            if reach.min(best[NEIGHBORS - 1].0.sqrt()) <= known {
                 return best;
             }
             best = [(f32::INFINITY, place); NEIGHBORS];
@@ -371,7 +379,7 @@ mod tests {
                 let mut expected: Vec<f32> = squares.filter(|s| limits.contains(s)).collect();
                 expected.sort_by(f32::total_cmp);
                 expected.resize(NEIGHBORS.max(expected.len()), f32::INFINITY);
-                known += usize::from(around.knows(place, around.cell));
+                known += usize::from(around.known(place) > 0.0);
                 let found = around.nearest(&cloud, place, beyond, reach);
                 for ((found, _), expected) in found.iter().zip(expected) {
                     // Points were moved there and back.
