@@ -84,7 +84,7 @@ pub(crate) fn aim(
     let single = match policy {
         CameraPolicy::ContactZone | CameraPolicy::AllDirections => None,
         CameraPolicy::Motion => Some(-approach.toward_b()),
-        CameraPolicy::Covariance => top_eigenvector(&zone_covariance(&sides, &Some)),
+        CameraPolicy::Covariance => top_eigenvector(&zone_covariance(&sides, Some)),
         CameraPolicy::SmallestExtent => {
             let axis = [Vec3::X, Vec3::Y, Vec3::Z][approach.half_extents.min_position()];
             Some(approach.larger_from_a.inverse() * axis)

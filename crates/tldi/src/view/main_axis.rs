@@ -29,7 +29,7 @@ pub(crate) const CONSTANTS: [(&str, f64); 3] = [
 /// Mean of n nᵀ over the normals of both sides, each as `map` makes it, if it keeps it.
 pub(crate) fn zone_covariance(
     sides: &[ZoneNormals; 2],
-    map: &dyn Fn(Vec3) -> Option<Vec3>,
+    map: impl Fn(Vec3) -> Option<Vec3>,
 ) -> Mat3 {
     let [a, b] = sides.each_ref().map(|side| {
         let kept = side.normals.iter().filter_map(|n| map(*n));
@@ -70,7 +70,7 @@ pub(crate) fn turned_to_face(
     sides: &[ZoneNormals; 2],
     axis: Vec3,
     covariance: &Mat3,
-    map: &dyn Fn(Vec3) -> Option<Vec3>,
+    map: impl Fn(Vec3) -> Option<Vec3>,
 ) -> Vec3 {
     if !is_one_of_alike(covariance, axis) {
         return axis;

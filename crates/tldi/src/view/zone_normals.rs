@@ -41,15 +41,16 @@ impl ZoneNormals<'_> {
 
     /// Mean of n·axis over the normals that face it or its opposite, if they tell the outside.
     pub(crate) fn mean_along(&self, axis: Vec3) -> f32 {
-        let facing = || {
-            let along = self.normals.iter().map(|n| n.dot(axis));
-            along.filter(|d| d.abs() >= SUPPORTED)
-        };
-        let count = facing().count() as f32;
-        if !self.oriented || count < LEAST_SHARE * self.normals.len() as f32 {
+        if !self.oriented {
             return 0.0;
         }
-        facing().sum::<f32>() / count.max(1.0)
+        let along = self.normals.iter().map(|n| n.dot(axis));
+        let facing = along.filter(|d| d.abs() >= SUPPORTED);
+        let (sum, count) = facing.fold((0.0, 0.0), |(sum, count), d| (sum + d, count + 1.0));
+        if count < LEAST_SHARE * self.normals.len() as f32 {
+            return 0.0;
+        }
+        sum / f32::max(count, 1.0)
     }
 
     /// Mean place along `axis` of the points that face it or its opposite, metres; of all, if none do.
