@@ -130,7 +130,7 @@ fn aim_at_zone(
         // What the earlier views see of a normal is not counted again.
         let rest = |n: Vec3| seen[..views].iter().fold(n, |n, v| n - n.dot(*v) * *v);
         let left = |n: Vec3| unseen(&n).then(|| rest(n));
-        let of_normals = zone_covariance(sides, &left);
+        let of_normals = zone_covariance(sides, left);
         let mut covariance = of_normals;
         if views == 0 {
             covariance += HINT_WEIGHT * approach.plainness() * outer(approach.direction());
@@ -140,7 +140,7 @@ fn aim_at_zone(
             break;
         };
         if turns {
-            axis = turned_to_face(sides, axis, &of_normals, &left);
+            axis = turned_to_face(sides, axis, &of_normals, left);
         }
         if views > 0 {
             let supports = |n: &Vec3| axis.dot(*n).abs() >= SUPPORTED;
