@@ -31,9 +31,8 @@ const SAMPLES: usize = 9;
 /// known to stand alone. Half or twice: no row of any suite changes.
 const REACH: f32 = 32.0;
 
-/// How far neighbours are looked for among the points around first, in mean radii. Of points with the paper's radii
-/// (0.65 of the distance to the seventh neighbour) the fourth is at half of it, of those of an uneven mesh at most of it.
-/// Half or twice: no row of any suite changes.
+/// How far neighbours are looked for first, in a grid of the points around, in mean radii. With the paper's radii (0.65 of
+/// the distance to the seventh neighbour) the fourth is at half of it. Only speed depends on it.
 const CELL: f32 = 4.0;
 
 /// The points nearest to a place: squares of their distances in metres, and where they are.

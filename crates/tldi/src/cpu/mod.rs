@@ -72,7 +72,7 @@ use std::sync::Mutex;
 /// ```
 #[derive(Default)]
 pub struct CpuBackend {
-    /// Boxed: it is 100 kB large, and to move it took as long as all else of a pair that does not touch.
+    /// Boxed: each has 100 kB. To move these took most of the time of a pair that does not touch.
     pool: Mutex<Vec<Box<Scratch>>>,
     is_without_first_look: bool,
 }

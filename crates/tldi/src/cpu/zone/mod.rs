@@ -7,19 +7,26 @@
 //! An uneven cloud is split into octaves of its radii ([`reach`](crate::reach)). Each pair of octaves has its own grid,
 //! with cells as large as the points of both reach. So two points are near by their own radii.
 
+mod around_places;
+mod grid;
+
+pub(crate) use around_places::AroundPlaces;
+pub use grid::ZoneGrid;
+
 use super::cull::Survivors;
 use super::fold::{SpaceFold, is_coarse};
-use super::lanes::{multiversioned, truncated};
+use super::lanes::multiversioned;
 use super::normals::sorted::{RUN, Sorted};
 use crate::Aabb;
 use crate::cloud::reach::{Class, classes};
 use crate::stage::stage;
 use glamx::Vec3;
+use grid::{locate, select};
 use std::ops::Range;
 
-/// Most cells of the grid. 4 Mi bits are 512 KiB, which stays in a core's cache; twice as many do not. Larger overlaps
-/// get larger cells, and the stage then keeps more points.
-const MAX_CELLS: f32 = (1 << 22) as f32;
+/// Most points around one whose distances to it are measured: about a microsecond. Of more, cells alone decide, and the
+/// point may count as near at up to 3.5 times the reach.
+const MOST_AROUND: usize = 4096;
 
 /// The grid and its bits, kept from call to call.
 #[derive(Default)]
@@ -37,136 +44,6 @@ pub(crate) struct ZoneScratch {
     /// Points of an octave of one side, and by how much each reaches farther than the mean radius, metres.
     sorted: Sorted,
     further: Vec<f32>,
-}
-
-/// Cells of at least the zone's reach over the overlap of both bounds.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct ZoneGrid {
-    /// Corner of the first cell, metres.
-    pub min: Vec3,
-    /// Cells per metre.
-    pub inv_cell: f32,
-    /// Cells along x, y, z.
-    pub dims: [usize; 3],
-}
-
-impl ZoneGrid {
-    /// Cells of `reach` metres. They are larger if `bounds` would hold too many.
-    pub fn new(bounds: &Aabb, reach: f32) -> Self {
-        Self::with_cells(bounds, reach, MAX_CELLS)
-    }
-
-    /// The same with at most `most` cells, and at least one.
-    pub(super) fn with_cells(bounds: &Aabb, reach: f32, most: f32) -> Self {
-        let extents = bounds.extents().max(Vec3::ZERO);
-        let mut cell = reach;
-        let count = |cell: f32| {
-            let n = (extents / cell).floor() + Vec3::ONE;
-            n.x * n.y * n.z
-        };
-        while count(cell) > most {
-            cell *= 1.26; // the cube root of 2: half as many cells
-        }
-        let dims = (extents / cell).floor() + Vec3::ONE;
-        let dims = [dims.x as usize, dims.y as usize, dims.z as usize];
-        Self {
-            min: bounds.min,
-            inv_cell: 1.0 / cell,
-            dims,
-        }
-    }
-
-    /// Bits from a cell to the next one along x, y and z. An empty cell after each row and an empty row after each plane
-    /// keep marks from growing into the next ones.
-    fn strides(&self) -> [usize; 3] {
-        let row = self.dims[0] + 1;
-        [1, row, row * (self.dims[1] + 1)]
-    }
-
-    fn words(&self) -> usize {
-        (self.strides()[2] * self.dims[2]).div_ceil(64)
-    }
-
-    /// Bit of the cell that holds `point`; `None` outside.
-    fn bit(&self, point: Vec3) -> Option<usize> {
-        let cell = ((point - self.min) * self.inv_cell).floor();
-        let [lx, ly, lz] = self.dims.map(|n| n as f32);
-        let is_inside = cell.cmpge(Vec3::ZERO).all() && cell.cmplt(Vec3::new(lx, ly, lz)).all();
-        let [x, y, z] = cell.to_array().map(|c| c as usize);
-        let [_, row, plane] = self.strides();
-        is_inside.then(|| z * plane + y * row + x)
-    }
-
-    fn mark<'c>(&self, cells: impl Iterator<Item = &'c u32>, bits: &mut Vec<u64>) {
-        bits.clear();
-        bits.resize(self.words(), 0);
-        for cell in cells {
-            bits[*cell as usize / 64] |= 1 << (cell % 64);
-        }
-    }
-
-    /// Grows the marked cells by one cell in all 26 directions. `spare` is overwritten.
-    fn dilate(&self, bits: &mut Vec<u64>, spare: &mut Vec<u64>) {
-        for stride in self.strides() {
-            spare.clone_from(bits);
-            grow(bits, stride, spare);
-            std::mem::swap(bits, spare);
-        }
-    }
-}
-
-/// Sets the bits of `to` that are `stride` bits above or below one of `from`.
-fn grow(from: &[u64], stride: usize, to: &mut [u64]) {
-    let (words, shift) = (stride / 64, stride % 64);
-    let Some(rest) = from.len().checked_sub(words).filter(|rest| *rest > 0) else {
-        return;
-    };
-    // Two steps where a word gives its neighbour nothing: a shift by 64 bits is none.
-    let carry_up = |word: u64| word >> 1 >> (63 - shift);
-    let carry_down = |word: u64| word << 1 << (63 - shift);
-    let up = &mut to[words..];
-    up[0] |= from[0] << shift;
-    for (to, pair) in up[1..].iter_mut().zip(from.windows(2)) {
-        *to |= pair[1] << shift | carry_up(pair[0]);
-    }
-    let above = &from[words..];
-    to[rest - 1] |= above[rest - 1] >> shift;
-    for (to, pair) in to.iter_mut().zip(above.windows(2)) {
-        *to |= pair[0] >> shift | carry_down(pair[1]);
-    }
-}
-
-/// Fills `near` with the indices of the points whose cells are marked.
-fn select(cells: &[u32], bits: &[u64], near: &mut Vec<u32>) {
-    near.resize(cells.len(), 0);
-    let mut count = 0;
-    for (i, cell) in cells.iter().enumerate() {
-        near[count] = i as u32;
-        count += (bits[*cell as usize / 64] >> (cell % 64) & 1) as usize;
-    }
-    near.truncate(count);
-}
-
-fn locate(points: &Survivors, grid: &ZoneGrid, cells: &mut Vec<u32>) {
-    cells.resize(points.len(), 0);
-    locate_cells(grid, &points.x, &points.y, &points.z, cells);
-}
-
-multiversioned! {
-/// Bit of the cell of each point; points outside the grid count to the nearest cell.
-fn locate_cells(grid: &ZoneGrid, x: &[f32], y: &[f32], z: &[f32], cells: &mut [u32]) {
-    let n = x.len().min(y.len()).min(z.len()).min(cells.len());
-    let (x, y, z, cells) = (&x[..n], &y[..n], &z[..n], &mut cells[..n]);
-    let [lx, ly, lz] = grid.dims.map(|n| (n - 1) as f32);
-    let [_, row, plane] = grid.strides().map(|stride| stride as u32);
-    let (min, inv) = (grid.min, grid.inv_cell);
-    for i in 0..n {
-        let cx = truncated((x[i] - min.x) * inv, lx);
-        let cy = truncated((y[i] - min.y) * inv, ly);
-        let cz = truncated((z[i] - min.z) * inv, lz);
-        cells[i] = cz * plane + cy * row + cx;
-    }
-}
 }
 
 /// The culled points of a side, which is a cloud of this mean radius, metres.
@@ -241,45 +118,6 @@ fn of_one_octave(
     grid.mark(cells_b.iter(), bits);
     grid.dilate(bits, dilated);
     select(cells_a, bits, near_a);
-}
-
-/// Points around some places, kept from call to call.
-#[derive(Debug, Default)]
-pub(crate) struct AroundPlaces {
-    grid: ZoneGrid,
-    /// The cells of the places with their neighbours, and the same grown by one more cell.
-    near: Vec<u64>,
-    around: Vec<u64>,
-    spare: Vec<u64>,
-    cells: Vec<u32>,
-    /// Indices of the points in the second.
-    pub(crate) found: Vec<u32>,
-}
-
-impl AroundPlaces {
-    /// Finds at least the points within `2 · reach` metres of `places`. Cost: linear in points.
-    pub(crate) fn find(&mut self, points: &Survivors, places: &[Vec3], reach: f32) {
-        let bounds = (places.iter().copied()).fold(Aabb::EMPTY, Aabb::including);
-        // Points outside count to the outermost cells. No place is near these.
-        self.grid = ZoneGrid::new(&bounds.loosened(3.0 * reach), reach);
-        self.near.clear();
-        self.near.resize(self.grid.words(), 0);
-        for bit in places.iter().filter_map(|place| self.grid.bit(*place)) {
-            self.near[bit / 64] |= 1 << (bit % 64);
-        }
-        self.grid.dilate(&mut self.near, &mut self.spare);
-        self.around.clone_from(&self.near);
-        self.grid.dilate(&mut self.around, &mut self.spare);
-        locate(points, &self.grid, &mut self.cells);
-        select(&self.cells, &self.around, &mut self.found);
-    }
-
-    /// Whether all points within `reach` metres of `place` were found. They were if it is itself within `reach` of one
-    /// of the places.
-    pub(crate) fn knows(&self, place: Vec3) -> bool {
-        let bit = self.grid.bit(place);
-        bit.is_some_and(|bit| self.near[bit / 64] >> (bit % 64) & 1 > 0)
-    }
 }
 
 /// Cost: that of [`of_one_octave`] and of two counting sorts, once for each pair of octaves among the culled points.
@@ -358,7 +196,9 @@ fn mark_in_reach(
         if is_near[i] == 0 {
             let (point, reach) = (points.point(i), reach + points.further(i));
             let rows = sorted.rows(grid.cell_of(point));
-            is_near[i] = u8::from(is_in_reach(point, reach, &rows, sorted, further));
+            let around: usize = rows.iter().map(|row| row.len()).sum();
+            let is_known = around <= MOST_AROUND;
+            is_near[i] = u8::from(!is_known || is_in_reach(point, reach, &rows, sorted, further));
         }
     }
 }
