@@ -16,6 +16,7 @@ use glamx::{Mat3, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
 
 /// Places in which the depths of points out of view end up by turns. In a single one, each would wait for the one before.
+/// Only speed depends on it.
 const OUT_OF_VIEW_PLACES: usize = 8;
 
 /// The culled points of one side in the view frame, metres.

@@ -24,8 +24,8 @@ use glamx::Vec3;
 use grid::{locate, select};
 use std::ops::Range;
 
-/// Most points around one whose distances to it are measured: about a microsecond. Of more, cells alone decide, and the
-/// point may count as near at up to 3.5 times the reach.
+/// Most points around one whose distances to it are measured: about a microsecond. Where coarse points lie more densely than
+/// that, cells alone decide, and the point may count as near at up to 3.5 times the reach.
 const MOST_AROUND: usize = 4096;
 
 /// The grid and its bits, kept from call to call.
@@ -259,6 +259,43 @@ impl ZoneSide<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A point in the cell next to coarse points, out of their reach, is far where these are measured, and near where they
+    /// are too many.
+    #[test]
+    fn the_work_of_a_point_is_bounded() {
+        for (count, is_near) in [(MOST_AROUND, false), (MOST_AROUND + 1, true)] {
+            let (mut coarse, mut fine) = (Survivors::default(), Survivors::default());
+            let put = |points: &mut Survivors, x: f32| {
+                points.x.push(x);
+                points.y.push(0.0);
+                points.z.push(0.0);
+            };
+            for k in 0..count {
+                put(&mut coarse, 0.1 * (k % 2) as f32);
+                coarse.further.push(0.9);
+            }
+            put(&mut fine, 1.5);
+            let bounds = Aabb {
+                min: Vec3::ZERO,
+                max: 1.5 * Vec3::X,
+            };
+            let (mut near_coarse, mut near_fine) = (vec![], vec![]);
+            let side = |points| ZoneSide {
+                points,
+                mean_radius: 0.1,
+            };
+            zone(
+                [side(&coarse), side(&fine)],
+                &bounds,
+                0.1,
+                &mut ZoneScratch::default(),
+                &mut near_coarse,
+                &mut near_fine,
+            );
+            assert_eq!(!near_fine.is_empty(), is_near, "{count}");
+        }
+    }
 
     /// Brute force says: every pair within reach is found. Nothing is found beyond the grown cells, or beyond the reach
     /// of coarser points.
