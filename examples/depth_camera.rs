@@ -4,7 +4,7 @@ use anyhow::{Context, bail};
 use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tldi::glamx::{DVec3, Pose3, Vec3};
+use tldi::glamx::{Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, RangeArgument, UpChoice};
 use tldi_examples::depth::{
@@ -155,7 +155,12 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let snapshots = simulate(&mut simulation, &source, recording, args)?;
     let report = simulation.report(missing);
     let json = args.common.json.as_deref();
-    output::publish(&report, DVec3::ZERO, |out| report.write_table(out), json)?;
+    output::publish(
+        &report,
+        source.origin(),
+        |out| report.write_table(out),
+        json,
+    )?;
     if !args.common.no_pictures {
         draw(&simulation, up, &snapshots, args)?;
     }

@@ -128,7 +128,7 @@ fn numbered_sweeps_have_their_poses() {
 /// origin that the report tells.
 #[test]
 fn poses_may_be_those_of_a_map() {
-    let map = [691_000.0_f64, 5_336_000.0, 520.0];
+    let map = [691_000.0_f64, 5_336_000.0, 8520.0];
     let folder = folder("lidar_map");
     write_sweeps(&folder, 3);
     let poses: String = (0..3)
@@ -179,7 +179,7 @@ fn what_is_missing_is_named() {
     fs::write(data.join("poses.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
     refused("2 .bin files, but poses.txt has 1 poses");
     fs::write(data.join("poses.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n1 2 3\n").unwrap();
-    refused("poses.txt, line 2: 3 numbers where 12 belong");
+    refused("poses.txt, line 2: 3 numbers where 12 or 16 belong");
     fs::write(data.join("poses.txt"), "2 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
     refused("poses.txt, line 1: the matrix is no pose");
     fs::write(data.join("calib.txt"), "P0: 1\n").unwrap();

@@ -2,15 +2,11 @@
 
 use crate::scalar::{Endian, Scalar};
 use crate::slot::{Column, Columns, Slot};
-use crate::{RawCloud, ReadOptions, SourceErrorKind, splat};
+use crate::{RawCloud, ReadOptions, SourceErrorKind, origin, splat};
 use tldi::glamx::{DVec3, Vec3};
 
 /// Points seen before the origin is chosen.
 const ORIGIN_SAMPLE: usize = 1024;
-
-/// Farther than this from zero, in units of the file, coordinates are moved: there, steps of `f32`
-/// reach 2⁻¹¹ (half a millimetre in metres).
-pub(crate) const FAR: f64 = 4096.0;
 
 /// Points reserved for at most before any has been read.
 const MAX_RESERVED: u64 = 1 << 16;
@@ -231,16 +227,7 @@ impl Collector {
         let Some(pending) = self.pending.take() else {
             return;
         };
-        for axis in 0..3 {
-            let mut coordinates: Vec<f64> = pending
-                .iter()
-                .map(|p| p[axis])
-                .filter(|c| c.is_finite())
-                .collect();
-            coordinates.sort_unstable_by(f64::total_cmp);
-            let median = coordinates.get(coordinates.len() / 2).copied();
-            self.origin[axis] = median.filter(|m| m.abs() > FAR).map_or(0.0, f64::round);
-        }
+        self.origin = origin::near(&pending);
         let origin = self.origin;
         self.points
             .extend(pending.iter().map(|p| (*p - origin).as_vec3()));

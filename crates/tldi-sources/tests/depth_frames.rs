@@ -57,6 +57,22 @@ fn a_folder_is_read() {
     assert!((p - Vec3::new(3.0, 7.0, 10.0)).length() < 1e-5, "{p}");
 }
 
+/// Poses on a map, where a step of `f32` is half a metre, keep their millimetres: they count from an origin.
+#[test]
+fn poses_may_be_those_of_a_map() {
+    let folder = folder("depth_map");
+    let pose = |x: f64| format!("a.png 1 0 0 {x}  0 1 0 5336000.002  0 0 1 1.5  0 0 0 1\n");
+    let poses = [691_000.001, 691_000.251, 691_000.501].map(pose);
+    fs::write(folder.join("poses.txt"), poses.concat()).unwrap();
+    let sequence = DepthSequence::open(folder).unwrap();
+    assert_eq!(sequence.origin.to_array(), [691_000.0, 5_336_000.0, 0.0]);
+    for (frame, x) in sequence.frames.iter().zip([0.001, 0.251, 0.501]) {
+        let place = frame.world_from_camera.translation;
+        // Steps of f64 are 1e-9 there.
+        assert!(place.distance(Vec3::new(x, 0.002, 1.5)) < 1e-6, "{place}");
+    }
+}
+
 #[test]
 fn what_is_wrong_is_said() {
     let error_of = |name: &str, change: &dyn Fn(&Path)| -> String {
@@ -81,7 +97,7 @@ fn what_is_wrong_is_said() {
         (&write("intrinsics.txt", ""), "nothing in it"),
         (
             &write("poses.txt", "a.png 1 0 0"),
-            "line 1: 3 numbers where 16 belong",
+            "line 1: 3 numbers where 12 or 16 belong",
         ),
         (
             &write("poses.txt", "a.png 2 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"),

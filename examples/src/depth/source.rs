@@ -3,7 +3,7 @@
 use super::generated::GeneratedCamera;
 use anyhow::Context;
 use std::time::Instant;
-use tldi::glamx::Pose3;
+use tldi::glamx::{DVec3, Pose3};
 use tldi_sources::depth::{DepthSequence, Intrinsics};
 
 /// Frames in order.
@@ -20,7 +20,7 @@ pub struct TimedFrame {
     pub name: String,
     /// Depths, row by row.
     pub depths: Vec<u16>,
-    /// From the frame of the camera into that of the world.
+    /// From the frame of the camera into that of the world, less [the origin](FrameSource::origin), metres.
     pub world_from_camera: Pose3,
     /// Seconds of reading and decoding; 0 for a generated one.
     pub decode_seconds: f64,
@@ -38,6 +38,14 @@ impl FrameSource {
     /// Whether there are no frames.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// Where all places count from in the world, metres.
+    pub fn origin(&self) -> DVec3 {
+        match self {
+            Self::Folder(sequence) => sequence.origin,
+            Self::Generated(_) => DVec3::ZERO,
+        }
     }
 
     /// The camera.

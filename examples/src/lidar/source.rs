@@ -1,21 +1,19 @@
 //! Where sweeps come from: a folder, or a generated street.
 
 use super::Scanner;
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use rapier3d_tldi::{CloudRecipe, RadiusRule, SeenPoints};
 use std::path::{Path, PathBuf};
-use tldi::glamx::{DMat3, DPose3, DQuat, DVec3, Pose3, Vec3};
+use tldi::glamx::{DPose3, DVec3, Pose3, Vec3};
 use tldi::{CloudError, PointCloud};
 use tldi_sources::depth::{OrganizedCloud, SensorModel};
-use tldi_sources::{Format, ReadOptions, read};
+use tldi_sources::{Format, ReadOptions, near_origin, parse_pose, read};
 
 /// Standard deviation of ranges, metres: what an HDL-64E is said to have at half of its reach. With half as much, noise
 /// counts as an edge here and there; with twice as much, normals are smoothed over twice as many columns.
 const DEVIATION: f32 = 0.01;
 /// Neighbours for radii and normals: so many that there are some of the rings beside.
 const NEIGHBORS: usize = 24;
-/// Largest deviation of a pose's rotation from an orthonormal matrix: files round.
-const ROUNDING: f64 = 0.01;
 
 /// One turn of a scanner.
 pub struct Sweep {
@@ -120,10 +118,9 @@ pub enum SweepSource {
 
 impl SweepSource {
     /// Opens a folder: `.bin` files in the order of their names, in which numbers count (2 is before 10), and `poses.txt`
-    /// with a line for each, twelve numbers: the upper rows of the matrix from the scanner's frame into that of the
-    /// world. Lines that start with `#` are comments. Where there is a
+    /// with a line for each: the matrix from the scanner's frame into that of the world, see [`parse_pose`]. Lines that start with `#` are comments. Where there is a
     /// `calib.txt` with a line `Tr:`, poses are those of a camera, and `Tr` goes from the scanner to it: KITTI's
-    /// odometry data. Places count from the first pose, in whole metres: coordinates of a map are too large for `f32`.
+    /// odometry data.
     ///
     /// # Errors
     /// What is missing or cannot be understood, with the file and the line.
@@ -148,7 +145,7 @@ impl SweepSource {
             let text = read_text("calib.txt")?;
             let line = (text.lines()).find_map(|line| line.strip_prefix("Tr:"));
             let line = line.context("calib.txt has no line `Tr:`")?;
-            pose(line).context("calib.txt, the line `Tr:`")?
+            parse_pose(line).context("calib.txt, the line `Tr:`")?
         } else {
             DPose3::IDENTITY
         };
@@ -160,7 +157,8 @@ impl SweepSource {
             .filter(|(_, line)| says_something(line.trim()));
         let poses = lines
             .map(|(k, line)| {
-                let pose = pose(line).with_context(|| format!("poses.txt, line {}", k + 1))?;
+                let pose =
+                    parse_pose(line).with_context(|| format!("poses.txt, line {}", k + 1))?;
                 Ok(pose * camera_from_scanner)
             })
             .collect::<anyhow::Result<Vec<_>>>()?;
@@ -176,18 +174,11 @@ impl SweepSource {
             files.len(),
             poses.len()
         );
-        let origin = poses[0].translation.round();
-        let near_origin = poses.into_iter().map(|pose| {
-            let near = DPose3::from_parts(pose.translation - origin, pose.rotation);
-            Pose3::from(near)
-        });
-        Ok(Self::Folder(
-            files.into_iter().zip(near_origin).collect(),
-            origin,
-        ))
+        let (poses, origin) = near_origin(&poses);
+        Ok(Self::Folder(files.into_iter().zip(poses).collect(), origin))
     }
 
-    /// Where all places count from in the world, metres.
+    /// Where all places count from in the world, metres: zero but for poses on a map, see [`near_origin`].
     pub fn origin(&self) -> DVec3 {
         match self {
             Self::Folder(_, origin) => *origin,
@@ -231,34 +222,4 @@ impl SweepSource {
             }),
         }
     }
-}
-
-/// A pose from the upper three rows of its matrix.
-fn pose(text: &str) -> anyhow::Result<DPose3> {
-    let numbers = (text.split_whitespace())
-        .map(|word| match word.parse::<f64>() {
-            Ok(number) if (number as f32).is_finite() => Ok(number),
-            _ => bail!("`{word}` is not a finite number"),
-        })
-        .collect::<anyhow::Result<Vec<_>>>()?;
-    let count = numbers.len();
-    let Ok(m) = <[f64; 12]>::try_from(numbers) else {
-        bail!("{count} numbers where 12 belong");
-    };
-    let column = |k: usize| DVec3::new(m[k], m[4 + k], m[8 + k]);
-    let rotation = DMat3::from_cols(column(0), column(1), column(2));
-    let skew = rotation.transpose() * rotation - DMat3::IDENTITY;
-    let is_rotation = skew
-        .to_cols_array()
-        .iter()
-        .all(|value| value.abs() < ROUNDING)
-        && rotation.determinant() > 0.0;
-    ensure!(
-        is_rotation,
-        "the matrix is no pose: its left part must be a rotation"
-    );
-    Ok(DPose3::from_parts(
-        column(3),
-        DQuat::from_mat3(&rotation).normalize(),
-    ))
 }

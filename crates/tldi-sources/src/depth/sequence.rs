@@ -1,17 +1,15 @@
 //! A folder of depth frames.
 
 use super::sensor::Intrinsics;
+use crate::{near_origin, parse_pose};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
+use tldi::glamx::{DPose3, DVec3, Pose3};
 
 /// What a folder must hold, for error messages.
-const LAYOUT: &str = "a folder of depth frames holds intrinsics.txt (one line `width height fx fy cx cy depth_unit_metres`), poses.txt (a line for each frame: file name, then the 4×4 camera-to-world matrix, row by row, metres) and 16-bit grey PNG files";
-
-/// Largest deviation of a pose's rotation from an orthonormal matrix: files round.
-const ROUNDING: f32 = 0.01;
+const LAYOUT: &str = "a folder of depth frames holds intrinsics.txt (one line `width height fx fy cx cy depth_unit_metres`), poses.txt (a line for each frame: file name, then the 4×4 camera-to-world matrix or its upper three rows, row by row, metres) and 16-bit grey PNG files";
 
 /// Why depth frames cannot be read.
 #[derive(Debug, Error)]
@@ -59,7 +57,7 @@ pub enum DepthError {
 pub struct DepthFrame {
     /// The image.
     pub path: PathBuf,
-    /// From the frame of the camera into that of the world.
+    /// From the frame of the camera into that of the world, less [the origin](DepthSequence::origin), metres.
     pub world_from_camera: Pose3,
 }
 
@@ -70,6 +68,8 @@ pub struct DepthSequence {
     pub intrinsics: Intrinsics,
     /// Frames whose image is there.
     pub frames: Vec<DepthFrame>,
+    /// Where all places count from in the world, metres: zero but for poses on a map, see [`near_origin`].
+    pub origin: DVec3,
     /// Names of images that are listed but not there.
     pub missing: Vec<String>,
 }
@@ -84,35 +84,43 @@ impl DepthSequence {
         let folder = folder.as_ref();
         let intrinsics = read_intrinsics(&folder.join("intrinsics.txt"))?;
         let list = folder.join("poses.txt");
-        let mut sequence = Self {
-            intrinsics,
-            frames: Vec::new(),
-            missing: Vec::new(),
-        };
+        let mut images = Vec::new();
+        let mut poses: Vec<DPose3> = Vec::new();
+        let mut missing = Vec::new();
         for (line, text) in lines(&list)? {
             let (name, numbers) = text.split_once(char::is_whitespace).unwrap_or((&text, ""));
-            let world_from_camera = pose(numbers).map_err(|reason| DepthError::Text {
+            let pose = parse_pose(numbers).map_err(|error| DepthError::Text {
                 path: list.clone(),
                 line,
-                reason,
+                reason: error.to_string(),
             })?;
             let path = folder.join(name);
             if path.is_file() {
-                sequence.frames.push(DepthFrame {
-                    path,
-                    world_from_camera,
-                });
+                images.push(path);
+                poses.push(pose);
             } else {
-                sequence.missing.push(name.to_owned());
+                missing.push(name.to_owned());
             }
         }
-        if sequence.frames.is_empty() {
+        if images.is_empty() {
             return Err(DepthError::NoFrames {
                 path: list,
-                listed: sequence.missing.len(),
+                listed: missing.len(),
             });
         }
-        Ok(sequence)
+        let (poses, origin) = near_origin(&poses);
+        let frames = images.into_iter().zip(poses);
+        Ok(Self {
+            intrinsics,
+            frames: frames
+                .map(|(path, world_from_camera)| DepthFrame {
+                    path,
+                    world_from_camera,
+                })
+                .collect(),
+            origin,
+            missing,
+        })
     }
 
     /// Reads the image of a frame: row by row, in units of
@@ -207,29 +215,4 @@ fn read_intrinsics(path: &Path) -> Result<Intrinsics, DepthError> {
         center: [cx, cy],
         depth_unit,
     })
-}
-
-/// A pose from a 4 × 4 matrix, row by row.
-fn pose(text: &str) -> Result<Pose3, String> {
-    let m = numbers::<16>(text)?;
-    let column = |k: usize| Vec3::new(m[k], m[4 + k], m[8 + k]);
-    let rotation = Mat3::from_cols(column(0), column(1), column(2));
-    let skew = rotation.transpose() * rotation;
-    let columns = [
-        skew.x_axis - Vec3::X,
-        skew.y_axis - Vec3::Y,
-        skew.z_axis - Vec3::Z,
-    ];
-    let is_rotation =
-        columns.iter().all(|c| c.abs().max_element() < ROUNDING) && rotation.determinant() > 0.0;
-    if !is_rotation || m[12..] != [0.0, 0.0, 0.0, 1.0] {
-        return Err(
-            "the matrix is no pose: its upper left part must be a rotation, its last row 0 0 0 1"
-                .to_owned(),
-        );
-    }
-    Ok(Pose3::from_parts(
-        column(3),
-        Quat::from_mat3(&rotation).normalize(),
-    ))
 }
