@@ -163,6 +163,14 @@ fn load_runner(args: &Args) -> anyhow::Result<Runner> {
     if mesh.faces.is_empty() {
         bail!("{} has no faces", path.display());
     }
+    if mesh.points.len() != points.points() {
+        bail!(
+            "{} has {} points and the frames have {}: its faces belong to others",
+            path.display(),
+            mesh.points.len(),
+            points.points()
+        );
+    }
     Runner::with_faces(points, mesh.faces)
         .with_context(|| format!("cannot use the faces of {}", path.display()))
 }

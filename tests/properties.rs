@@ -143,9 +143,10 @@ fn reduced_alike_in_any_order() {
     let pixel = 0.01;
     let contacts: Vec<ContactPixel> = (0..100_000)
         .map(|k| {
-            let [i, j] = [k % 400, k / 400];
+            // Two layers in each pixel.
+            let [i, j] = [k % 400 / 2, k / 400];
             let gap = 0.2 * pixel * (rng.f32() - 0.8);
-            let point = pixel * Vec3::new(i as f32, 0.0, j as f32);
+            let point = pixel * Vec3::new(i as f32, 3.0 * (k % 2) as f32, j as f32);
             ContactPixel {
                 pixel: [i, j],
                 view: u32::from(j > 120),

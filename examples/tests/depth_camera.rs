@@ -25,25 +25,49 @@ fn write_frames(folder: &Path, plates: &[bool]) {
     for (k, plate) in plates.iter().enumerate() {
         let name = format!("{k:03}.png");
         poses += &format!("{name} 1 0 0 0 0 -1 0 0 0 0 -1 1.5 0 0 0 1\n");
-        let mut bytes = Vec::new();
-        for v in 0..120 {
-            for u in 0..160 {
-                let on_plate = *plate && (12..148).contains(&u) && (12..108).contains(&v);
-                let depth: u16 = if on_plate { 1200 } else { 1500 };
-                bytes.extend(depth.to_be_bytes());
-            }
-        }
-        let file = fs::File::create(folder.join(name)).unwrap();
-        let mut encoder = png::Encoder::new(file, 160, 120);
-        encoder.set_color(png::ColorType::Grayscale);
-        encoder.set_depth(png::BitDepth::Sixteen);
-        encoder
-            .write_header()
-            .unwrap()
-            .write_image_data(&bytes)
-            .unwrap();
+        write_image(&folder.join(name), |u, v| {
+            let on_plate = *plate && (12..148).contains(&u) && (12..108).contains(&v);
+            if on_plate { 1200 } else { 1500 }
+        });
     }
     fs::write(folder.join("poses.txt"), poses).unwrap();
+}
+
+/// Writes the depths of the columns and rows of an image.
+fn write_image(path: &Path, depth: impl Fn(usize, usize) -> u16) {
+    let places = (0..120).flat_map(|v| (0..160).map(move |u| (u, v)));
+    let bytes: Vec<u8> = places
+        .flat_map(|(u, v)| depth(u, v).to_be_bytes())
+        .collect();
+    let file = fs::File::create(path).unwrap();
+    let mut encoder = png::Encoder::new(file, 160, 120);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(&bytes)
+        .unwrap();
+}
+
+/// A frame in which nothing was measured is passed over: what lies on the surface of the frame before stays.
+#[test]
+fn a_frame_without_points_is_passed_over() {
+    let folder = folder("depth_empty");
+    write_frames(&folder.join("frames"), &[true; 30]);
+    for name in ["007.png", "029.png"] {
+        write_image(&folder.join("frames").join(name), |_, _| 0);
+    }
+    let options = [
+        "--frames", "frames", "--up", "0,0,1", "--count", "1", "--size", "0.2", "--hold", "1",
+    ];
+    let report = report(&folder, &options);
+    let frames = report["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 60);
+    let empty = frames.iter().filter(|frame| frame["points"] == 0);
+    assert!(empty.eq([&frames[37], &frames[59]]));
+    let height = number(&report["bodies"][0]["translation"][2]);
+    assert!((height - 0.35).abs() < 0.005, "{height}");
 }
 
 fn report(folder: &Path, options: &[&str]) -> Value {

@@ -47,7 +47,7 @@ fn bodies_rest_on_a_generated_street() {
 }
 
 /// Sweeps in KITTI's layout: the scanner looks along x with z up, poses are those of a camera that looks along
-/// z with y down. The ground is a grid 1.5 m below, and one point of each sweep is NaN.
+/// z with y down. The ground is a grid 1.5 m below, and two rays of each sweep met nothing: NaN, and the scanner's own place.
 fn write_sweeps(folder: &Path, count: usize) {
     let mut poses = String::new();
     for k in 0..count {
@@ -65,6 +65,7 @@ fn write_sweeps(folder: &Path, count: usize) {
             }
         }
         push([f32::NAN, 0.0, 0.0]);
+        push([0.0; 3]);
         fs::write(folder.join(format!("{k:06}.bin")), bytes).unwrap();
     }
     fs::write(folder.join("poses.txt"), poses).unwrap();
@@ -84,7 +85,7 @@ fn a_folder_of_sweeps_is_read_with_its_poses() {
     for sweep in sweeps {
         assert_eq!(
             (&sweep["points"], &sweep["dropped"]),
-            (&(121 * 121).into(), &1.into())
+            (&(121 * 121).into(), &2.into())
         );
     }
     // The grid is exact; contacts scatter by a tenth of its radius.

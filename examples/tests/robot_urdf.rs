@@ -177,6 +177,17 @@ fn xacro_is_named_only_where_it_is() {
     };
     assert!(error(&sized("${w} 1 1")).contains("xacro FILE"));
     assert!(error("<robot><xacro:arm/>").contains("xacro FILE"));
+    // Well-formed, with a robot in it.
+    let space = r#"<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:leg/>"#;
+    let macros = sized("1 1 1").replace(r#"<robot name="r">"#, space);
+    assert!(error(&macros).contains("xacro FILE"));
+    assert!(error("<sdf version='1.6'><model name='r'/></sdf>").contains("<sdf>, not <robot>"));
+    assert!(error(&sized("1 nan 1")).contains("link a has a number that is not finite"));
+    let inertia = r#"<link name="a"><inertial><mass value="1"/><inertia ixx="nan" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>"#;
+    let heavy = sized("1 1 1").replace(r#"<link name="a">"#, inertia);
+    assert!(error(&heavy).contains("link a has a number that is not finite"));
+    let commented = sized("1 1 1").replace("<link", "<!-- ${w} <xacro:leg/> --><link");
+    assert!(Description::from_text(&commented, &folders).is_ok());
     for plain in [sized("1 1"), "<robot".to_owned()] {
         let said = error(&plain);
         assert!(

@@ -83,7 +83,7 @@ pub enum SourceErrorKind {
     UnknownFormat,
     /// The extension is that of a mesh that is not PLY.
     #[error(
-        "a .{extension} file is a mesh, and of meshes only PLY is read: convert it to PLY, whose vertices become the points, or sample points on its faces and write these as PLY"
+        "a .{extension} file is no cloud, and of meshes only PLY is read as one: convert it to PLY, whose vertices become the points, or sample points on its faces and write these as PLY"
     )]
     Mesh {
         /// The file's extension, in lower case.

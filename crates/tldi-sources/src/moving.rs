@@ -1,12 +1,12 @@
 //! Points that move: a deforming mesh as a NumPy array or as a folder of clouds.
 
-use crate::{ReadOptions, SourceError, numbered_order};
+use crate::{ReadOptions, SourceError, numbered_order, origin};
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-use tldi::glamx::Vec3;
+use tldi::glamx::{DVec3, Vec3};
 
 /// Most numbers of an array: 2³¹ bytes of them are more than fits a story.
 const MAX_NUMBERS: u64 = 1 << 29;
@@ -101,7 +101,8 @@ impl MovingPoints {
     }
 
     /// Reads a NumPy file (`.npy`, also packed with gzip) or a folder with a cloud for each frame, in
-    /// [the order of their numbers](numbered_order).
+    /// [the order of their numbers](numbered_order). Coordinates of a map count from an origin that is chosen for the first
+    /// frame as [`RawCloud::origin`](crate::RawCloud::origin) is.
     ///
     /// # Errors
     /// [`MovingError`].
@@ -255,20 +256,18 @@ fn read_npy(path: &Path) -> Result<MovingPoints, MovingError> {
     let size = if is_double { 8 } else { 4 };
     let mut found = Vec::new();
     let mut frame = Vec::new();
+    let mut origin = None;
     for index in 0..frames {
         let what = format!("frame {index} of {frames}");
         exact(&mut frame, numbers / frames * size, &what)?;
         let number = |bytes: &[u8]| match is_double {
-            true => f64::from_le_bytes(std::array::from_fn(|k| bytes[k])) as f32,
-            false => f32::from_le_bytes(std::array::from_fn(|k| bytes[k])),
+            true => f64::from_le_bytes(std::array::from_fn(|k| bytes[k])),
+            false => f64::from(f32::from_le_bytes(std::array::from_fn(|k| bytes[k]))),
         };
-        let values: Vec<f32> = frame.chunks_exact(size as usize).map(number).collect();
-        found.push(
-            values
-                .chunks_exact(3)
-                .map(|p| Vec3::new(p[0], p[1], p[2]))
-                .collect(),
-        );
+        let values: Vec<f64> = frame.chunks_exact(size as usize).map(number).collect();
+        let points: Vec<DVec3> = values.chunks_exact(3).map(DVec3::from_slice).collect();
+        let origin = *origin.get_or_insert_with(|| origin::near(&points));
+        found.push(points.iter().map(|p| (*p - origin).as_vec3()).collect());
     }
     MovingPoints::new(found)
 }

@@ -11,8 +11,11 @@ const ROUNDING: f64 = 0.01;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PoseError {
     /// One of its words is no number.
-    #[error("`{0}` is not a finite number")]
+    #[error("`{0}` is not a number")]
     NoNumber(String),
+    /// One of its numbers is infinite or NaN, or too large for `f32`: some write this where they lost track of the sensor.
+    #[error("`{0}` is not a finite number")]
+    NotFinite(String),
     /// It has another count of numbers.
     #[error("{0} numbers where 12 or 16 belong, a matrix of 3 × 4 or 4 × 4")]
     Count(usize),
@@ -38,7 +41,8 @@ pub fn parse_pose(text: &str) -> Result<DPose3, PoseError> {
     let m = (text.split_whitespace())
         .map(|word| match word.parse::<f64>() {
             Ok(number) if (number as f32).is_finite() => Ok(number),
-            _ => Err(PoseError::NoNumber(word.to_owned())),
+            Ok(_) => Err(PoseError::NotFinite(word.to_owned())),
+            Err(_) => Err(PoseError::NoNumber(word.to_owned())),
         })
         .collect::<Result<Vec<_>, _>>()?;
     if !matches!(m.len(), 12 | 16) {

@@ -57,6 +57,17 @@ fn a_folder_is_read() {
     assert!((p - Vec3::new(3.0, 7.0, 10.0)).length() < 1e-5, "{p}");
 }
 
+/// Where the camera's track was lost, the frame counts as missing.
+#[test]
+fn frames_without_a_pose_are_missing() {
+    let folder = folder("depth_lost");
+    let lost = ["-inf ", "nan "].map(|word| format!("a.png {}\n", word.repeat(16)));
+    let poses = [&lost[0][..], &format!("a.png {POSE}\n"), &lost[1]].concat();
+    fs::write(folder.join("poses.txt"), poses).unwrap();
+    let sequence = DepthSequence::open(folder).unwrap();
+    assert_eq!((sequence.frames.len(), sequence.missing.len()), (1, 2));
+}
+
 /// Poses on a map, where a step of `f32` is half a metre, keep their millimetres: they count from an origin.
 #[test]
 fn poses_may_be_those_of_a_map() {
@@ -105,7 +116,7 @@ fn what_is_wrong_is_said() {
         ),
         (
             &write("poses.txt", "a.png 1 0 x 0 0 1 0 0 0 0 1 0 0 0 0 1"),
-            "`x` is not a finite number",
+            "`x` is not a number",
         ),
         (&write("poses.txt", ""), "none of the 0 frames"),
         (&write("a.png", "no image"), "a.png"),

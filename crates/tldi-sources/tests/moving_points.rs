@@ -51,6 +51,19 @@ fn arrays_are_read_packed_and_not() {
     }
 }
 
+/// Doubles of a map, where a step of `f32` is half a metre, keep their millimetres.
+#[test]
+fn doubles_of_a_map_count_from_an_origin() {
+    let folder = folder("moving_map");
+    let place = |k: i32| 5_336_000.0 + 0.001 * f64::from(k);
+    let doubles: Vec<u8> = (0..24).flat_map(|k| place(k).to_le_bytes()).collect();
+    fs::write(folder.join("a.npy"), npy("<f8", "(2, 4, 3)", &doubles)).unwrap();
+    let moving = MovingPoints::read(folder.join("a.npy")).unwrap();
+    let way = moving.frames()[1][2] - moving.frames()[0][1];
+    // From numbers 3 to 5 to numbers 18 to 20; steps of f64 are 1e-9 there.
+    assert!(way.distance(Vec3::splat(0.015)) < 1e-6, "{way}");
+}
+
 #[test]
 fn folders_are_read_in_order() {
     let folder = folder("moving_folder");

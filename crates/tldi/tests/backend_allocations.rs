@@ -1,10 +1,10 @@
-//! A warm backend allocates nothing. A binary of its own with one test, since the allocations of
+//! A warm backend allocates nothing, for comparisons and for casts. A binary of its own with one test, since the allocations of
 //! all threads are counted.
 
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
-    Aabb, Backend, CpuBackend, PairQuery, PairResult, Params, PointCloud, RayHit, RaySurface,
-    Surface, View,
+    Aabb, Backend, CpuBackend, ImpactQuery, PairQuery, PairResult, Params, PointCloud, RayHit,
+    RaySurface, Surface, View,
 };
 use tldi_memory::{Counting, allocations};
 
@@ -102,6 +102,18 @@ fn a_warm_backend_allocates_nothing() {
                             .expect("the pair is supported");
                         assert!(!results[0].contacts.is_empty(), "{depth}");
                     }
+                    let cast = ImpactQuery {
+                        a: Surface::Cloud(cloud),
+                        b: Surface::Cloud(cloud),
+                        a_from_b: Pose3::new(Vec3::Y * 2.5, rotation),
+                        motion: -Vec3::Y,
+                        touching: 0.0,
+                        core_only: false,
+                        penetration: None,
+                        params: Params::for_radius(r),
+                    };
+                    let impact = backend.impact(&cast).expect("the pair is supported");
+                    assert!(impact.is_some());
                 }
             }
         }

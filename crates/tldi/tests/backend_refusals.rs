@@ -111,6 +111,14 @@ fn fixed_cameras_that_show_nothing() {
         });
         refused(of_size, "size must be");
     }
+    let of_pixels = |width, height| {
+        of_camera(VirtualCamera {
+            size: Some([width, height]),
+            ..camera
+        })
+    };
+    refused(of_pixels(1 << 14, (1 << 14) + 1), "2^28 pixels");
+    assert_eq!(of_pixels(1 << 14, 4), None);
     let perspective = |focal_px, near, far| VirtualCamera {
         projection: Projection::Perspective {
             focal_px,

@@ -160,10 +160,11 @@ impl DepthSimulation {
         })
     }
 
-    /// A frame arrives and becomes the surface; then time goes on until the next.
+    /// A frame arrives and becomes the surface; then time goes on until the next. A frame without points is passed over:
+    /// the last surface stays.
     ///
     /// # Errors
-    /// Where the frame holds no points, and those of the pipeline.
+    /// Those of the pipeline.
     pub fn take_frame(&mut self, frame: &TimedFrame) -> anyhow::Result<()> {
         let start = Instant::now();
         let points = self.camera.points(&frame.depths, &frame.world_from_camera);
@@ -184,8 +185,10 @@ impl DepthSimulation {
         let whole = (self.memory).complete(points, &self.camera, &frame.world_from_camera);
         report.remembered_points = whole.points.len() - report.points;
         let seen = whole.points.clone();
-        let cloud = whole.into_builder().build()?.into_owned();
-        (self.tldi).set_cloud(&mut self.world, self.surface, cloud)?;
+        if !seen.is_empty() {
+            let cloud = whole.into_builder().build()?.into_owned();
+            (self.tldi).set_cloud(&mut self.world, self.surface, cloud)?;
+        }
         let updated = start.elapsed();
         report.contacts = self.step()?;
         let stepped = start.elapsed();

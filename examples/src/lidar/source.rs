@@ -19,7 +19,7 @@ const NEIGHBORS: usize = 24;
 pub struct Sweep {
     /// What it is called.
     pub name: String,
-    /// Points in the frame of the scanner, metres.
+    /// Points in the frame of the scanner, metres; not finite where a ray met nothing.
     pub points: Vec<Vec3>,
     /// Columns and rows of the points, if they come in rows.
     pub size: Option<[usize; 2]>,
@@ -207,9 +207,14 @@ impl SweepSource {
         match self {
             Self::Folder(sweeps, _) => {
                 let (path, world_from_scanner) = &sweeps[index];
+                let mut points = read(path, &ReadOptions::default())?.points;
+                // Some drivers write the scanner's own place where a ray met nothing.
+                for point in points.iter_mut().filter(|point| **point == Vec3::ZERO) {
+                    *point = Vec3::NAN;
+                }
                 Ok(Sweep {
                     name: crate::load::stem(path),
-                    points: read(path, &ReadOptions::default())?.points,
+                    points,
                     size: None,
                     world_from_scanner: *world_from_scanner,
                 })

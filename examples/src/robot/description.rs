@@ -88,15 +88,10 @@ impl Description {
     /// # Errors
     /// [`DescriptionError`].
     pub fn from_text(text: &str, folders: &MeshFolders) -> Result<Self, DescriptionError> {
-        let mut urdf = urdf_rs::read_from_string(&completed(text)).map_err(|error| {
-            let is_xacro = text.contains("xacro:") || text.contains("${");
-            let kind = if is_xacro {
-                DescriptionError::Xacro
-            } else {
-                DescriptionError::Syntax
-            };
-            kind(error.to_string())
-        })?;
+        check_kind(text)?;
+        let mut urdf = urdf_rs::read_from_string(&completed(text))
+            .map_err(|error| DescriptionError::Syntax(error.to_string()))?;
+        urdf.links.iter().try_for_each(check_numbers)?;
         let mut warnings = Vec::new();
         check_limits(&mut urdf, &mut warnings);
         let kinematics = kinematics_of(&urdf, &mut warnings)?;
@@ -240,6 +235,62 @@ fn kinematics_of(
     }
     check_tree(urdf, &joints)?;
     Ok(Kinematics::new(urdf.links.len(), joints))
+}
+
+/// Fails for what is XML, but of another kind.
+fn check_kind(text: &str) -> Result<(), DescriptionError> {
+    let document = roxmltree::Document::parse(text).map_err(|error| {
+        let kind = match text.contains("xacro:") {
+            true => DescriptionError::Xacro,
+            false => DescriptionError::Syntax,
+        };
+        kind(error.to_string())
+    })?;
+    let root = document.root_element().tag_name().name();
+    if root != "robot" {
+        let reason = format!("its root element is <{root}>, not <robot>");
+        return Err(DescriptionError::Syntax(reason));
+    }
+    let of_xacro = document.descendants().find_map(|node| {
+        let is_tag = (node.tag_name().namespace()).is_some_and(|space| space.contains("xacro"));
+        let attribute =
+            (node.attributes()).find(|a| ["${", "$("].iter().any(|s| a.value().contains(s)));
+        match attribute {
+            _ if is_tag => Some(format!("xacro:{}", node.tag_name().name())),
+            Some(attribute) => Some(attribute.value().to_owned()),
+            None => None,
+        }
+    });
+    of_xacro.map_or(Ok(()), |found| Err(DescriptionError::Xacro(found)))
+}
+
+/// Fails for a link with a number that is not finite.
+fn check_numbers(link: &urdf_rs::Link) -> Result<(), DescriptionError> {
+    use urdf_rs::Geometry;
+    let of_pose = |pose: &urdf_rs::Pose| [pose.xyz.0, pose.rpy.0].concat();
+    let of_geometry = |geometry: &Geometry| match geometry {
+        Geometry::Box { size } => size.0.to_vec(),
+        Geometry::Cylinder { radius, length } | Geometry::Capsule { radius, length } => {
+            vec![*radius, *length]
+        }
+        Geometry::Sphere { radius } => vec![*radius],
+        Geometry::Mesh { scale, .. } => scale.map_or(vec![], |scale| scale.0.to_vec()),
+    };
+    let urdf_rs::Inertial {
+        origin,
+        mass,
+        inertia: i,
+    } = &link.inertial;
+    let of_mass = [mass.value, i.ixx, i.ixy, i.ixz, i.iyy, i.iyz, i.izz];
+    let visual = (link.visual.iter()).map(|v| (&v.origin, &v.geometry));
+    let collision = (link.collision.iter()).map(|c| (&c.origin, &c.geometry));
+    let of_shapes =
+        (visual.chain(collision)).flat_map(|(pose, of)| [of_pose(pose), of_geometry(of)].concat());
+    let mut numbers = of_mass.into_iter().chain(of_pose(origin)).chain(of_shapes);
+    match numbers.all(f64::is_finite) {
+        true => Ok(()),
+        false => Err(DescriptionError::NotFinite(format!("link {}", link.name))),
+    }
 }
 
 fn joint_model(

@@ -92,7 +92,11 @@ impl Build {
         let footprint = standing.iter().map(radius).fold(0.0, f32::max);
         Self {
             is_fixed,
-            lift: -lowest(standing),
+            // A base without a surface stands on the ground, and the links above it need no room.
+            lift: match is_fixed && base_points.is_empty() {
+                true => (-lowest(standing)).max(0.0),
+                false => -lowest(standing),
+            },
             footprint: footprint.clamp(LEAST_FOOTPRINT.min(0.5 * size), size),
             size,
             tip: if is_fixed {

@@ -436,8 +436,11 @@ impl RobotSimulation {
         }
     }
 
-    /// Whether a robot that is not fixed is still on the scan: not below its lowest point.
+    /// Whether the robot is fixed or still on the scan: not below its lowest point.
     pub fn is_on_scan(&self) -> bool {
+        if self.build.is_fixed {
+            return true;
+        }
         let lowest = (self.scan.points().iter().map(|&p| p.dot(self.up))).fold(f32::MAX, f32::min);
         self.root().translation.dot(self.up) >= lowest - 0.1
     }

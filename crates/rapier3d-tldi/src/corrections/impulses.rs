@@ -1,6 +1,8 @@
 //! Impulses outside of rapier's solver: bodies that have to separate at points.
 
-use rapier3d::dynamics::{RigidBodyHandle, RigidBodySet, RigidBodyVelocity};
+use rapier3d::dynamics::{
+    RigidBody, RigidBodyDominance, RigidBodyHandle, RigidBodySet, RigidBodyType, RigidBodyVelocity,
+};
 use rapier3d::geometry::Collider;
 use rapier3d::math::Vector;
 
@@ -27,15 +29,29 @@ pub(crate) fn may_separate(collider1: &Collider, collider2: &Collider) -> bool {
     !collider1.is_sensor() && !collider2.is_sensor() && groups[0].test(groups[1])
 }
 
-/// Velocity that a unit of impulse along `normal` at `point` gives to a body.
+/// Whether impulses between two bodies move each: dynamic ones which the other does not dominate.
+fn movable(
+    bodies: &RigidBodySet,
+    pair: [Option<RigidBodyHandle>; 2],
+) -> [Option<RigidBodyHandle>; 2] {
+    let found = pair.map(|body| bodies.get(body?));
+    let dominance = found.map(|body| {
+        let fixed = RigidBodyDominance::default().effective_group(&RigidBodyType::Fixed);
+        body.map_or(fixed, RigidBody::effective_dominance_group)
+    });
+    let moves =
+        |k: usize| found[k].is_some_and(RigidBody::is_dynamic) && dominance[k] <= dominance[1 - k];
+    [0, 1].map(|k| pair[k].filter(|_| moves(k)))
+}
+
+/// Velocity that a unit of impulse along `normal` at `point` gives to a body that moves.
 fn velocity_per_impulse(
     bodies: &RigidBodySet,
     body: Option<RigidBodyHandle>,
     point: Vector,
     normal: Vector,
 ) -> RigidBodyVelocity<f32> {
-    let body = body.and_then(|body| bodies.get(body));
-    let Some(body) = body.filter(|body| body.is_dynamic()) else {
+    let Some(body) = body.and_then(|body| bodies.get(body)) else {
         return RigidBodyVelocity::zero();
     };
     let mass = body.mass_properties();
@@ -73,13 +89,10 @@ impl PushedPoint {
         let separating = (velocity_at(bodies, second, self.point)
             - velocity_at(bodies, first, self.point))
         .dot(self.normal);
-        let gained = self
-            .bodies
-            .map(|body| velocity_per_impulse(bodies, body, self.point, self.normal));
-        let mobility: f32 = self
-            .bodies
-            .iter()
-            .zip(&gained)
+        let movable = movable(bodies, self.bodies);
+        let gained =
+            movable.map(|body| velocity_per_impulse(bodies, body, self.point, self.normal));
+        let mobility: f32 = (movable.iter().zip(&gained))
             .filter_map(|(body, gained)| {
                 let com = bodies.get((*body)?)?.center_of_mass();
                 Some(gained.velocity_at_point(self.point, com).dot(self.normal))
@@ -94,9 +107,8 @@ impl PushedPoint {
         if change == 0.0 {
             return;
         }
-        for ((body, gained), sign) in self.bodies.iter().zip(gained).zip([-1.0, 1.0]) {
-            let body = body.and_then(|body| bodies.get_mut(body));
-            if let Some(body) = body.filter(|body| body.is_dynamic()) {
+        for ((body, gained), sign) in movable.into_iter().zip(gained).zip([-1.0, 1.0]) {
+            if let Some(body) = body.and_then(|body| bodies.get_mut(body)) {
                 let linvel = body.linvel() + sign * change * gained.linvel;
                 let angvel = body.angvel() + sign * change * gained.angvel;
                 body.set_linvel(linvel, true);

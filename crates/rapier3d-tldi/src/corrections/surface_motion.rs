@@ -25,9 +25,10 @@ pub(crate) struct SurfaceMotions {
     /// does not move.
     undoing: [f32; 2],
     dt: f32,
-    /// Least closing speed at which bodies are pushed, or were pushed in this step, m/s.
-    least_push: f32,
-    pushed: bool,
+    /// Least closing speed at which bodies are pushed, m/s.
+    pub(crate) least_push: f32,
+    /// The pairs that were pushed in this step.
+    pub(crate) pushed: Vec<[ColliderHandle; 2]>,
     /// Memory of those that were forgotten.
     spare: Vec<Vec<Vector>>,
     spare_snapshots: Vec<Snapshot>,
@@ -38,6 +39,8 @@ struct SurfaceMotion {
     collider: ColliderHandle,
     /// Of the points whose velocities these are. The collider may get others without a word to the pipeline.
     revision: u64,
+    /// The points that [`SurfaceMotions::before`] gave before the first deformation since the last step.
+    before: Vec<Vector>,
     /// Of each point, in the collider's frame, m/s; not finite where the point was not there before.
     velocities: Vec<Vector>,
 }
@@ -91,24 +94,29 @@ impl SurfaceMotions {
         snapshot
     }
 
-    /// Records that the points [`before`](Self::before) moved to those of `shape`, as many, within `dt` seconds.
+    /// Records that the points [`before`](Self::before) moved to those of `shape`, as many, within `dt` seconds. Of several
+    /// times since the last step, all points of the first count.
     pub(crate) fn record(
         &mut self,
         collider: ColliderHandle,
-        before: Vec<Vector>,
+        mut before: Vec<Vector>,
         shape: &PointCloudShape,
         dt: f32,
     ) {
+        let earlier = self.motions.iter_mut().find(|m| m.collider == collider);
+        if let Some(motion) = earlier.filter(|m| m.before.len() == before.len()) {
+            std::mem::swap(&mut motion.before, &mut before);
+        }
         self.forget(collider);
         let cloud = shape.cloud();
         let mut velocities = self.spare.pop().unwrap_or_default();
         velocities.clear();
         let points = cloud.points().iter().enumerate();
         velocities.extend(points.map(|(i, new)| (*new - before[cloud.given_index(i)]) / dt));
-        self.spare.push(before);
         self.motions.push(SurfaceMotion {
             collider,
             revision: shape.revision(),
+            before,
             velocities,
         });
     }
@@ -145,9 +153,11 @@ impl SurfaceMotions {
         }
     }
 
-    fn forget_velocities(&mut self, collider: ColliderHandle) {
+    /// The points of this collider no longer move as they were deformed.
+    pub(crate) fn forget_velocities(&mut self, collider: ColliderHandle) {
         if let Some(at) = self.motions.iter().position(|m| m.collider == collider) {
-            self.spare.push(self.motions.swap_remove(at).velocities);
+            let motion = self.motions.swap_remove(at);
+            self.spare.extend([motion.before, motion.velocities]);
         }
     }
 
@@ -158,23 +168,19 @@ impl SurfaceMotions {
             integration.contact_softness,
             integration.static_contact_softness,
         ];
-        self.undoing = softness.map(|softness| 1.0 / softness.erp_inv_dt(substep));
+        let rates = softness.map(|softness| softness.erp_inv_dt(substep));
+        // Where rapier undoes no penetration, a deeper one does not help.
+        self.undoing = rates.map(|rate| if rate > 0.0 { 1.0 / rate } else { 0.0 });
         self.dt = integration.dt;
         self.least_push = LEFT_TO_CORRECTION * integration.max_corrective_velocity();
-        self.pushed = false;
-    }
-
-    /// Least closing speed at which bodies are pushed, m/s. Records that they were.
-    pub(crate) fn begin_push(&mut self) -> f32 {
-        self.pushed = true;
-        self.least_push
+        self.pushed.clear();
     }
 
     /// After a step, surfaces that deformed stand still until they are moved again. Those that are
     /// sampled anew every few steps go on until the next sampling is due.
     pub(crate) fn clear(&mut self) {
-        self.spare
-            .extend(self.motions.drain(..).map(|motion| motion.velocities));
+        let motions = self.motions.drain(..);
+        (self.spare).extend(motions.flat_map(|motion| [motion.before, motion.velocities]));
         for motion in &mut self.sampled {
             motion.age += 1;
         }
@@ -311,13 +317,15 @@ impl PhysicsHooks for TldiHooks<'_> {
         if self.motions.motions.iter().any(deforms)
             && let Some(rigid) = context.rigid_mut()
         {
+            let is_pushed = (self.motions.pushed.iter())
+                .any(|pair| pair.contains(&collider1) && pair.contains(&collider2));
             for contact in rigid.solver_contacts.iter_mut() {
                 // Inside a hook the anchors are in world space.
                 let of = |collider, anchor| self.motions.at(collider, sets, anchor, *rigid.normal);
                 let velocity = of(collider1, contact.anchor1) - of(collider2, contact.anchor2);
                 let closing = velocity.dot(*rigid.normal).max(0.0);
                 contact.tangent_velocity += velocity;
-                if !(self.motions.pushed && closing > self.motions.least_push) {
+                if !(is_pushed && closing > self.motions.least_push) {
                     contact.dist -= undoing * closing;
                 }
             }

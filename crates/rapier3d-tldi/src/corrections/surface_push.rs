@@ -11,7 +11,7 @@ use crate::corrections::surface_motion::SurfaceMotions;
 use crate::narrow_phase::parts::PartPair;
 use crate::step::candidates::pose_of;
 use crate::step::prepared::Batch;
-use rapier3d::dynamics::{IntegrationParameters, RigidBodySet};
+use rapier3d::dynamics::{IntegrationParameters, LockedAxes, RigidBody, RigidBodySet};
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet, SolverFlags};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::pipeline::{ActiveHooks, PairFilterContext, PhysicsHooks};
@@ -22,19 +22,26 @@ use tldi::PairResult;
 /// in any suite.
 const UNDONE_IN: f32 = 6.0;
 
-/// Gives the bodies in the way of surfaces that close faster than `least_speed` m/s their velocity. `hooks` are the
-/// user's.
+/// Gives the bodies in the way of surfaces that close faster than [`SurfaceMotions::least_push`] their velocity. `hooks` are the
+/// user's. Returns the pairs that are pushed where this is needed. Links of multibodies, whose velocities are those of their
+/// joints, and bodies with locked translations are left to rapier.
 pub(crate) fn push(
     motions: &SurfaceMotions,
-    least_speed: f32,
     batch: &Batch,
     bodies: &mut RigidBodySet,
     colliders: &ColliderSet,
     integration: &IntegrationParameters,
     hooks: &dyn PhysicsHooks,
-) {
-    let mut points = Vec::new();
-    for pair in batch.pairs.iter().filter(|pair| !pair.is_kept) {
+) -> Vec<[ColliderHandle; 2]> {
+    let (mut points, mut pushed) = (Vec::new(), Vec::new());
+    if integration.dt <= 0.0 {
+        return pushed;
+    }
+    for pair in batch
+        .pairs
+        .iter()
+        .filter(|pair| !pair.is_kept && !pair.has_link)
+    {
         if !motions.have(pair.colliders) {
             continue;
         }
@@ -48,6 +55,10 @@ pub(crate) fn push(
             continue;
         }
         let of = [collider1, collider2].map(Collider::parent);
+        if of.iter().flatten().any(|&body| is_guided(&bodies[body])) {
+            continue;
+        }
+        pushed.push(pair.colliders);
         let pose1 = pose_of(collider1, bodies);
         let parts = &batch.parts[pair.parts.clone()];
         for (on_surface, normal, gap) in contacts(parts, &batch.results, &pose1) {
@@ -63,7 +74,7 @@ pub(crate) fn push(
             let speed = (velocity(0) - velocity(1)).dot(normal);
             let closing =
                 (velocity_at(bodies, of[0], point) - velocity_at(bodies, of[1], point)).dot(normal);
-            if speed > least_speed && gap < (speed + closing) * integration.dt {
+            if speed > motions.least_push && gap < (speed + closing) * integration.dt {
                 points.push(PushedPoint {
                     bodies: of,
                     point,
@@ -75,6 +86,15 @@ pub(crate) fn push(
         }
     }
     separate(&mut points, bodies);
+    pushed
+}
+
+/// Whether a body cannot move everywhere: a blow would spin it.
+fn is_guided(body: &RigidBody) -> bool {
+    body.is_dynamic()
+        && body
+            .locked_axes()
+            .intersects(LockedAxes::TRANSLATION_LOCKED)
 }
 
 /// Whether the user's hooks let rapier's solver separate the colliders.

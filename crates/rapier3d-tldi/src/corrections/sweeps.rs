@@ -132,6 +132,7 @@ mod tests {
                     colliders.insert_with_parent(of_ball, body, &mut bodies),
                 ],
                 bodies: [None, Some(body)],
+                has_link: false,
                 poses: [Pose::IDENTITY; 2],
                 question: Question::Contacts(0.1),
                 parts: 0..0,
@@ -198,6 +199,7 @@ mod tests {
             let prepared = PreparedPair {
                 colliders: [k as u32, 9].map(|i| ColliderHandle::from_raw_parts(i, 0)),
                 bodies: [None; 2],
+                has_link: false,
                 poses: [pose, at],
                 question,
                 parts: first..batch.parts.len(),

@@ -114,7 +114,7 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for TldiDispatc
         manifolds: &mut Vec<ContactManifold>,
         workspace: &mut Option<ContactManifoldsWorkspace>,
     ) -> Result<(), Unsupported> {
-        Self::accept(shape1, shape2)?;
+        Self::accept(shape1, shape2).inspect_err(|_| manifolds::leave(manifolds, workspace))?;
         let pair = ShapePair {
             shape1,
             shape2,

@@ -51,7 +51,7 @@ pub(crate) fn keep(
     workspace: &mut Option<ContactManifoldsWorkspace>,
 ) -> bool {
     let measured = workspace_of(workspace).measured;
-    let holds = measured.is_some_and(|measured| measured.holds(&pair.pos12, pair.prediction));
+    let holds = measured.is_some_and(|measured| measured.holds(pair));
     if !holds {
         return false;
     }
@@ -60,6 +60,22 @@ pub(crate) fn keep(
         manifold.update_separations(&pair.pos12);
     }
     true
+}
+
+/// Lets go of a pair that holds a cloud no longer. Rapier drops its workspace then, but keeps its manifolds: of several, it
+/// would fill the first, and the others would touch for ever. It counts manifolds anew only of pairs with a workspace.
+pub(crate) fn leave(
+    manifolds: &mut Vec<ContactManifold>,
+    workspace: &mut Option<ContactManifoldsWorkspace>,
+) {
+    match workspace {
+        None if manifolds.len() > 1 => {
+            manifolds.clear();
+            *workspace = Some(ManifoldWorkspace::default().into());
+        }
+        Some(ours) if ours.0.is::<ManifoldWorkspace>() => *workspace = None,
+        _ => (),
+    }
 }
 
 /// Replaces a pair's manifolds by those of `parts`, whose comparisons have the results `results`,

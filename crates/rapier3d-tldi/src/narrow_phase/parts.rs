@@ -19,9 +19,12 @@ pub(crate) fn cloud_of(shape: &dyn Shape) -> Option<&PointCloudShape> {
 
 /// The clouds that a shape consists of: itself, or parts of a compound.
 pub(crate) fn clouds_of(shape: &dyn Shape) -> impl Iterator<Item = &PointCloud<'static>> {
-    (0..part_count(shape))
-        .filter_map(move |i| cloud_of(part(shape, i).1))
-        .map(PointCloudShape::cloud)
+    cloud_shapes_of(shape).map(PointCloudShape::cloud)
+}
+
+/// The same as shapes.
+pub(crate) fn cloud_shapes_of(shape: &dyn Shape) -> impl Iterator<Item = &PointCloudShape> {
+    (0..part_count(shape)).filter_map(move |i| cloud_of(part(shape, i).1))
 }
 
 /// Whether the shape is a cloud or a compound that holds one.

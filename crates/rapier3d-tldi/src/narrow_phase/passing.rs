@@ -26,6 +26,7 @@ pub(crate) struct Told {
 impl Told {
     /// Looks for the first candidate that passes and was not reported so far.
     pub(crate) fn look_for_passing(&mut self, candidates: &[Candidate], colliders: &ColliderSet) {
+        self.colliders.retain(|&known| colliders.contains(known));
         let passing = |[collider, other]: [ColliderHandle; 2]| {
             let reason = passes(colliders.get(collider)?)?;
             let is_new =

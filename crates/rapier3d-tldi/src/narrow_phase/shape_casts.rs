@@ -152,13 +152,17 @@ fn first_of_parts(
     pair: &ShapePair<'_>,
     cast: impl Fn([&dyn Shape; 2], [u32; 2], [Pose; 2]) -> Result<Option<ShapeCastHit>, Unsupported>,
 ) -> Result<Option<ShapeCastHit>, Unsupported> {
+    let is_single = part_count(pair.shape1) * part_count(pair.shape2) == 1;
     let mut first: Option<ShapeCastHit> = None;
     for i in 0..part_count(pair.shape1) {
         for j in 0..part_count(pair.shape2) {
             let ((pose1, part1), (pose2, part2)) = (part(pair.shape1, i), part(pair.shape2, j));
             let [pose1, pose2] = [pose1, pose2].map(|p| p.copied().unwrap_or(Pose::IDENTITY));
-            let Some(hit) = cast([part1, part2], [i, j], [pose1, pose2])? else {
-                continue;
+            let hit = match cast([part1, part2], [i, j], [pose1, pose2]) {
+                Ok(Some(hit)) => hit,
+                Err(Unsupported) if is_single => return Err(Unsupported),
+                // A part without a surface passes, and the others meet.
+                Ok(None) | Err(Unsupported) => continue,
             };
             if first.is_none_or(|first| hit.time_of_impact < first.time_of_impact) {
                 first = Some(ShapeCastHit {
@@ -213,7 +217,8 @@ fn straight_impact(
         [options.max_time_of_impact, options.target_distance].map(f64::from);
     let direction = velocity.as_dvec3().try_normalize()?;
     // A cast without an end is one of the longest that there is.
-    let length = (speed * max_time + target_distance).min(f64::from(f32::MAX));
+    let ahead = target_distance / f64::from(LEAST_COSINE);
+    let length = (speed * max_time + ahead).min(f64::from(f32::MAX));
     let way = StraightWay::new(moving.parts, &a_from_b, length * direction, &params)?;
     let [a, b] = moving.parts.map(ExactShape);
     let query = ImpactQuery {

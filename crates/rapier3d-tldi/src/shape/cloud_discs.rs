@@ -2,6 +2,7 @@
 
 use crate::PointCloudShape;
 use rapier3d::glamx::Vec3;
+use rapier3d::parry::bounding_volume::{Aabb, BoundingVolume};
 use rapier3d::parry::partitioning::BvhNode;
 use rapier3d::parry::query::{PointProjection, PointQuery, Ray, RayCast, RayIntersection};
 use rapier3d::parry::shape::FeatureId;
@@ -16,6 +17,28 @@ impl PointCloudShape {
                 |leaf, _| Some(self.cloud().point(leaf as usize).distance(point)),
             )
             .map(|(leaf, _)| leaf as usize)
+    }
+
+    /// Whether `point`, whose nearest sample this is, lies behind the surface, if the cloud tells its outside. Beyond an edge
+    /// the nearest sample may belong to the face around the corner: of those within two radii of it, the one whose normal is
+    /// most along the way to the point decides.
+    pub(crate) fn is_behind(&self, nearest: usize, point: Vec3) -> bool {
+        let cloud = self.cloud();
+        let Some(normals) = cloud.normals().filter(|_| cloud.normals_oriented()) else {
+            return false;
+        };
+        let sample = cloud.point(nearest);
+        let offset = point - sample;
+        let reach = 2.0 * cloud.radius(nearest);
+        let around = Aabb::new(sample, sample).loosened(reach);
+        let is_near = |leaf: &u32| cloud.point(*leaf as usize).distance(sample) <= reach;
+        let along = |leaf: u32| normals[leaf as usize].dot(offset);
+        let near = self.bvh().intersect_aabb(&around).filter(is_near);
+        let order = |a: &u32, b: &u32| {
+            let by_way = along(*a).abs().total_cmp(&along(*b).abs());
+            by_way.then(b.cmp(a))
+        };
+        near.max_by(order).is_some_and(|leaf| along(leaf) < 0.0)
     }
 
     /// Where the line of `ray` passes through the disc of a point, in units of the direction.
@@ -69,8 +92,8 @@ impl PointQuery for PointCloudShape {
     }
 
     /// The point of the nearest sample's disc that is nearest to `point`, and the index of that
-    /// sample. Where normals are oriented, a point behind the disc is inside; for an open scan
-    /// that is all that lies behind it. A point that is not finite is its own projection.
+    /// sample. Where normals are oriented, a point behind the discs is inside; for an open scan
+    /// that is all that lies behind it. Far beyond a sharp edge or tip, one in a hundred points may count to the wrong side. A point that is not finite is its own projection.
     fn project_local_point_and_get_feature(&self, point: Vec3) -> (PointProjection, FeatureId) {
         let Some(index) = self.nearest(point) else {
             return (PointProjection::new(false, point), FeatureId::Unknown);
@@ -84,7 +107,9 @@ impl PointQuery for PointCloudShape {
         let height = normals[index].dot(point - sample);
         let along = point - sample - height * normals[index];
         let foot = sample + along.clamp_length_max(cloud.radius(index));
-        let is_inside = cloud.normals_oriented() && height < 0.0;
-        (PointProjection::new(is_inside, foot), feature)
+        (
+            PointProjection::new(self.is_behind(index, point), foot),
+            feature,
+        )
     }
 }

@@ -99,6 +99,16 @@ impl std::fmt::Debug for PointCloudShape {
     }
 }
 
+/// The value of `cell`, made where there is none. It is made outside of the cell's lock: a thread that waits for others
+/// there may take up work that asks for the same value.
+fn made_once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
+    if let Some(value) = cell.get() {
+        return value;
+    }
+    let made = make();
+    cell.get_or_init(|| made)
+}
+
 impl PointCloudShape {
     /// A shape over `cloud`, with the mass of the solid that it encloses.
     ///
@@ -359,7 +369,7 @@ impl PointCloudShape {
     pub(crate) fn surface_normals(&self) -> &[Vec3] {
         let cloud = self.cloud();
         cloud.normals().unwrap_or_else(|| {
-            self.content.fitted_normals.get_or_init(|| {
+            let made = made_once(&self.content.fitted_normals, || {
                 let points: Vec<Vec3> = cloud.points().to_vec();
                 let with_normals = PointCloud::builder(points)
                     .radius(cloud.max_radius())
@@ -368,7 +378,8 @@ impl PointCloudShape {
                     .expect("the points of a valid cloud are valid");
                 let normals = with_normals.normals();
                 normals.expect("they were asked for").to_vec()
-            })
+            });
+            made
         })
     }
 }
@@ -430,10 +441,9 @@ impl Shape for PointCloudShape {
     }
 
     fn mass_properties(&self, density: f32) -> MassProperties {
-        let unit = self
-            .content
-            .unit_mass
-            .get_or_init(|| mass_properties(self.cloud(), self.mass_model()));
+        let unit = made_once(&self.content.unit_mass, || {
+            mass_properties(self.cloud(), self.mass_model())
+        });
         MassProperties::with_principal_inertia_frame(
             unit.local_com,
             unit.mass() * density,

@@ -59,7 +59,7 @@ impl<'a> Frame<'a> {
         let kept = self
             .memory
             .measured(colliders)
-            .filter(|measured| !is_measured_anew && measured.holds(&pos12, prediction));
+            .filter(|measured| !is_measured_anew && measured.holds(&pair));
         let first_part = batch.parts.len();
         if kept.is_none() {
             let looked_for = ShapePair {
@@ -72,13 +72,17 @@ impl<'a> Frame<'a> {
             PreparedPair {
                 colliders,
                 bodies: [collider1, collider2].map(Collider::parent),
+                has_link: candidate.has_link,
                 poses: [pose1, pose2],
                 question,
                 parts: first_part..batch.parts.len(),
                 used: AtomicBool::new(false),
                 blocked: Mutex::default(),
                 is_kept: kept.is_some(),
-                measured: kept.or_else(|| Measured::new(&pair, self.config)),
+                measured: kept.or_else(|| match question {
+                    Question::Contacts(_) => Measured::new(&pair, self.config),
+                    Question::Crossing => None,
+                }),
                 shapes: [collider1, collider2].map(|c| c.shared_shape().clone()),
             },
             &pos12,
@@ -361,6 +365,7 @@ mod tests {
             let prepared = PreparedPair {
                 colliders,
                 bodies: [None; 2],
+                has_link: false,
                 poses: [turned; 2],
                 question: Question::Contacts(pair.prediction),
                 parts: 0..1,

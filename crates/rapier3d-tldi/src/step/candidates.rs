@@ -31,6 +31,8 @@ pub(crate) struct Candidate {
     pub(crate) collider2: ColliderHandle,
     /// Rapier is not going to update the pair: no side is awake or was changed.
     pub(crate) asleep: bool,
+    /// Whether one of the bodies is a link of a multibody.
+    pub(crate) has_link: bool,
 }
 
 /// All joints of a world.
@@ -40,6 +42,12 @@ pub(crate) struct Joints<'a> {
 }
 
 impl Joints<'_> {
+    /// Whether the collider's body is a link of a multibody.
+    fn has_link(&self, collider: &Collider) -> bool {
+        let link = |body| self.multibody.rigid_body_link(body);
+        collider.parent().and_then(link).is_some()
+    }
+
     /// Whether rapier drops contacts between the two bodies, by the rules of rapier3d's `narrow_phase/pair_update.rs`.
     fn keep_apart(&self, body1: RigidBodyHandle, body2: RigidBodyHandle) -> bool {
         let mut between = self.impulse.joints_between(body1, body2);
@@ -177,6 +185,7 @@ impl CandidateSearch {
                         collider1,
                         collider2,
                         asleep: !is_updated(c1, &collider1) && !is_updated(c2, &collider2),
+                        has_link: [c1, c2].into_iter().any(|c| joints.has_link(c)),
                     });
                 }
             }

@@ -7,7 +7,7 @@
 //! distance that does not depend on the cloud.
 
 use crate::TldiConfig;
-use crate::narrow_phase::parts::{PartPair, ShapePair, clouds_of};
+use crate::narrow_phase::parts::{PartPair, ShapePair, cloud_shapes_of, clouds_of};
 use rapier3d::math::Pose;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::shape::Shape;
@@ -31,6 +31,8 @@ pub(crate) fn rolls(parts: &[PartPair], results: &[PairResult]) -> bool {
 pub(crate) struct Measured {
     pos12: Pose,
     prediction: f32,
+    /// Of the points: the user may change them without a word to the pipeline.
+    revision: u64,
     /// Bounds of the smaller shape, in its own frame: only where it is can there be contacts.
     bounds: Aabb,
     shape1_is_smaller: bool,
@@ -64,15 +66,17 @@ impl Measured {
         (max_drift > 0.0).then_some(Self {
             pos12: pair.pos12,
             prediction: pair.prediction,
+            revision: revision_of(pair),
             bounds: bounds[usize::from(!shape1_is_smaller)],
             shape1_is_smaller,
             max_drift,
         })
     }
 
-    /// Whether the contacts still hold at this relative pose.
-    pub(crate) fn holds(&self, pos12: &Pose, prediction: f32) -> bool {
-        if prediction != self.prediction {
+    /// Whether the contacts still hold for the pair where it is now.
+    pub(crate) fn holds(&self, pair: &ShapePair<'_>) -> bool {
+        let pos12 = &pair.pos12;
+        if pair.prediction != self.prediction || revision_of(pair) != self.revision {
             return false;
         }
         let (before, now) = if self.shape1_is_smaller {
@@ -87,4 +91,12 @@ impl Measured {
             .into_iter()
             .all(|corner| (now * corner).distance_squared(before * corner) <= limit)
     }
+}
+
+/// A number that another one takes the place of where a cloud of the pair gets other points.
+fn revision_of(pair: &ShapePair<'_>) -> u64 {
+    let clouds = cloud_shapes_of(pair.shape1).chain(cloud_shapes_of(pair.shape2));
+    clouds.fold(0, |sum: u64, cloud| {
+        sum.wrapping_mul(31).wrapping_add(cloud.revision())
+    })
 }

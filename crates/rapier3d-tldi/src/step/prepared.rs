@@ -74,6 +74,8 @@ pub(crate) struct PreparedPair {
     pub(crate) colliders: [ColliderHandle; 2],
     /// Of the colliders.
     pub(crate) bodies: [Option<RigidBodyHandle>; 2],
+    /// Whether one of these is a link of a multibody.
+    pub(crate) has_link: bool,
     /// Of the colliders in world space.
     pub(crate) poses: [Pose; 2],
     /// What rapier is expected to ask.

@@ -57,6 +57,8 @@ pub struct CloudStream {
     normals: Vec<Vector>,
     radii: Vec<f32>,
     last_radius: Option<f32>,
+    /// Whether the stream disabled the collider, since there are no points.
+    is_hidden: bool,
 }
 
 /// What a sensor saw in a frame, in its own frame, metres; points alone become one by `into`.
@@ -152,6 +154,7 @@ impl CloudStream {
             normals: Vec::new(),
             radii: Vec::new(),
             last_radius: None,
+            is_hidden: true,
         })
     }
 
@@ -280,7 +283,9 @@ impl CloudStream {
         };
         self.last_radius = Some(cloud.mean_radius());
         tldi.set_collider_cloud(colliders, collider, cloud)?;
-        if let Some(collider) = colliders.get_mut(collider).filter(|c| !c.is_enabled()) {
+        if std::mem::take(&mut self.is_hidden)
+            && let Some(collider) = colliders.get_mut(collider)
+        {
             collider.set_enabled(true);
         }
         Ok(taken)
@@ -329,13 +334,18 @@ impl CloudStream {
     }
 
     /// Disables the collider, without its points.
-    fn clear(&self, tldi: &mut TldiPipeline, colliders: &mut ColliderSet) -> Result<(), TldiError> {
+    fn clear(
+        &mut self,
+        tldi: &mut TldiPipeline,
+        colliders: &mut ColliderSet,
+    ) -> Result<(), TldiError> {
         let collider = self.collider;
         let empty = stand_in().map_err(|source| TldiError::Cloud { collider, source })?;
         tldi.set_collider_cloud(colliders, collider, empty.cloud().clone())?;
         if let Some(collider) = colliders.get_mut(collider) {
             collider.set_enabled(false);
         }
+        self.is_hidden = true;
         Ok(())
     }
 }

@@ -93,8 +93,5 @@ fn is_on_cloud(shape: &PointCloudShape, point: Vector, margin: f32) -> bool {
     if !cloud.normals_oriented() {
         return is_near && height.abs() <= margin;
     }
-    let aside = (offset - height * normal).length();
-    // Beyond an edge, the nearest sample may belong to the face around the corner.
-    let is_behind = height < 0.0 && aside < 2.0 * -height;
-    is_near && height <= margin || is_behind
+    is_near && height <= margin || shape.is_behind(nearest, point)
 }

@@ -4,6 +4,7 @@
 mod common;
 
 mod ccd;
+mod changes;
 mod hooks;
 mod pipeline;
 mod refusals;

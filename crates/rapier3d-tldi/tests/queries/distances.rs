@@ -8,6 +8,7 @@ use rapier3d::parry::shape::Shape;
 use rapier3d::prelude::*;
 use rapier3d_tldi::TldiDispatcher;
 use rapier3d_tldi::prelude::*;
+use rayon::prelude::*;
 
 fn dispatcher() -> TldiDispatcher {
     TldiPipeline::new(TldiConfig::default())
@@ -340,4 +341,28 @@ fn query_pipeline() -> TestResult {
         }
     }
     Ok(())
+}
+
+/// Many threads ask for distances to clouds whose normals nobody has asked for yet: the work of finding these is shared, and
+/// nobody waits for himself. Without, this test does not end.
+#[test]
+fn first_distances_may_be_asked_for_at_once() {
+    let dispatcher = TldiPipeline::new(TldiConfig::default())
+        .expect("the settings are valid")
+        .dispatcher();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(8).build();
+    let asked = pool.expect("threads can be started").install(|| {
+        let rounds = (0..10).map(|_| {
+            let samples = plane(&mut fastrand::Rng::with_seed(1));
+            let shapes: Vec<PointCloudShape> = (0..24).map(|_| shape(&samples, false)).collect();
+            let above = Pose::from_translation(2.0 * Vector::Y);
+            let found = (0..24 * 16).into_par_iter().map(|k| {
+                let shape = &shapes[k * 7 % 24];
+                dispatcher.distance(&above, shape, &Ball::new(0.1)).is_ok()
+            });
+            found.filter(|is_found| *is_found).count()
+        });
+        rounds.sum::<usize>()
+    });
+    assert_eq!(asked, 10 * 24 * 16);
 }

@@ -386,3 +386,36 @@ fn casts_through_the_query_pipeline() -> TestResult {
     assert!((hit.time_of_impact - 2.3).abs() < TOLERANCE, "{hit:?}");
     Ok(())
 }
+
+/// A ball that flies at 60° to the normal of a square comes within the target distance of it, but does not reach it.
+#[test]
+fn target_distances_count_along_the_normal() -> TestResult {
+    let direction = Vector::new(60f32.to_radians().sin(), -0.5, 0.0);
+    let end = Vector::new(0.0, 0.1 + 0.08, 0.0);
+    let options = ShapeCastOptions {
+        target_distance: 0.1,
+        ..until(0.5)
+    };
+    let start = Pose::from_translation(end - 0.5 * direction);
+    let (floor, ball) = (shape(&square(0.8)), Ball::new(0.1));
+    let hit = dispatcher().cast_shapes(&start, direction, &floor, &ball, options)?;
+    // 2 cm along the normal before the end.
+    let time = hit.ok_or("it comes near")?.time_of_impact;
+    // Normals of slanting impacts are good to 5°, which is 0.03 s here.
+    assert!((time - 0.46).abs() < 0.03, "{time} s");
+    Ok(())
+}
+
+/// A part of a compound that has no surface passes through; the others meet.
+#[test]
+fn a_part_without_a_surface_leaves_the_others() -> TestResult {
+    let floor = shape(&square(0.8));
+    let line = SharedShape::segment(Vector::ZERO, 0.2 * Vector::Y);
+    let ball = (Pose::IDENTITY, SharedShape::ball(0.1));
+    let body = SharedShape::compound(vec![ball, (Pose::IDENTITY, line)]);
+    let start = Pose::from_translation(Vector::Y);
+    let hit = dispatcher().cast_shapes(&start, -Vector::Y, &floor, &*body, until(10.0))?;
+    let time = hit.ok_or("the ball meets the floor")?.time_of_impact;
+    assert!((time - 0.9).abs() < TOLERANCE, "{time} s");
+    Ok(())
+}

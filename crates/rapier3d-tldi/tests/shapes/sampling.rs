@@ -4,7 +4,7 @@ use fastrand::Rng;
 use rapier3d::parry::shape::{HeightField, TriMesh};
 use rapier3d::parry::utils::Array2;
 use rapier3d::prelude::*;
-use rapier3d_tldi::{PointCloud, SampleError, sample_shape};
+use rapier3d_tldi::{CloudError, PointCloud, SampleError, sample_shape};
 use std::f32::consts::{PI, TAU};
 
 const SPACING: f32 = 0.04;
@@ -380,6 +380,16 @@ fn what_has_no_surface_is_refused() {
         (area - 2400.0).abs() < 1e-3 && (least - 0.0169).abs() < 1e-4,
         "{area} {least}"
     );
+    // Where a step of f32 is half a metre, no piece of a triangle is as small as the spacing.
+    let far = [Vector::ZERO, Vector::X, Vector::Z].map(|corner| corner + 5_432_109.0 * Vector::Y);
+    let mesh = TriMesh::new(far.to_vec(), vec![[0, 1, 2]]).expect("rapier takes it");
+    let refused = sample_shape(&mesh, 0.02).map(|c| c.len());
+    let too_far = CloudError::CoordinateTooLarge {
+        index: 0,
+        coordinate: 5_432_109.0,
+        radius: 0.02,
+    };
+    assert_eq!(refused, Err(SampleError::Cloud(too_far)));
     let broken = vec![Vector::ZERO, Vector::X, Vector::Y, Vector::splat(f32::NAN)];
     let mesh = TriMesh::new(broken, vec![[0, 1, 2], [0, 1, 3]]).expect("rapier takes it");
     let refused = sample_shape(&mesh, 0.1).map(|c| c.len());

@@ -4,7 +4,7 @@ use rapier3d::glamx::{Pose3, Vec3};
 use rapier3d::parry::query::{PointQuery, Ray, RayCast};
 use rapier3d::parry::shape::{FeatureId, Shape, ShapeType};
 use rapier3d::prelude::{ColliderBuilder, PhysicsWorld, RigidBodyBuilder, SharedShape};
-use rapier3d_tldi::{CloudError, MassModel, PointCloud, PointCloudShape};
+use rapier3d_tldi::{CloudError, MassModel, PointCloud, PointCloudShape, sample_shape};
 
 fn unit(rng: &mut fastrand::Rng) -> Vec3 {
     loop {
@@ -186,6 +186,39 @@ fn rays_and_projections_find_a_sphere_within_the_stated_error() {
     }
     // Balls of one radius leave e^(-7 · 0.65²) = 5 % of a random sample uncovered.
     assert!(gaps < 25 && inside > 100, "{gaps} {inside}");
+}
+
+/// Far from a sharp shape's samples, hardly any point counts to the wrong side; near them, where depths are as large as
+/// radii, all count to the right one. Beyond a tip or an edge the nearest sample may be of the face around it.
+#[test]
+fn insides_end_at_tips_and_edges() {
+    let mut rng = fastrand::Rng::with_seed(5);
+    for exact in [
+        SharedShape::cone(0.3, 0.25),
+        SharedShape::cone(0.5, 0.15),
+        SharedShape::cuboid(0.3, 0.2, 0.25),
+        SharedShape::cylinder(0.2, 0.2),
+    ] {
+        let shape = PointCloudShape::new(sample_shape(&*exact, 0.02).unwrap());
+        let (mut wrong, mut count) = (0, 0);
+        while count < 4000 {
+            let size = [1.0, 0.35][count % 2];
+            let mut coordinate = || size * (2.0 * rng.f32() - 1.0);
+            let point = Vec3::new(coordinate(), coordinate(), coordinate());
+            let depth = exact.project_local_point(point, false);
+            if (depth.point - point).length() < 0.02 {
+                continue;
+            }
+            count += 1;
+            let found = shape.project_local_point(point, true);
+            wrong += usize::from(found.is_inside != depth.is_inside);
+        }
+        assert!(
+            wrong <= count / 50,
+            "{:?}: {wrong} of {count}",
+            exact.shape_type()
+        );
+    }
 }
 
 #[test]

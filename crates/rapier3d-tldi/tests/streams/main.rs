@@ -4,5 +4,6 @@
 mod common;
 
 mod own_points;
+mod pushing;
 mod set_points;
 mod stream;

@@ -1,7 +1,7 @@
 //! A folder of depth frames.
 
 use super::sensor::Intrinsics;
-use crate::{near_origin, parse_pose};
+use crate::{PoseError, near_origin, parse_pose};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -66,11 +66,11 @@ pub struct DepthFrame {
 pub struct DepthSequence {
     /// The camera.
     pub intrinsics: Intrinsics,
-    /// Frames whose image is there.
+    /// Frames whose image and pose are there.
     pub frames: Vec<DepthFrame>,
     /// Where all places count from in the world, metres: zero but for poses on a map, see [`near_origin`].
     pub origin: DVec3,
-    /// Names of images that are listed but not there.
+    /// Names of images that are listed but not there, or whose pose is not finite: the camera's track was lost.
     pub missing: Vec<String>,
 }
 
@@ -89,17 +89,21 @@ impl DepthSequence {
         let mut missing = Vec::new();
         for (line, text) in lines(&list)? {
             let (name, numbers) = text.split_once(char::is_whitespace).unwrap_or((&text, ""));
-            let pose = parse_pose(numbers).map_err(|error| DepthError::Text {
-                path: list.clone(),
-                line,
-                reason: error.to_string(),
-            })?;
+            let pose = match parse_pose(numbers) {
+                Err(PoseError::NotFinite(_)) => None,
+                told => Some(told.map_err(|error| DepthError::Text {
+                    path: list.clone(),
+                    line,
+                    reason: error.to_string(),
+                })?),
+            };
             let path = folder.join(name);
-            if path.is_file() {
-                images.push(path);
-                poses.push(pose);
-            } else {
-                missing.push(name.to_owned());
+            match pose.filter(|_| path.is_file()) {
+                Some(pose) => {
+                    images.push(path);
+                    poses.push(pose);
+                }
+                None => missing.push(name.to_owned()),
             }
         }
         if images.is_empty() {

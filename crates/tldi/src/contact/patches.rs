@@ -72,8 +72,8 @@ impl PatchScratch {
     /// Confirms the contact pixels of `result`, derives `collides` and `gap` from them as if
     /// normals told inside from outside, and fills the patches, deepest first.
     ///
-    /// The contact pixels may come in any order. Afterwards they are ordered by view, row, column
-    /// and gap, as the stage `compare` finds them. Cost: linear in their number, except for sorting
+    /// The contact pixels may come in any order. Afterwards they are ordered by view, row and column; of one pixel, the
+    /// greatest gap comes first. Each view of a contact pixel has its axis in `result`. Cost: linear in their number, except for sorting
     /// the groups, and the pixels if needed.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         let _stage = stage!("patches");
@@ -285,10 +285,13 @@ fn drop_between_faces(result: &mut PairResult) {
     }
 }
 
-/// Orders contact pixels by view, row, column and gap.
+/// Orders contact pixels by view, row and column; of one pixel, the greatest gap first.
 fn order(contacts: &mut [ContactPixel]) {
     let place = |c: &ContactPixel| (c.view, c.pixel[1], c.pixel[0]);
-    if !contacts.is_sorted_by_key(place) {
-        contacts.sort_unstable_by(|c, d| (place(c).cmp(&place(d))).then(d.gap.total_cmp(&c.gap)));
+    let order = |c: &ContactPixel, d: &ContactPixel| {
+        (place(c).cmp(&place(d))).then(d.gap.total_cmp(&c.gap))
+    };
+    if !contacts.is_sorted_by(|c, d| order(c, d).is_le()) {
+        contacts.sort_by(order);
     }
 }

@@ -56,6 +56,7 @@ const MOST: f32 = 2_147_483_520.0;
 /// instructions.
 #[inline(always)]
 pub(super) fn truncated(value: f32, most: f32) -> u32 {
+    debug_assert!(most.is_nan() || most >= 0.0);
     let value = if value > 0.0 { value } else { 0.0 };
     let most = if most < MOST { most } else { MOST };
     let value = if value < most { value } else { most };

@@ -198,9 +198,9 @@ impl CpuBackend {
 
     fn with_room<R>(&self, room: &mut Room, run: impl FnOnce(&mut Scratch) -> R) -> R {
         self.with_scratch(|scratch| {
-            scratch.room = room.clone();
+            std::mem::swap(&mut scratch.room, room);
             let result = run(scratch);
-            *room = scratch.room.clone();
+            std::mem::swap(&mut scratch.room, room);
             result
         })
     }
@@ -239,12 +239,12 @@ impl Backend for CpuBackend {
         batch: &[PairQuery<'_>],
         results: &mut Vec<PairResult>,
     ) -> Result<(), BackendError> {
-        results.resize_with(batch.len(), PairResult::default);
         for (pair, query) in batch.iter().enumerate() {
             query
                 .check()
                 .map_err(|reason| BackendError::Unsupported { pair, reason })?;
         }
+        results.resize_with(batch.len(), PairResult::default);
         let this = &*self;
         batch
             .par_iter()
@@ -328,7 +328,7 @@ pub fn build(
         };
         if let Some(seen) = side.project(&view) {
             let points = side.points.len();
-            let fragments = side.fragments_in(&view, &seen.rect, points);
+            let fragments = side.fragments_in(&view, &seen.rect, seen.near, points);
             if camera.size.is_none()
                 && room.refuses(Cost::new(&seen.rect, points, fragments))
                 && let Some(coarser) = room.take_wanted()

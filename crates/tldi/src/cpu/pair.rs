@@ -46,7 +46,8 @@ impl Scratch {
         self.room.take_wanted();
         let is_found = match first_look {
             FirstLook::Settled => return,
-            FirstLook::Culled(taken) => taken == strides,
+            // Thinned ones may be those of a first look that reached farther.
+            FirstLook::Culled(taken) => taken == strides && strides == [1, 1],
             FirstLook::Nothing => false,
         };
         let is_near =
@@ -97,14 +98,10 @@ impl Scratch {
                     return false;
                 }
                 let mut axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
-                for view in 0..axes.len() {
-                    self.look_along(query, plan, &axes, view, result);
-                }
+                self.look_along(query, plan, &axes, 0, result);
                 if policy == CameraPolicy::AllDirections && !self.crossings.are_enough() {
                     axes.extend(further_axes(&result.axes));
-                    for view in result.axes.len()..axes.len() {
-                        self.look_along(query, plan, &axes, view, result);
-                    }
+                    self.look_along(query, plan, &axes, result.axes.len(), result);
                 }
             }
         }
@@ -197,16 +194,22 @@ impl Scratch {
         result.gap = found.gap;
     }
 
+    /// Looks along each of `axes` from the `first` on, until one has no room.
     fn look_along(
         &mut self,
         query: &PairQuery,
         plan: &PairPlan,
         axes: &[Vec3],
-        view: usize,
+        first: usize,
         result: &mut PairResult,
     ) {
-        let camera = VirtualCamera::along(axes[view], query.params.pixel_size);
-        self.look(query, plan, &camera, axes, view, result);
+        for view in first..axes.len() {
+            if self.room.has_refused() {
+                return;
+            }
+            let camera = VirtualCamera::along(axes[view], query.params.pixel_size);
+            self.look(query, plan, &camera, axes, view, result);
+        }
     }
 
     /// Builds both images for the camera of `axes[view]` and compares them.

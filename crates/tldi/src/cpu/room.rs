@@ -130,6 +130,11 @@ impl Room {
         share > 1.0
     }
 
+    /// Whether an image was refused since [`take_wanted`](Self::take_wanted).
+    pub(super) fn has_refused(&self) -> bool {
+        self.wanted.is_some()
+    }
+
     /// By how much the pixels of what was refused must be larger.
     pub(super) fn take_wanted(&mut self) -> Option<f32> {
         self.wanted.take()

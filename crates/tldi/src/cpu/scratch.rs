@@ -244,14 +244,14 @@ impl Scratch {
             || side_b.image(b, &imaging, Some(touching)),
         );
         let [drawn_a, drawn_b] = [&self.a, &self.b].map(|side| side.kept.len());
-        self.room.take(self.cost([a, b], &rect, [drawn_a, drawn_b]));
+        (self.room).take(self.cost([a, b], &rect, near, [drawn_a, drawn_b]));
         Some(())
     }
 
-    /// What the images of two clouds take, of so many drawn points each.
-    fn cost(&self, [a, b]: [&CloudView; 2], rect: &Rect, drawn: [usize; 2]) -> Cost {
-        let fragments =
-            self.a.fragments_in(a, rect, drawn[0]) + self.b.fragments_in(b, rect, drawn[1]);
+    /// What the images of two clouds take, of so many drawn points each, the nearest at a depth of `near` metres.
+    fn cost(&self, [a, b]: [&CloudView; 2], rect: &Rect, near: f32, drawn: [usize; 2]) -> Cost {
+        let of_a = self.a.fragments_in(a, rect, near, drawn[0]);
+        let fragments = of_a + self.b.fragments_in(b, rect, near, drawn[1]);
         Cost::new(rect, self.a.points.len() + self.b.points.len(), fragments)
     }
 
@@ -283,7 +283,7 @@ impl Scratch {
             rect = seen_a.rect.intersection(&seen_b.rect)?;
         }
         let all = [side_a.points.len(), side_b.points.len()];
-        let cost = self.cost([a, b], &rect, all);
+        let cost = self.cost([a, b], &rect, seen_a.near.min(seen_b.near), all);
         if camera.size.is_none() && self.room.refuses(cost) {
             return None;
         }

@@ -182,9 +182,15 @@ impl Side {
         self.columns.project(&self.points, largest, view.camera)
     }
 
-    /// About how many fragments an image has in which so many points are drawn.
-    pub(super) fn fragments_in(&self, view: &CloudView, rect: &Rect, drawn: usize) -> f32 {
-        let edge = 2.0 * self.mean_radius(view.cloud) / view.camera.pixel_size_at(0.0);
+    /// About how many fragments an image has in which so many points are drawn, the nearest at a depth of `near` metres.
+    pub(super) fn fragments_in(
+        &self,
+        view: &CloudView,
+        rect: &Rect,
+        near: f32,
+        drawn: usize,
+    ) -> f32 {
+        let edge = 2.0 * self.mean_radius(view.cloud) / view.camera.pixel_size_at(near);
         drawn as f32 * (edge * edge).min(rect.pixels() as f32)
     }
 
@@ -375,7 +381,8 @@ impl Side {
 
     /// What the images of this cloud, of which so many points are drawn, and of an exact surface take.
     fn cost_with(&self, view: &CloudView, look: &ExactView, rect: &Rect, drawn: usize) -> Cost {
-        let fragments = self.fragments_in(view, rect, drawn);
+        // Seen by an orthographic camera: all depths are alike.
+        let fragments = self.fragments_in(view, rect, 0.0, drawn);
         let pixels = rect.pixels() as f32;
         let rays = match look.scope {
             Scope::Everywhere => pixels,

@@ -7,7 +7,7 @@ use crate::BLOCK;
 /// any suite.
 const POINTS_PER_PIXEL: f32 = 8.0;
 
-/// Most near points of a cloud whose normals aim the camera, or that are projected onto an exact
+/// About the most near points of a cloud whose normals aim the camera, or that are projected onto an exact
 /// surface to aim it; more do not sharpen the mean of their normals.
 pub const AIM_SAMPLES: usize = 512;
 
@@ -36,10 +36,10 @@ pub(crate) fn stride_for(points_per_pixel: f32, mean_radius: f32, pixel_size: f3
 /// block to block. Otherwise only some columns would remain of a depth image, whose rows may fill
 /// whole blocks.
 pub fn first_taken(block: usize, stride: usize) -> usize {
-    hash(block as u32) as usize % stride
+    hash(block as u32) as usize % stride.max(1)
 }
 
-/// A mixing of the bits without structure, so that none of a grid of points meets it.
+/// Mixes the bits of an index, so that the choice shows no pattern on points in rows.
 fn hash(index: u32) -> u32 {
     let mut hash = (index ^ (index >> 16)).wrapping_mul(0x7feb_352d);
     hash = (hash ^ (hash >> 15)).wrapping_mul(0x846c_a68b);

@@ -3,9 +3,10 @@
 use crate::cloud::radii;
 use crate::pair::pixels::{least_pixel, least_pixel_within};
 use crate::pair::plan::DepthScale;
+use crate::paper::MAX_PIXELS;
 use crate::{
     DeviceCloud, ImpactQuery, PairQuery, Params, Penetration, Projection, Surface, Variant, View,
-    VirtualCamera, paper,
+    VirtualCamera,
 };
 use glamx::{Pose3, Vec3};
 use std::ops::RangeInclusive;
@@ -63,7 +64,7 @@ impl PairQuery<'_> {
         {
             return Err("a perspective camera needs an image of fixed size");
         }
-        if self.params.variant() == Variant::Paper && most_pixels(self) > paper::MAX_PIXELS as f64 {
+        if self.params.variant() == Variant::Paper && most_pixels(self) > MAX_PIXELS as f64 {
             return Err(
                 "the paper's image may have more than 2^28 pixels: use a larger pixel_size, \
              a smaller image or smaller clouds",
@@ -150,6 +151,10 @@ impl VirtualCamera {
         {
             return Err("the camera's size must be 1 to 2^31 - 1 columns and rows");
         }
+        let pixels = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
+        if self.size.is_some_and(|size| pixels(size) > MAX_PIXELS) {
+            return Err("the camera's image may have at most 2^28 pixels: use fewer");
+        }
         match self.projection {
             Projection::Orthographic { pixel_size } if !Params::LENGTHS.contains(&pixel_size) => {
                 Err("the camera's pixel_size must be 1e-14 to 1e14: choose another")
@@ -214,16 +219,10 @@ impl Params {
     }
 }
 
-/// At least the number of pixels that the paper's image of either cloud has.
+/// At least the number of pixels that the paper's image of either cloud has, where it follows the clouds.
 fn most_pixels(query: &PairQuery) -> f64 {
-    let fixed = match query.view {
-        View::Fixed(camera) => camera.size,
-        View::Aim { .. } => None,
-    };
-    if let Some([width, height]) = fixed {
-        return f64::from(width) * f64::from(height);
-    }
     let pixel_size = match query.view {
+        View::Fixed(camera) if camera.size.is_some() => return 0.0, // checked with the camera
         View::Fixed(camera) => camera.pixel_size_at(0.0),
         View::Aim { .. } => query.params.pixel_size,
     };

@@ -69,6 +69,14 @@ impl Body {
     }
 }
 
+/// A unit vector along `axis`: itself, to the bit, if it is one.
+fn unit(axis: Vec3) -> Option<Vec3> {
+    match axis.is_normalized() {
+        true => Some(axis),
+        false => axis.try_normalize(),
+    }
+}
+
 impl Approach {
     /// `motion` is that of `b` relative to `a` over the step, in the frame of `a`, metres.
     pub(crate) fn new(
@@ -113,7 +121,7 @@ impl Approach {
             lies: toward_b,
             motion,
             body,
-            last_axis,
+            last_axis: last_axis.and_then(unit),
         }
     }
 

@@ -341,6 +341,25 @@ mod tests {
         assert!(still.y < -0.95, "{still}");
     }
 
+    /// A last axis counts by its direction; without one it counts for nothing.
+    #[test]
+    fn a_last_axis_of_any_length_gives_a_unit_axis() {
+        let normals = vec![Vec3::Y; 10];
+        let sides = [zone(&normals, false), zone(&normals, false)];
+        let unit = Aabb {
+            min: -Vec3::ONE,
+            max: Vec3::ONE,
+        };
+        let last = Vec3::new(0.0, -0.99, 0.14).normalize();
+        for (length, kept) in [(0.0, false), (0.5, true), (1.0, true), (100.0, true)] {
+            let above = Pose3::translation(0.0, 1.9, 0.0);
+            let approach = Approach::new(&unit, &unit, &above, Vec3::ZERO, Some(length * last));
+            let axis = zone_axes(sides, &approach)[0];
+            assert!(axis.is_normalized(), "{length}: {axis}");
+            assert_eq!(axis.distance(last) < 1e-6, kept, "{length}: {axis}");
+        }
+    }
+
     /// A motion towards `a` puts `b` on the side that it came from, however deep it is.
     #[test]
     fn motion_tells_where_b_came_from() {

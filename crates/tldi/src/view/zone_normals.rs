@@ -2,11 +2,11 @@
 
 use glamx::Vec3;
 
-/// The other side must face a further axis within 60° ...
+/// Least |n·axis| (60°) at which a point faces an axis. Half or twice the angle: no change in any suite.
 pub(crate) const SUPPORTED: f32 = 0.5;
 
-/// ... with at least this share of its near points. Fewer is noise at the rim of the zone. Half or twice,
-/// and half or twice the angle: no change in any suite.
+/// Least share of a side's near points that must face a further axis. Fewer are noise at the rim of the zone. Half or
+/// twice: no change in any suite.
 pub(crate) const LEAST_SHARE: f32 = 0.05;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
@@ -64,16 +64,18 @@ impl ZoneNormals<'_> {
     fn place(&self, axis: Vec3, keep: impl Fn(f32) -> bool) -> Option<Place> {
         let kept = self.normals.iter().zip(self.points);
         let kept = kept.filter(|(normal, _)| keep(normal.dot(axis)));
+        let mut kept = kept.map(|(_, point)| point.dot(axis)).peekable();
+        // Counted from the first one: far from the origin, squares in `f32` would lose the scatter.
+        let first = *kept.peek()?;
         let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
-        for along in kept.map(|(_, point)| point.dot(axis)) {
+        for off in kept.map(|along| along - first) {
             count += 1.0;
-            sum += along;
-            squares += along * along;
+            sum += off;
+            squares += off * off;
         }
         let mean = sum / count;
-        let is_enough = count > 0.0 && count >= LEAST_SHARE * self.normals.len() as f32;
-        is_enough.then(|| Place {
-            mean,
+        (count >= LEAST_SHARE * self.normals.len() as f32).then(|| Place {
+            mean: first + mean,
             scatter: (squares / count - mean * mean).max(0.0).sqrt(),
         })
     }
@@ -84,16 +86,16 @@ impl ZoneNormals<'_> {
     }
 }
 
-/// How far `a` is beyond `b` along `axis` where they face each other, and how much these places scatter, metres. With
-/// `sign` -1, how far it is before `b`, where both face away from that.
+/// Distance from `b` to `a` along `axis`, and the scatter of both, metres, where they face each other. With `sign` -1, the
+/// same along the opposite of `axis`.
 fn gap([a, b]: &[ZoneNormals; 2], axis: Vec3, sign: f32) -> Option<(f32, f32)> {
     let (of_a, of_b) = (a.facing(axis, -sign)?, b.facing(axis, sign)?);
     let gap = sign * (of_a.mean - of_b.mean);
     Some((gap, of_a.scatter + of_b.scatter))
 }
 
-/// Whether `axis` points from `b` towards `a`, and not the other way, as far as the near points tell: if only so both show
-/// each other their outsides, or are apart by more than these places scatter.
+/// Whether `axis` points from `b` towards `a`. Outward normals decide if the surfaces show each other their outsides in
+/// one order only. Otherwise the mean places decide, if they differ by more than the points scatter. `None`: neither tells.
 ///
 /// Where the outsides are not known all near points count. So two links of a chain are told, whose middles lie on the
 /// wrong sides, but not surfaces that are in each other by as much as their points scatter.
@@ -107,5 +109,32 @@ pub(crate) fn side_by_places(sides: &[ZoneNormals; 2], axis: Vec3) -> Option<boo
         [Some(_), None] => are_oriented.then_some(true),
         [None, Some(_)] => are_oriented.then_some(false),
         [None, None] => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two bare sheets 5 cm apart that are 3 mm rough are told by their places, and others that are 1 mm apart are not,
+    /// wherever the origin is.
+    #[test]
+    fn places_tell_the_side_far_from_the_origin() {
+        let normals = [Vec3::Y; 40];
+        for far in [0.0, 10.0, 100.0, 1000.0] {
+            for (apart, told) in [(0.05, Some(false)), (-0.05, Some(true)), (0.001, None)] {
+                let sheet = |height: f32| {
+                    let rough = |k: usize| 0.003 * (k as f32).sin();
+                    (0..40).map(move |k| Vec3::new(0.1 * k as f32, far + height + rough(k), 0.0))
+                };
+                let points = [0.0, apart].map(|height| sheet(height).collect::<Vec<_>>());
+                let sides = points.each_ref().map(|points| ZoneNormals {
+                    normals: &normals,
+                    points,
+                    oriented: false,
+                });
+                assert_eq!(side_by_places(&sides, Vec3::Y), told, "{far} {apart}");
+            }
+        }
     }
 }

@@ -9,6 +9,7 @@ use patch::{Patch, patches_of};
 use rapier3d::parry::shape::Shape;
 use scatter::Scatter;
 use tldi::PointCloud;
+use tldi::glamx::Vec3;
 
 /// Most squares of the spacing that a surface is sampled with: some ten million points.
 const MOST_SQUARES: f64 = 8_388_608.0; // 2²³
@@ -32,7 +33,7 @@ const MOST_SQUARES: f64 = 8_388_608.0; // 2²³
 /// in proportion to area / spacing².
 ///
 /// # Errors
-/// [`SampleError`]: half-spaces, segments, polylines and custom shapes have no surface to sample.
+/// [`SampleError`]: places farther than 2¹⁹ spacings from the origin cannot be told apart; half-spaces, segments, polylines and custom shapes have no surface to sample.
 ///
 /// ```
 /// use rapier3d::prelude::*;
@@ -57,6 +58,11 @@ pub fn sample_shape(shape: &dyn Shape, spacing: f32) -> Result<PointCloud<'stati
             area,
             least: (area / MOST_SQUARES).sqrt() as f32,
         });
+    }
+    // Refused by the cloud in the end: where coordinates are coarser than the spacing, no piece is small enough.
+    let corners: Vec<Vec3> = parts.iter().flatten().flat_map(|p| p.corners).collect();
+    if !corners.is_empty() {
+        PointCloud::builder(corners).radius(spacing).build()?;
     }
     let mut scatter = Scatter::new(spacing);
     for (part, patches) in parts.iter().enumerate() {

@@ -103,9 +103,13 @@ fn patches_of_part(part: &dyn Shape, pose: Pose) -> Result<Vec<Patch<'_>>, Sampl
         TypedShape::HalfSpace(_)
         | TypedShape::Segment(_)
         | TypedShape::Polyline(_)
-        | TypedShape::Compound(_)
-        | TypedShape::Custom(_) => {
+        | TypedShape::Compound(_) => {
             let shape = format!("{:?}", part.shape_type());
+            return Err(SampleError::NoSurface { shape });
+        }
+        // A cloud that is asked for its type warns of a dispatcher that does not know it.
+        TypedShape::Custom(_) => {
+            let shape = "Custom".to_owned();
             return Err(SampleError::NoSurface { shape });
         }
     };

@@ -83,27 +83,15 @@ impl TldiPipeline {
         points: &[Vector],
         normals: Option<&[Vector]>,
     ) -> Result<(), TldiError> {
-        self.replace_points(colliders, collider, points, normals, |shape| {
-            shape.set_points(points, normals)
-        })
-    }
-
-    /// Lets `change` give the collider these points and normals, unless it has them.
-    fn replace_points(
-        &mut self,
-        colliders: &mut ColliderSet,
-        collider: ColliderHandle,
-        points: &[Vector],
-        normals: Option<&[Vector]>,
-        change: impl FnOnce(&mut PointCloudShape) -> Result<(), CloudError>,
-    ) -> Result<(), TldiError> {
         let shape = cloud_of(colliders, collider)?;
         if shape.cloud().consists_of(points, normals) {
-            self.motions.forget(collider);
+            self.motions.forget_velocities(collider);
             return Ok(());
         }
         let before = self.motions.snapshot(shape.cloud());
-        self.change_shape(colliders, collider, change)?;
+        self.change_shape(colliders, collider, |shape| {
+            shape.set_points(points, normals)
+        })?;
         self.motions.record_sampled(collider, before);
         Ok(())
     }
@@ -205,7 +193,7 @@ impl TldiPipeline {
     /// [`set_points`](Self::set_points) for a surface that deforms: the same points, where they are
     /// a step later. In the step to come they are taken to go on with the velocity that brought
     /// them there, which reaches the contacts: what stands on a floor that slides or rises is
-    /// carried along.
+    /// carried along. The points before the first call since the last step count, if there are several.
     ///
     /// Sets [`ActiveHooks::MODIFY_SOLVER_CONTACTS`] on the collider; the hooks of
     /// [`step_with_events`](Self::step_with_events) see its contacts then, too. Cost beside that of
@@ -283,7 +271,9 @@ impl TldiPipeline {
         normals: Option<&[Vector]>,
         dt: f32,
     ) -> Result<(), TldiError> {
-        let before = self.motions.before(cloud_of(colliders, collider)?.cloud());
+        let cloud = cloud_of(colliders, collider)?.cloud();
+        let before = self.motions.before(cloud);
+        let is_moved = !cloud.consists_of(points, normals);
         if before.len() != points.len() {
             return Err(TldiError::OtherPoints {
                 collider,
@@ -291,17 +281,21 @@ impl TldiPipeline {
                 found: points.len(),
             });
         }
-        self.replace_points(colliders, collider, points, normals, |shape| {
-            shape.move_points(points, normals)
-        })?;
-        let after = cloud_of(colliders, collider)?.clone();
+        if is_moved {
+            self.change_shape(colliders, collider, |shape| {
+                shape.move_points(points, normals)
+            })?;
+        }
         // Without a time there is no velocity.
         if dt > 0.0 {
-            self.motions.record(collider, before, &after, dt);
+            let after = cloud_of(colliders, collider)?;
+            self.motions.record(collider, before, after, dt);
             if let Some(collider) = colliders.get_mut(collider) {
                 let hooks = collider.active_hooks() | ActiveHooks::MODIFY_SOLVER_CONTACTS;
                 collider.set_active_hooks(hooks);
             }
+        } else {
+            self.motions.forget(collider);
         }
         Ok(())
     }

@@ -195,16 +195,16 @@ impl<'a> PointRadii<'a> {
         match self.radii {
             Radii::Global(r) => self.scale * r,
             Radii::PerPoint(r) => {
-                let sum: f32 = self.index.iter().map(|&i| r[i as usize]).sum();
-                self.scale * sum / self.index.len().max(1) as f32
+                let sum: f64 = self.index.iter().map(|&i| f64::from(r[i as usize])).sum();
+                self.scale * (sum / self.index.len().max(1) as f64) as f32
             }
         }
     }
 
     /// Mean over some of the culled points.
     pub(crate) fn mean_of(&self, some: &[u32]) -> f32 {
-        let sum: f32 = some.iter().map(|&i| self.of(i as usize)).sum();
-        sum / some.len().max(1) as f32
+        let sum: f64 = some.iter().map(|&i| f64::from(self.of(i as usize))).sum();
+        (sum / some.len().max(1) as f64) as f32
     }
 
     /// A bound of the radii of the culled points. It is theirs if the cloud is coarser elsewhere, else the cloud's.
@@ -226,5 +226,30 @@ impl<'a> PointRadii<'a> {
             Radii::Global(r) => self.scale * r,
             Radii::PerPoint(r) => self.scale * r[self.index[i] as usize],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The sum of radii that are much less than the one before them keeps them.
+    #[test]
+    fn the_mean_radius_is_that_of_all_points() {
+        let radii: Vec<f32> = (0..1001)
+            .map(|k| if k == 0 { 16_777_216.0 } else { 1.0 })
+            .collect();
+        let points = vec![Vec3::ZERO; radii.len()];
+        let cloud = PointCloud::builder(points).radii(radii).build().unwrap();
+        let survivors = Survivors {
+            index: (0..1001).collect(),
+            stride: 1,
+            ..Survivors::default()
+        };
+        // In f32, 2^24 + 1 is 2^24.
+        let mean = (16_777_216.0 + 1000.0) / 1001.0;
+        let all: Vec<u32> = (0..1001).collect();
+        let radii = PointRadii::new(&cloud, &survivors);
+        assert_eq!([radii.mean(), radii.mean_of(&all)], [mean; 2]);
     }
 }

@@ -4,7 +4,6 @@
 //! ray enters the other one. The least of these distances is the distance to the impact. The images hold all that the
 //! motion passes, so no surface is too thin, and none too fast.
 
-use crate::contact::lone_points::is_alone;
 use crate::cpu::cull::{self, PointRadii, Region};
 use crate::cpu::exact::placed::Placed;
 use crate::cpu::motion::core::{BORDER, CORE, OUTSIDE, RIM};
@@ -108,10 +107,11 @@ impl Scratch {
             camera.point_at(u, v, depth)
         };
         let b_from_a = query.a_from_b.inverse();
-        let is_lone = |meeting: &Meeting| {
+        let around = &mut self.patches.lone_points.around;
+        let mut is_lone = |meeting: &Meeting| {
             let before = place(meeting.pixel, meeting.depth - meeting.distance);
-            let of = |surface: &Surface, place: Vec3| match surface {
-                Surface::Cloud(cloud) => is_alone(cloud, place),
+            let mut of = |surface: &Surface, place: Vec3| match surface {
+                Surface::Cloud(cloud) => around.is_alone(cloud, place),
                 Surface::Exact(_) | Surface::Device(_) => false,
             };
             of(&query.a, place(meeting.pixel, meeting.depth)) || of(&query.b, b_from_a * before)

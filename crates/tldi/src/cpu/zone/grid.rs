@@ -21,7 +21,7 @@ pub struct ZoneGrid {
 }
 
 impl ZoneGrid {
-    /// Cells of `reach` metres. They are larger if `bounds` would hold too many.
+    /// Cells of `reach` metres. They are larger if `bounds`, which are finite, would hold too many.
     pub fn new(bounds: &Aabb, reach: f32) -> Self {
         Self::with_cells(bounds, reach, MAX_CELLS)
     }
@@ -29,7 +29,7 @@ impl ZoneGrid {
     /// The same with at most `most` cells, and at least one.
     pub(crate) fn with_cells(bounds: &Aabb, reach: f32, most: f32) -> Self {
         let extents = bounds.extents().max(Vec3::ZERO);
-        let mut cell = reach;
+        let mut cell = reach.max(f32::MIN_POSITIVE);
         let count = |cell: f32| {
             let n = (extents / cell).floor() + Vec3::ONE;
             n.x * n.y * n.z

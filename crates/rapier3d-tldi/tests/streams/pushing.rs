@@ -1,0 +1,143 @@
+//! What surfaces that deform do to bodies, whatever these are, against what rapier does with a surface that its body moves.
+
+use crate::common::square;
+use crate::common::worlds::{HALF, TestResult, attached, dynamic_at, insert_floor};
+use rapier3d::prelude::*;
+use rapier3d_tldi::prelude::*;
+
+/// Half the edges of the floor, metres.
+const FLOOR: f32 = 1.6;
+
+fn floor_at(offset: Vector) -> Vec<Vector> {
+    square(FLOOR).iter().map(|p| *p + offset).collect()
+}
+
+fn box_collider() -> ColliderBuilder {
+    ColliderBuilder::cuboid(HALF, HALF, HALF)
+}
+
+/// How far a floor that slides at 0.3 m/s for a second carries a box, metres, if it is told so in each step by as many
+/// calls as `ways` has, each of which puts the floor that far from where it is then.
+fn carried(ways: &[f32]) -> Result<f32, TldiError> {
+    let (mut world, mut tldi) = attached();
+    let floor = insert_floor(&mut world, FLOOR);
+    let (body, _) = world.insert(dynamic_at(HALF), box_collider());
+    let step = 0.3 * world.integration_parameters.dt;
+    for k in 1..=60 {
+        for way in ways {
+            let points = floor_at((k as f32 * step + way) * Vector::X);
+            tldi.deform(&mut world, floor, &points, None)?;
+        }
+        tldi.step(&mut world)?;
+    }
+    Ok(world.bodies[body].translation().x)
+}
+
+/// Of several deformations before a step, all together count: the same points again, half of the way first, and what was
+/// taken back change nothing.
+#[test]
+fn deformations_before_a_step_add_up() -> TestResult {
+    let once = carried(&[0.0])?;
+    assert!((once - 0.3).abs() < 0.01, "{once} m");
+    for ways in [[0.0, 0.0], [-0.0025, 0.0], [0.2, 0.0]] {
+        let several = carried(&ways)?;
+        assert!((several - once).abs() < 1e-4, "{ways:?}: {several} m");
+    }
+    Ok(())
+}
+
+/// A floor that goes down and back up before a step did not move.
+#[test]
+fn what_is_back_before_a_step_throws_nothing() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let floor = insert_floor(&mut world, FLOOR);
+    let (body, _) = world.insert(dynamic_at(HALF), box_collider());
+    for k in 0..60 {
+        if k == 30 {
+            for height in [-0.5, 0.0] {
+                tldi.deform(&mut world, floor, &floor_at(height * Vector::Y), None)?;
+            }
+        }
+        tldi.step(&mut world)?;
+        let speed = world.bodies[body].linvel().length();
+        assert!(speed < 0.05, "{k}: {speed} m/s");
+    }
+    Ok(())
+}
+
+/// Steps for `steps` with a floor that rises at `speed` m/s, at first at height 0. `watch` is told the height after each.
+fn rise(
+    (world, tldi): (&mut PhysicsWorld, &mut TldiPipeline),
+    floor: ColliderHandle,
+    (speed, steps): (f32, usize),
+    mut watch: impl FnMut(&PhysicsWorld, f32),
+) -> TestResult {
+    for k in 1..=steps {
+        let height = k as f32 * speed * world.integration_parameters.dt;
+        tldi.deform(world, floor, &floor_at(height * Vector::Y), None)?;
+        tldi.step(world)?;
+        watch(world, height);
+    }
+    Ok(())
+}
+
+/// A link on a vertical rail is lifted by a floor that rises faster than free bodies wait for. Rapier's own mesh on a body
+/// of this speed is at most 6 mm deep in it.
+#[test]
+fn links_are_lifted() -> TestResult {
+    for speed in [1.0, 2.0, 3.0] {
+        let (mut world, mut tldi) = attached();
+        let floor = insert_floor(&mut world, FLOOR);
+        let root = world.insert_body(RigidBodyBuilder::fixed().translation(0.35 * Vector::Y));
+        let (link, _) = world.insert(dynamic_at(0.35), box_collider());
+        world.insert_multibody_joint(root, link, PrismaticJointBuilder::new(Vector::Y));
+        let mut deepest = 0.0_f32;
+        rise(
+            (&mut world, &mut tldi),
+            floor,
+            (speed, 60),
+            |world, height| {
+                let below = world.bodies[link].translation().y - HALF;
+                deepest = deepest.max(height - below);
+            },
+        )?;
+        assert!(deepest < 0.01, "{speed} m/s: {deepest} m deep");
+    }
+    Ok(())
+}
+
+/// A body that dominates the floor's is not pushed, as it is not by rapier's contacts.
+#[test]
+fn what_dominates_is_not_pushed() -> TestResult {
+    for (dominance, lifted) in [(0, true), (5, false)] {
+        let (mut world, mut tldi) = attached();
+        let floor = insert_floor(&mut world, FLOOR);
+        // Of a fixed body everything is dominated.
+        let body = world.colliders[floor].parent().ok_or("a body")?;
+        world.bodies[body].set_body_type(RigidBodyType::KinematicPositionBased, true);
+        let above = dynamic_at(0.35)
+            .gravity_scale(0.0)
+            .dominance_group(dominance);
+        let (body, _) = world.insert(above, box_collider());
+        rise((&mut world, &mut tldi), floor, (2.0, 60), |_, _| ())?;
+        let height = world.bodies[body].translation().y;
+        assert_eq!(height > 1.9, lifted, "dominance {dominance}: {height} m");
+        assert!(lifted || (height - 0.35).abs() < 1e-3, "{height} m");
+    }
+    Ok(())
+}
+
+/// A body that cannot rise is not spun away. Rapier's own mesh on a body of this speed throws it at 6 m/s.
+#[test]
+fn what_is_locked_is_not_spun() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let floor = insert_floor(&mut world, FLOOR);
+    let locked = dynamic_at(0.35).enabled_translations(true, false, true);
+    let (body, _) = world.insert(locked, box_collider());
+    let mut fastest = 0.0_f32;
+    rise((&mut world, &mut tldi), floor, (4.0, 30), |world, _| {
+        fastest = fastest.max(world.bodies[body].linvel().length());
+    })?;
+    assert!(fastest < 10.0, "{fastest} m/s");
+    Ok(())
+}
