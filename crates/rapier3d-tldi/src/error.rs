@@ -51,9 +51,7 @@ pub enum TldiError {
     },
     /// Pairs that were compared on the spot, inside rapier's step, failed: they had no contacts in
     /// that step.
-    #[error(
-        "{count} pairs that were not in the batch had no contacts in the last step; the first: {first}"
-    )]
+    #[error("{count} comparisons or casts inside the last step failed; the first: {first}")]
     OnTheSpot {
         /// How many failed since the step was prepared.
         count: usize,

@@ -102,8 +102,8 @@ impl Aabb {
         self.max - self.min
     }
 
-    /// The smallest axis-aligned box around this one after a rigid motion. Infinite extents stay
-    /// infinite.
+    /// The smallest axis-aligned box around this one after a rigid motion. A box that is infinite anywhere
+    /// becomes all of space.
     pub fn transformed(&self, pose: &Pose3) -> Self {
         if self.is_empty() {
             return Self::EMPTY;

@@ -21,8 +21,7 @@ use tldi::PointCloud;
 pub(crate) struct SurfaceMotions {
     motions: Vec<SurfaceMotion>,
     sampled: Vec<SampledMotion>,
-    /// Seconds in which the solver undoes a penetration: between moving bodies, and with one that
-    /// does not move.
+    /// Time constant of rapier's correction of penetrations, seconds: of two dynamic bodies, and of one.
     undoing: [f32; 2],
     dt: f32,
     /// Least closing speed at which bodies are pushed, m/s.

@@ -39,7 +39,7 @@ use tldi::PairResult;
 /// # Shape casts
 /// The distance of a straight cast is exact to 0.2 r̄ of the coarser cloud if surfaces meet face
 /// on. Otherwise it is exact to a pixel divided by the cosine between normal and motion. A target
-/// distance counts along the motion. With `stop_at_penetration` off, and in turning casts, a shape
+/// distance counts along the normal. With `stop_at_penetration` off, and in turning casts, a shape
 /// passes two things: surfaces that touch it at the start, unless the motion goes on towards them
 /// by more than a pixel; and surfaces that only its rim would meet. The rim is two pixels wide, or
 /// three where the motion goes on by no more than that. Turning casts are early by up to a pixel.

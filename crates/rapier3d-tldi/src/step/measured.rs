@@ -15,8 +15,8 @@ use tldi::plan::largest_pixel;
 use tldi::{ContactPatch, PairResult};
 
 /// Whether a pair touches in one or two round spots or lines. Such a pair rolls, and a point that
-/// is fixed to the bodies would soon be late. A point that is late by a tenth of a radius drives a
-/// ball like a slope.
+/// is fixed to the bodies would soon be late. A contact point that lags by a tenth of a
+/// radius accelerates a ball as a slope would.
 pub(crate) fn rolls(parts: &[PartPair], results: &[PairResult]) -> bool {
     let patches = (parts.iter())
         .filter_map(|part| part.comparison.as_ref())

@@ -29,7 +29,8 @@ use web_time::Instant;
 /// the dispatcher that [`attach`](Self::attach) installs. [`step`](Self::step) does both.
 ///
 /// Several worlds may be attached to one pipeline if each is prepared, stepped and finished before
-/// the next is prepared; a pipeline for each remembers more (the view axes of its pairs).
+/// the next is prepared, and if no surface changes; a pipeline for each remembers more (the view axes of its pairs, and the
+/// speeds of surfaces, by the handles of colliders).
 ///
 /// ```
 /// # use rapier3d::prelude::*;

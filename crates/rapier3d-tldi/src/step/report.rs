@@ -31,7 +31,7 @@ use tldi::Backend;
 pub struct StepReport {
     /// Pairs of colliders that were compared in one batch before the step.
     pub pairs_batched: usize,
-    /// Pairs that were not compared because the contacts of an earlier step still hold
+    /// Pairs that are expected to keep their contacts of an earlier step
     /// ([`TldiConfig::scatter`](crate::TldiConfig::scatter)).
     pub pairs_kept: usize,
     /// Pairs that rapier asked for and the batch did not hold. Their poses or shapes changed after

@@ -15,10 +15,11 @@ const STAND_IN_RADIUS: f32 = 1.0;
 ///
 /// The [recipe](CloudRecipe) says once how radii and normals are found. Normals, found or given, are turned to
 /// where the sensor was in the frame. A frame without points disables the collider: there are no
-/// contacts, what rested on it wakes, and no point is kept.
+/// contacts, what rested on it wakes, and the collider keeps no point.
 ///
 /// The collider has no body and is at the origin of the world. It may be moved, to a place near the sensor
-/// where coordinates are large (see [`CloudError::CoordinateTooLarge`]); its friction and
+/// where coordinates are large (see [`CloudError::CoordinateTooLarge`]), but not in every frame: what stands still would seem to
+/// move. Its friction and
 /// groups are set as those of any other.
 ///
 /// ```

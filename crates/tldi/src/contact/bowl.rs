@@ -71,8 +71,8 @@ const ALIKE_RADII: f32 = 2.0;
 pub struct Lowest {
     /// The point, and the gap there.
     pub point: ContactPoint,
-    /// How far it moves aside, along each main axis of the points, for an error of one metre of the slope of the
-    /// gaps over a standard deviation of the places, metres.
+    /// Displacement of the lowest point along each main axis, metres, for each metre of error in the slope: the gap over one
+    /// standard deviation of the places.
     pub aside: [Vec3; 2],
     /// Along the same axes, vectors as long as the bowl's radii of curvature, metres.
     pub radii: [Vec3; 2],
@@ -193,8 +193,8 @@ pub(crate) fn slope_error(off: impl Iterator<Item = f32>, pixel_size: f32) -> f3
     DOUBT * ramp(noise / pixel_size, NOISE) * noise * (ALIKE / count).sqrt()
 }
 
-/// The relative radius of curvature along `radius`, that of the gaps of `contacts` about `centre`, by how their
-/// normals turn: a vector along it, metres; and which share of the variance of the normals a steady turn explains.
+/// Relative radius of curvature along `radius`, from how the normals turn: a vector, metres. Second: share (0 to 1) of the
+/// normals' variance that a linear turn explains.
 /// What the gaps of a ball tell is up to a fifth too much or too little, by how far up they are known.
 pub(crate) fn relative_radius<'c>(
     radius: Vec3,

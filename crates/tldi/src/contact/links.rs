@@ -27,8 +27,7 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(crate) struct Links {
     /// Indices of the contact pixels, the lower one first.
     pub(crate) pairs: Vec<(u32, u32)>,
-    /// Links of each contact pixel, or whether the surfaces are apart anywhere in the component of a root; then the new
-    /// index of each, or [`NONE`].
+    /// Scratch for each contact pixel: first its links, then whether its component leads out, last its new index or [`NONE`].
     counts: Vec<u32>,
     /// Where the neighbours of each contact pixel start in `neighbors`, and their end.
     starts: Vec<u32>,

@@ -16,8 +16,8 @@ use glamx::{Mat3, Pose3, Vec3};
 /// Neighbours that tell how dense points are. Clouds of fewer have no lone points.
 const NEIGHBORS: usize = 4;
 
-/// Times the distance of a neighbour's fourth neighbour beyond which that of a point makes it stand
-/// alone. At the corner of a grid it is twice as far. Half or twice: no change in any suite.
+/// A point stands alone if its fourth neighbour is at least this many times as far away as the fourth neighbour of one of
+/// its neighbours. At the corner of a grid it is twice as far. Half or twice: no change in any suite.
 const ALONE: f32 = 2.5;
 
 /// Points closer to each other than this share of the mean radius are the same point. Half or twice: no row of any

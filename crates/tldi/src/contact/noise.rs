@@ -2,8 +2,8 @@
 
 use crate::{PairQuery, PairResult};
 
-/// How much closer than the surfaces the least fitted gap is taken to be for noise with a standard deviation
-/// of a pixel, in pixels; of other noise its square decides. Measured with `accuracy --variant told`, noise of
+/// Shortening of the least gap by noise, in pixels, at a standard deviation of one pixel. It grows with the square of the
+/// noise. Measured with `accuracy --variant told`, noise of
 /// 0.25 to 1.5 mean radii and pixels of 0.5 to 3: more makes for fewer false collisions of scans, but misses
 /// contacts of meshes of 1,000 points. Half: 4 of 930 cases with noise of 0.25 to 1 (`--variant told`) are
 /// wrong instead of 3; twice: 3.

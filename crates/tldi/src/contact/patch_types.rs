@@ -1,4 +1,4 @@
-//! From contact pixels to contact patches.
+//! Contact pixels, points and patches.
 
 use glamx::Vec3;
 

@@ -68,8 +68,8 @@ const NEAR_FLOOR: f32 = 0.4;
 
 /// Of points on one plane with unit normal `normal`, those on which a body would rest. There are
 /// four directions at right angles to each other, along which the points reach out farthest. Each
-/// gives the point that is farthest out and lowest: √2 standard deviations of extent count as much
-/// as one of roughness, which is at least `least_roughness` metres.
+/// gives the point that is farthest out and lowest: one standard deviation of extent counts as much
+/// as √2 of roughness, which is at least `least_roughness` metres.
 ///
 /// Heights are measured from the plane that fits the gaps. So the choice does not depend on the
 /// tilt of the body, and a lifted edge remains. Cost: linear in points.

@@ -27,7 +27,7 @@ impl WayOut {
     /// Drops the contact pixels deeper than a layer that lead through a place where another view sees the surfaces apart or
     /// in each other by less than half of that. Contact pixels are ordered by view, row and column.
     ///
-    /// Cost: for each such pixel and each other view up to 16 binary searches.
+    /// Cost: for each such pixel and each other view up to 17 binary searches.
     pub(crate) fn keep_least(&mut self, result: &mut PairResult, params: &Params) {
         let PairResult { axes, contacts, .. } = result;
         if axes.len() < 2 {

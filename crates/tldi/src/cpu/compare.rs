@@ -248,9 +248,8 @@ fn opposed(entry: &Layer, exit: &Layer) -> bool {
     n.z <= -FACING && m.z >= FACING && n.dot(m) <= -FACING
 }
 
-/// Depth at which the ray entered the part of a body that it leaves through the last of `layers`: where the body begins, if
-/// its normal says that there is an inside but the entry was culled. A ray that leaves a body twice in a row has missed a
-/// layer and tells no more than that the surface is there.
+/// Depth at which the ray entered the body that it leaves at the last layer of `column`. If the entry is missing, the body's
+/// bounds decide. Two exits in a row mean that a layer was missed: only one thickness counts.
 fn entered_at(column: &Column, params: &Params) -> f32 {
     let Some((exit, before)) = column.layers.split_last() else {
         return f32::INFINITY;

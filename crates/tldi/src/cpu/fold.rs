@@ -28,7 +28,7 @@ const COARSE: f32 = 4.0;
 /// Half or twice: no test of queries fails.
 const LEAST_QUANTUM: i32 = 8;
 
-/// Largest coordinate of a pixel of an image: an `i32` holds twice as many, and their differences.
+/// Largest coordinate of a pixel of an image: an `i32` holds four times as many, so that differences fit, too.
 pub(super) const FARTHEST_PIXEL: f32 = (1 << 29) as f32;
 
 /// Whether cells of so many per metre are much larger than `reach` metres, since most are empty.

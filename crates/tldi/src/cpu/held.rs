@@ -6,6 +6,7 @@ use crate::PointCloud;
 use crate::pair::plan::SidePlan;
 
 impl Side {
+    /// Forgets the held points. Their memory stays.
     pub(super) fn release(&mut self) {
         self.is_held = false;
     }

@@ -220,8 +220,8 @@ impl Scratch {
         looked
     }
 
-    /// Builds the images of two clouds where `a` is less than `reach` metres behind `b`; `None` if
-    /// that is nowhere.
+    /// Builds the images of two clouds in the tiles where their depth ranges come within `reach` metres. `None` if there are
+    /// none.
     pub(super) fn look_at_clouds(
         &mut self,
         a: &CloudView,

@@ -78,7 +78,8 @@ pub(crate) fn sweep(
     }
 }
 
-/// The splat of the heaviest fragment of a run; of like ones that of the last place, whatever their order.
+/// The splat of the heaviest fragment of a run. Ties go by key, normal and place, so that the order of the fragments does
+/// not matter.
 fn face_of<'a>(run: &[Fragment], splats: &'a [Splat]) -> &'a Splat {
     let splat = |f: &Fragment| &splats[f.splat as usize];
     let rank = |f: &Fragment| (f.weight, f.key, splat(f).normal);

@@ -60,7 +60,7 @@ pub struct PairResult {
     /// Least signed gap in metres over all pixels that both surfaces cover (negative:
     /// penetration), or `None` where no pixel is shared within reach.
     pub gap: Option<f32>,
-    /// Unit axes of the views in which contacts were found, from `b` towards `a`. Empty after an
+    /// Unit axes of the views in which contacts were looked for, from `b` towards `a`. Empty after an
     /// early rejection.
     pub axes: Vec<Vec3>,
     /// Pixels where the surfaces are within [`Params::prediction`] or penetrate.

@@ -51,7 +51,8 @@ pub struct SidePlan {
     pub frame_from_surface: Pose3,
     /// Which of its points are kept.
     pub region: Region,
-    /// Its bounds, in its own frame, unless it is the larger one of the pair: then it counts as a body, which fills them.
+    /// Its bounds, in its own frame, if it is the smaller surface of the pair. It then counts as a body that fills them. `None`
+    /// for the larger one.
     pub body: Option<Aabb>,
 }
 

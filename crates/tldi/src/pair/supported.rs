@@ -23,8 +23,7 @@ impl PairQuery<'_> {
         supported_surfaces(self.a, self.b)
     }
 
-    /// Whether the numbers of the pair can be used, wherever its points are; if not, why, and what to do instead. It is
-    /// [`check`](Self::check) without where the surfaces are: what a backend asks of clouds that live on its device.
+    /// Like [`check`](Self::check), but also accepts clouds on a device: checks only the numbers.
     pub fn check_numbers(&self) -> Result<(), &'static str> {
         self.params.check()?;
         for surface in [self.a, self.b] {

@@ -28,7 +28,7 @@ pub struct Approach {
     /// Half the extents of the region where the bounds meet, in the frame of the larger surface,
     /// metres.
     pub half_extents: Vec3,
-    /// From where the bounds meet to where `b` lies, metres.
+    /// From the middle of where the bounds meet to the middle of `b`, metres.
     pub lies: Vec3,
     /// Of `b` over the step, metres.
     pub motion: Vec3,
@@ -59,8 +59,8 @@ impl Body {
         (share.abs() > PLAINLY).then_some(share < 0.0)
     }
 
-    /// How far along `axis` `b`, off by `offset`, is from `a`, from `sheet` to the body's middle or the
-    /// opposite, in half extents of the body.
+    /// Signed distance of `b`, moved by `offset`, from the larger surface along `axis`, in half extents of the smaller one.
+    /// Positive: `axis` points from `a` to `b`.
     fn share_along(&self, axis: Vec3, sheet: f32, offset: Vec3) -> f32 {
         let toward_body = self.middle.dot(axis) - sheet;
         let toward_b = if self.is_b { toward_body } else { -toward_body };

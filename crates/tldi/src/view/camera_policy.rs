@@ -31,13 +31,13 @@ pub enum CameraPolicy {
     /// crossing, up to two more views follow, until three axes span all directions. So a query
     /// whether surfaces meet does not miss walls that the first views see edge-on.
     AllDirections,
-    /// One view against the motion of `b` relative to `a`; without motion, by the bounds.
+    /// One view along the motion of `b` relative to `a`, plus the way from `b` to where the bounds meet.
     Motion,
     /// One view by the normals of the contact zone, anew in every frame.
     Covariance,
     /// One view along the axis of the larger surface's frame in which the bounds overlap least.
     SmallestExtent,
-    /// One view along the last axis; the first time by the normals of the contact zone.
+    /// One view along the last axis; the first time up to three, by the normals of the contact zone.
     LastNormal,
 }
 

@@ -5,7 +5,7 @@
 //! floor of the whole pipeline is this stage's reading of the coordinates. Of a cloud much finer
 //! than the pixels only every n-th point is taken ([`stride`](crate::pair::plan::stride)): more would not be seen.
 //!
-//! Coarser points reach farther ([`reach`](crate::reach)). In such a cloud, the box of a block is
+//! Coarser points reach farther ([`reach`](crate::cloud::reach)). In such a cloud, the box of a block is
 //! as wide as its coarsest point needs. Points inside are then tested again, each by its own
 //! radius.
 
@@ -81,7 +81,8 @@ pub(crate) fn cull(
 /// more takes less time than to write them down. Half or twice: no frame takes longer or shorter beyond what times scatter by.
 const HELD: f32 = 0.2;
 
-/// Whether the points in `region` are so few that they are better held than culled again for each look.
+/// Whether the region holds so small a share of the cloud's bounds that its points are better held than culled again for
+/// each look.
 pub(crate) fn are_few(cloud: &PointCloud, frame_from_cloud: &Pose3, region: &Region) -> bool {
     let all = cloud.bounds().extents();
     let inside = region

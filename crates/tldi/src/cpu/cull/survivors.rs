@@ -53,7 +53,7 @@ impl Survivors {
         Vec3::new(self.x[i], self.y[i], self.z[i])
     }
 
-    pub(crate) fn points(&self) -> impl Iterator<Item = Vec3> + Clone {
+    pub(crate) fn points(&self) -> impl ExactSizeIterator<Item = Vec3> + Clone {
         (0..self.len()).map(|i| self.point(i))
     }
 
@@ -97,7 +97,7 @@ impl Survivors {
         are_any
     }
 
-    /// Takes every `stride`-th point of the cloud that is in `all`.
+    /// Takes every `stride`-th point of the cloud that is in `all`. The cloud is even.
     pub(crate) fn thin_out(&mut self, all: &Self, stride: usize) {
         let _stage = stage!("cull");
         self.clear();

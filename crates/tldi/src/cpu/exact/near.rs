@@ -67,7 +67,7 @@ impl Side {
     /// Fills `kept` with the points in cells that reach within `reach` metres of the surface, and `support`
     /// with those within `beyond` metres more; with coarser ones of cells farther away.
     fn in_near_cells(&mut self, exact: &Placed, reach: f32, beyond: f32) {
-        let points = (0..self.points.len()).map(|i| self.points.point(i));
+        let points = self.points.points();
         let CellDistances {
             least,
             fold,
@@ -100,8 +100,8 @@ impl Side {
             let [x, y, z] = [0, 1, 2].map(|k| (cell[k] as usize).min(grid.dims[k] - 1));
             let cell = (z * grid.dims[1] + y) * grid.dims[0] + x;
             let least = &mut least[cell];
-            // A cell that is wider than what is left of a gap holds points from both sides of it: of the others, nothing is
-            // known yet.
+            // After folding, one cell may hold points from both sides of a gap. The stored distance then holds for one side
+            // only and is computed again for the other.
             let is_beyond_gap =
                 (middles.get(cell)).is_some_and(|middle| middle.distance(point) > half_diagonal);
             if least.is_nan() || is_beyond_gap {

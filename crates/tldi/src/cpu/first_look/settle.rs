@@ -66,8 +66,8 @@ fn overlap(query: &PairQuery) -> Option<f32> {
     (!overlap.is_empty()).then(|| overlap.extents().min_element())
 }
 
-/// The largest of the large pixels, metres, of two kinds: they resolve the smaller body, and at least `deep` of them
-/// fit into `depth`.
+/// Edge of the largest large pixel, metres, that resolves the smaller body and fits `deep` times into `depth`. `None` if even
+/// the smallest does not.
 fn large_pixel(query: &PairQuery, depth: f32, deep: f32) -> Option<f32> {
     let radius = query.a.mean_radius().max(query.b.mean_radius());
     let pixels = LARGE.map(|large| large * query.params.pixel_size.max(radius));
@@ -77,12 +77,8 @@ fn large_pixel(query: &PairQuery, depth: f32, deep: f32) -> Option<f32> {
     pixels.into_iter().find(|pixel| *pixel <= largest)
 }
 
-/// The two clouds of a pair as `camera` looks at them, with normals sharpened or not.
-fn cloud_views<'a>(
-    query: &'a PairQuery,
-    camera: &'a VirtualCamera,
-    sharpens: bool,
-) -> Option<[CloudView<'a>; 2]> {
+/// The two clouds of a pair as `camera` looks at them.
+fn cloud_views<'a>(query: &'a PairQuery, camera: &'a VirtualCamera) -> Option<[CloudView<'a>; 2]> {
     let (Surface::Cloud(a), Surface::Cloud(b)) = (query.a, query.b) else {
         return None;
     };
@@ -92,7 +88,7 @@ fn cloud_views<'a>(
         camera,
         params: &query.params,
         merge_gap: query.params.merge_gap,
-        sharpens,
+        sharpens: true,
     };
     Some([view_of(a, &Pose3::IDENTITY), view_of(b, &query.a_from_b)])
 }
@@ -219,7 +215,7 @@ impl Scratch {
         view: usize,
         result: &mut PairResult,
     ) -> f32 {
-        let Some([a, b]) = cloud_views(query, camera, false) else {
+        let Some([a, b]) = cloud_views(query, camera) else {
             return 0.0;
         };
         let Some(CommonPixels { rect, near, .. }) = self.meet(&a, &b, plan.column_reach, 0.0)
@@ -273,7 +269,7 @@ impl Scratch {
         seen: &Seen,
         crossings: &mut Crossings,
     ) {
-        let Some([a, b]) = cloud_views(query, camera, true) else {
+        let Some([a, b]) = cloud_views(query, camera) else {
             return;
         };
         if self.look_at_clouds(&a, &b, plan.column_reach).is_none() {

@@ -4,8 +4,8 @@ use crate::Tldi;
 use crate::cpu::columns::{Columns, dilate};
 use crate::cpu::splat_radius::splat_radius;
 
-/// Width in pixels of the rim that [`ImpactQuery::core_only`](crate::ImpactQuery::core_only) leaves out. Splats stand out by one pixel on either side,
-/// and one more is for roughness. A surface missed in the rim penetrates by at most that pixel, and contacts push it
+/// Width in pixels of the rim that [`ImpactQuery::core_only`](crate::ImpactQuery::core_only) leaves out. Splats stand out
+/// by one pixel on either side, and one more is for roughness. A surface missed in the rim penetrates by at most that pixel, and contacts push it
 /// out again. 2: 1 of 900 drops passes through instead of none; 6: no change in any suite.
 pub(crate) const RIM: i32 = 3;
 
@@ -27,7 +27,7 @@ pub(crate) const CORE: u8 = 2;
 pub(crate) struct CoreScratch {
     covered: Vec<u8>,
     inner: Vec<u8>,
-    /// Distance from the edge in pixels, counted up to the width of the rim.
+    /// Two more than the distance from the edge, pixels, up to [`RIM`] + 2; one less in gaps that were closed.
     depth: Vec<u8>,
     spare: Vec<u8>,
 }

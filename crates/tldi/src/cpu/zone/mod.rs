@@ -4,7 +4,7 @@
 //! The other cloud's points in marked cells are near: none within one cell edge is missed. The cost is linear in points
 //! and cells. If nothing is near, the pair is rejected before any image is built.
 //!
-//! An uneven cloud is split into octaves of its radii ([`reach`](crate::reach)). Each pair of octaves has its own grid,
+//! An uneven cloud is split into octaves of its radii ([`reach`](crate::cloud::reach)). Each pair of octaves has its own grid,
 //! with cells as large as the points of both reach. So two points are near by their own radii.
 
 mod around_places;
@@ -25,7 +25,7 @@ use grid::{locate, select};
 use std::ops::Range;
 
 /// Most points around one whose distances to it are measured: about a microsecond. Where coarse points lie more densely than
-/// that, cells alone decide, and the point may count as near at up to 3.5 times the reach.
+/// that, cells alone decide, and the point may count as near at up to 3.5 edges of a cell.
 const MOST_AROUND: usize = 4096;
 
 /// The grid and its bits, kept from call to call.
@@ -207,8 +207,8 @@ fn mark_in_reach(
 const LANES: usize = 8;
 
 multiversioned! {
-/// Whether one of the points in `rows`, or of those right behind a row, is in reach of `point`. These reach `further` than
-/// the `reach`.
+/// Whether a point in `rows` is within `reach + further` of `point`. Reads on to full lanes: what follows a row is tested,
+/// too.
 fn is_in_reach(
     point: Vec3,
     reach: f32,
