@@ -369,7 +369,7 @@ impl PointCloudShape {
     pub(crate) fn surface_normals(&self) -> &[Vec3] {
         let cloud = self.cloud();
         cloud.normals().unwrap_or_else(|| {
-            let made = made_once(&self.content.fitted_normals, || {
+            made_once::<Vec<Vec3>>(&self.content.fitted_normals, || {
                 let points: Vec<Vec3> = cloud.points().to_vec();
                 let with_normals = PointCloud::builder(points)
                     .radius(cloud.max_radius())
@@ -378,8 +378,7 @@ impl PointCloudShape {
                     .expect("the points of a valid cloud are valid");
                 let normals = with_normals.normals();
                 normals.expect("they were asked for").to_vec()
-            });
-            made
+            })
         })
     }
 }
