@@ -184,7 +184,7 @@ fn open(args: &Args) -> anyhow::Result<(FrameSource, Vec<String>)> {
     if !missing.is_empty() {
         let names = &missing[..missing.len().min(3)].join(", ");
         eprintln!(
-            "warning: {} frames of poses.txt are not there: {names} …",
+            "warning: {} frames of poses.txt are not there, or have no pose: {names} …",
             missing.len()
         );
     }

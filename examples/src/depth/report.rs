@@ -19,7 +19,7 @@ pub struct DepthReport {
     pub max_penetration: f32,
     /// The deepest contacts after a step, by kind.
     pub deepest: ContactKinds,
-    /// Frames that are listed but not there.
+    /// Frames that are listed but not there, or without a pose.
     pub missing_frames: Vec<String>,
     /// Median of the frames' `latency_ms`.
     pub median_latency_ms: f64,

@@ -29,7 +29,7 @@ pub(crate) fn may_separate(collider1: &Collider, collider2: &Collider) -> bool {
     !collider1.is_sensor() && !collider2.is_sensor() && groups[0].test(groups[1])
 }
 
-/// Whether impulses between two bodies move each: dynamic ones which the other does not dominate.
+/// The bodies of a pair that impulses between them move: dynamic ones which the other does not dominate.
 fn movable(
     bodies: &RigidBodySet,
     pair: [Option<RigidBodyHandle>; 2],

@@ -26,7 +26,7 @@ pub(crate) struct SurfaceMotions {
     dt: f32,
     /// Least closing speed at which bodies are pushed, m/s.
     pub(crate) least_push: f32,
-    /// The pairs that were pushed in this step.
+    /// The pairs that are pushed in this step, where this is needed.
     pub(crate) pushed: Vec<[ColliderHandle; 2]>,
     /// Memory of those that were forgotten.
     spare: Vec<Vec<Vector>>,

@@ -93,7 +93,8 @@ impl PointQuery for PointCloudShape {
 
     /// The point of the nearest sample's disc that is nearest to `point`, and the index of that
     /// sample. Where normals are oriented, a point behind the discs is inside; for an open scan
-    /// that is all that lies behind it. Far beyond a sharp edge or tip, one in a hundred points may count to the wrong side. A point that is not finite is its own projection.
+    /// that is all that lies behind it. Far beyond a sharp edge or tip, one in a hundred points may count to the wrong
+    /// side. A point that is not finite is its own projection.
     fn project_local_point_and_get_feature(&self, point: Vec3) -> (PointProjection, FeatureId) {
         let Some(index) = self.nearest(point) else {
             return (PointProjection::new(false, point), FeatureId::Unknown);

@@ -93,7 +93,7 @@ impl Measured {
     }
 }
 
-/// A number that another one takes the place of where a cloud of the pair gets other points.
+/// Changes when a cloud of the pair gets other points.
 fn revision_of(pair: &ShapePair<'_>) -> u64 {
     let clouds = cloud_shapes_of(pair.shape1).chain(cloud_shapes_of(pair.shape2));
     clouds.fold(0, |sum: u64, cloud| {

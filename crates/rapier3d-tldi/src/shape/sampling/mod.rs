@@ -33,7 +33,8 @@ const MOST_SQUARES: f64 = 8_388_608.0; // 2²³
 /// in proportion to area / spacing².
 ///
 /// # Errors
-/// [`SampleError`]: places farther than 2¹⁹ spacings from the origin cannot be told apart; half-spaces, segments, polylines and custom shapes have no surface to sample.
+/// [`SampleError`]: half-spaces, segments, polylines and custom shapes have no surface to sample, and places farther than
+/// 2¹⁹ spacings from the origin cannot be told apart.
 ///
 /// ```
 /// use rapier3d::prelude::*;
@@ -59,7 +60,7 @@ pub fn sample_shape(shape: &dyn Shape, spacing: f32) -> Result<PointCloud<'stati
             least: (area / MOST_SQUARES).sqrt() as f32,
         });
     }
-    // Refused by the cloud in the end: where coordinates are coarser than the spacing, no piece is small enough.
+    // A cloud refuses coordinates that are coarser than its spacing. Pieces would be halved for ever there.
     let corners: Vec<Vec3> = parts.iter().flatten().flat_map(|p| p.corners).collect();
     if !corners.is_empty() {
         PointCloud::builder(corners).radius(spacing).build()?;
