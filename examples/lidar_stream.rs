@@ -1,6 +1,6 @@
 //! Sweeps of a laser scanner become a collider that is new ten times a second, and bodies land on it.
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -152,8 +152,14 @@ fn scene(args: &Args, [first, last]: [&Sweep; 2]) -> anyhow::Result<LidarScene> 
 
 /// What a sweep sees near the scanner, in the frame of the world.
 fn near(args: &Args, sweep: &Sweep) -> anyhow::Result<PointCloud<'static>> {
-    (sweep.within(NEAR * args.range))
-        .cloud(sweep.world_from_scanner)
+    let near = sweep.within(NEAR * args.range);
+    ensure!(
+        near.points.iter().any(|point| point.is_finite()),
+        "no point of sweep {} is nearer than {} m, a part of --range: is the unit metres?",
+        sweep.name,
+        NEAR * args.range
+    );
+    near.cloud(sweep.world_from_scanner)
         .with_context(|| format!("sweep {} has no place for a body", sweep.name))
 }
 

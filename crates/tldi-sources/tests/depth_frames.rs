@@ -14,7 +14,9 @@ fn folder(name: &str) -> PathBuf {
         fs::remove_dir_all(&folder).unwrap();
     }
     fs::create_dir_all(&folder).unwrap();
-    fs::write(folder.join("intrinsics.txt"), INTRINSICS).unwrap();
+    // With the mark that some editors put in front.
+    let intrinsics = format!("\u{feff}{INTRINSICS}");
+    fs::write(folder.join("intrinsics.txt"), intrinsics).unwrap();
     fs::write(
         folder.join("poses.txt"),
         format!("# file, pose\na.png {POSE}\nlost.png {POSE}\n"),

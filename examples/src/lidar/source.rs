@@ -127,8 +127,10 @@ impl SweepSource {
     pub fn open(folder: &Path) -> anyhow::Result<Self> {
         let read_text = |name: &str| {
             let path = folder.join(name);
-            std::fs::read_to_string(&path)
-                .with_context(|| format!("cannot read {}", path.display()))
+            let text = std::fs::read_to_string(&path)
+                .with_context(|| format!("cannot read {}", path.display()))?;
+            // Some editors put a mark in front.
+            anyhow::Ok(text.trim_start_matches('\u{feff}').to_owned())
         };
         let entries = std::fs::read_dir(folder)
             .with_context(|| format!("cannot read the folder {}", folder.display()))?;

@@ -380,8 +380,9 @@ fn what_has_no_surface_is_refused() {
         (area - 2400.0).abs() < 1e-3 && (least - 0.0169).abs() < 1e-4,
         "{area} {least}"
     );
-    // Where a step of f32 is half a metre, no piece of a triangle is as small as the spacing.
-    let far = [Vector::ZERO, Vector::X, Vector::Z].map(|corner| corner + 5_432_109.0 * Vector::Y);
+    // Where a step of f32 is half a metre, no piece of a triangle is as small as the spacing: without a check, sampling does
+    // not end.
+    let far = [Vector::ZERO, Vector::X, Vector::Y].map(|corner| corner + 5_432_109.0 * Vector::Y);
     let mesh = TriMesh::new(far.to_vec(), vec![[0, 1, 2]]).expect("rapier takes it");
     let refused = sample_shape(&mesh, 0.02).map(|c| c.len());
     let too_far = CloudError::CoordinateTooLarge {

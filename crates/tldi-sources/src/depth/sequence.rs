@@ -174,6 +174,8 @@ fn lines(path: &Path) -> Result<Vec<(usize, String)>, DepthError> {
         path: path.to_owned(),
         source,
     })?;
+    // Some editors put a mark in front.
+    let text = text.trim_start_matches('\u{feff}');
     let numbered = text
         .lines()
         .enumerate()
