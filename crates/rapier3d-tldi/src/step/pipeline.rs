@@ -242,8 +242,8 @@ impl TldiPipeline {
     /// the last two steps; noise, and a surface that jumps once, have none. Cost: for each contact of
     /// such a cloud a pass over the points in the blocks around it.
     ///
-    /// A surface pushes what rapier's solver lets it push: no bodies that [dominate](RigidBody::dominance_group), no sensors,
-    /// no colliders whose solver groups exclude each other, and what `filter_contact_pair` of your hooks lets it, which is
+    /// A surface pushes what rapier's solver lets it push: no bodies that
+    /// [dominate](rapier3d::dynamics::RigidBody::dominance_group), no sensors, no colliders whose solver groups exclude each other, and what `filter_contact_pair` of your hooks lets it, which is
     /// asked here once more in each step. What `modify_solver_contacts` will do is not known yet. Links of multibodies and
     /// bodies with locked translations are not pushed: rapier corrects their penetration, at up to 3 m/s.
     ///
