@@ -243,9 +243,10 @@ impl TldiPipeline {
     /// such a cloud a pass over the points in the blocks around it.
     ///
     /// A surface pushes what rapier's solver lets it push: no bodies that
-    /// [dominate](rapier3d::dynamics::RigidBody::dominance_group), no sensors, no colliders whose solver groups exclude each other, and what `filter_contact_pair` of your hooks lets it, which is
-    /// asked here once more in each step. What `modify_solver_contacts` will do is not known yet. Links of multibodies and
-    /// bodies with locked translations are not pushed: rapier corrects their penetration, at up to 3 m/s.
+    /// [dominate](rapier3d::dynamics::RigidBody::dominance_group), no sensors, no colliders whose solver groups exclude each
+    /// other, and what `filter_contact_pair` of your hooks lets it, which is asked here once more in each step. What
+    /// `modify_solver_contacts` will do is not known yet. Links of multibodies and bodies with locked translations are not
+    /// pushed: rapier corrects their penetration, at up to 3 m/s.
     ///
     /// ```
     /// # use rapier3d::prelude::*;
