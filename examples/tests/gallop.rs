@@ -154,7 +154,7 @@ fn what_is_wrong_is_said() {
         (
             &["--frames", "ball.npy", "--faces", "other.ply"],
             1,
-            "a face refers to point 450",
+            "other.ply has 500 points and the frames have 400",
         ),
         (&["--faces", "other.ply"], 2, "--frames"),
         (&["--size", "-1"], 2, "greater than 0"),
