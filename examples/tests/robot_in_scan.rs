@@ -162,6 +162,52 @@ fn a_car_drives() {
     assert!(!folder.join("out").exists(), "it was told to draw nothing");
 }
 
+/// An arm whose base has no surface stands on the floor by its origin; the first link begins above, and touches nothing.
+#[test]
+fn an_arm_without_a_base_stands_on_the_floor() {
+    let folder = folder("robot_without_base");
+    write_floor(&folder);
+    let link = |name: &str| {
+        format!(
+            r#"<link name="{name}"><collision><origin xyz="0 0 0.1"/><geometry><box size="0.1 0.1 0.2"/></geometry></collision></link>"#
+        )
+    };
+    let joint = |parent: &str, child: &str| {
+        format!(
+            r#"<joint name="to_{child}" type="revolute"><parent link="{parent}"/><child link="{child}"/>
+              <origin xyz="0 0 0.2"/><axis xyz="0 1 0"/><limit lower="-0.2" upper="0.2" effort="50" velocity="1"/></joint>"#
+        )
+    };
+    let arm = format!(
+        r#"<robot name="arm"><link name="base"/>{}{}{}{}</robot>"#,
+        link("a"),
+        link("b"),
+        joint("base", "a"),
+        joint("a", "b"),
+    );
+    fs::write(folder.join("arm.urdf"), arm).unwrap();
+    let options = [
+        "--urdf",
+        "arm.urdf",
+        "--scan",
+        "floor.ply",
+        "--up",
+        "0,0,1",
+        "--place",
+        "1.5,1.5,0",
+        "--steps",
+        "60",
+    ];
+    let report = report(&folder, &options);
+    assert_eq!(report["base_fixed"], true);
+    assert!(number(&report["base"][2]).abs() < 0.01, "{report}");
+    let links = report["links"].as_array().unwrap();
+    assert!(
+        links.iter().all(|link| link["contact_steps"] == 0),
+        "{links:?}"
+    );
+}
+
 /// A place on a map is one of the file: the robot stands there, to what a grid of 2.5 cm tells.
 #[test]
 fn a_place_counts_from_the_zero_of_the_file() {

@@ -2,7 +2,8 @@
 
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
-    Backend, ContactPixel, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View,
+    Backend, ContactPixel, CpuBackend, PairQuery, PairResult, Params, PointCloud, Room, Surface,
+    View, VirtualCamera,
 };
 
 /// Spacing and radius of the coarse points, metres.
@@ -18,6 +19,31 @@ const GAP: f32 = 0.01;
 fn sheet(edge: i32, spacing: f32, corner: Vec3) -> impl Iterator<Item = Vec3> {
     let place = move |k| Vec3::new((k % edge) as f32, 0.0, (k / edge) as f32);
     (0..edge * edge).map(move |k| spacing * place(k) + corner)
+}
+
+/// Images of a perspective camera take no more of a room than their fragments: many share one.
+#[test]
+fn images_of_fixed_size_share_a_room() {
+    let points: Vec<Vec3> = sheet(21, COARSE, Vec3::new(-0.5, 0.0, -0.5)).collect();
+    let cloud = PointCloud::builder(points).radius(COARSE).build();
+    let cloud = cloud.expect("valid");
+    let (from, to, size) = (3.0 * Vec3::Y, Vec3::ZERO, [200, 200]);
+    let camera = VirtualCamera::perspective(from, to, Vec3::Z, 1.0, size, 0.1, 10.0);
+    let query = PairQuery {
+        a: Surface::Cloud(&cloud),
+        b: Surface::Cloud(&cloud),
+        a_from_b: Pose3::translation(0.0, 0.02, 0.0),
+        view: View::Fixed(camera),
+        params: Params::for_radius(COARSE),
+    };
+    let (mut result, mut room) = (PairResult::default(), Room::default());
+    let backend = CpuBackend::new();
+    for _ in 0..8 {
+        let compared = backend.compare_within(&query, &mut room, &mut result);
+        compared.expect("the pair is supported");
+        assert!(!result.contacts.is_empty());
+    }
+    assert!(!room.is_used_up());
 }
 
 /// A plate of fine points over the coarse part of a floor, which has so many sheets, 0.1 m apart. Fine points elsewhere

@@ -190,6 +190,22 @@ fn an_empty_frame_holds_nothing() -> TestResult {
     Ok(())
 }
 
+/// A stream enables what it disabled itself, and not what the user disabled.
+#[test]
+fn what_the_user_disables_stays_so() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let mut stream = CloudStream::new(&mut world.colliders, RECIPE)?;
+    for (disables, is_enabled) in [(false, true), (true, false)] {
+        if disables {
+            world.colliders[stream.collider()].set_enabled(false);
+        }
+        let (bodies, colliders) = (&world.bodies, &mut world.colliders);
+        stream.frame(&mut tldi, bodies, colliders, &square(0.8), &Pose::IDENTITY)?;
+        assert_eq!(world.colliders[stream.collider()].is_enabled(), is_enabled);
+    }
+    Ok(())
+}
+
 /// A single point has no neighbours: it has the radius of the frame before, or the frame is refused.
 #[test]
 fn a_single_point_is_taken() -> TestResult {

@@ -56,7 +56,7 @@ pub(crate) struct Culled<'a> {
 
 /// The points of a cloud around some places, in a grid; kept from call to call.
 #[derive(Debug, Default)]
-pub(crate) struct Surroundings {
+struct Surroundings {
     frame_from_cloud: Pose3,
     /// Where points are known, around the places.
     region: Region,
@@ -182,18 +182,12 @@ impl Surroundings {
             });
         is_alone.then_some(point)
     }
-
-    /// Whether the point of `cloud` nearest to `place`, in its frame, stands alone. Cost: a pass over its blocks.
-    pub(crate) fn is_alone(&mut self, cloud: &PointCloud, place: Vec3) -> bool {
-        self.find(cloud, &Pose3::IDENTITY, None, &[place]);
-        self.lone_point(cloud, place).is_some()
-    }
 }
 
 /// Removes the components of linked contact pixels that points standing alone make.
 #[derive(Debug, Default)]
 pub(crate) struct LonePoints {
-    pub(crate) around: Surroundings,
+    around: Surroundings,
     roots: Vec<u32>,
     components: Groups,
     /// Of the small components.
@@ -204,6 +198,12 @@ pub(crate) struct LonePoints {
 }
 
 impl LonePoints {
+    /// Whether the point of `cloud` nearest to `place`, in its frame, stands alone. Cost: a pass over its blocks.
+    pub(crate) fn is_alone(&mut self, cloud: &PointCloud, place: Vec3) -> bool {
+        (self.around).find(cloud, &Pose3::IDENTITY, None, &[place]);
+        self.around.lone_point(cloud, place).is_some()
+    }
+
     /// Removes them from the contact pixels of `result`, which `links` joins; `false` where there are
     /// none. `culled` are all points of each cloud where the surfaces can touch, if they are at hand.
     pub(crate) fn drop(
@@ -392,7 +392,7 @@ mod tests {
     }
 
     fn is_alone(cloud: &PointCloud, place: Vec3) -> bool {
-        Surroundings::default().is_alone(cloud, place)
+        LonePoints::default().is_alone(cloud, place)
     }
 
     #[test]

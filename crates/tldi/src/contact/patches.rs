@@ -15,6 +15,7 @@ use crate::stage::stage;
 use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params};
 use arrayvec::ArrayVec;
 use glamx::Vec3;
+use std::cmp::Ordering;
 use std::ops::Range;
 
 /// Most patches of one pair. The deepest are kept; a solver gains nothing from more. Half or twice: no
@@ -73,8 +74,8 @@ impl PatchScratch {
     /// normals told inside from outside, and fills the patches, deepest first.
     ///
     /// The contact pixels may come in any order. Afterwards they are ordered by view, row and column; of one pixel, the
-    /// greatest gap comes first. Each view of a contact pixel has its axis in `result`. Cost: linear in their number, except for sorting
-    /// the groups, and the pixels if needed.
+    /// greatest gap comes first. Where `result` has several axes, they are those of the pixels' views. Cost: linear in their
+    /// number, except for sorting the groups, and the pixels if needed.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         let _stage = stage!("patches");
         self.link(result, params);
@@ -285,13 +286,18 @@ fn drop_between_faces(result: &mut PairResult) {
     }
 }
 
-/// Orders contact pixels by view, row and column; of one pixel, the greatest gap first.
+/// Orders contact pixels by view, row and column; of one pixel, the greatest gap first, and of equal gaps by their places.
 fn order(contacts: &mut [ContactPixel]) {
-    let place = |c: &ContactPixel| (c.view, c.pixel[1], c.pixel[0]);
+    let pixel = |c: &ContactPixel| (c.view, c.pixel[1], c.pixel[0]);
+    let place = |c: &ContactPixel, d: &ContactPixel| {
+        let axes = c.point_a.to_array().into_iter().zip(d.point_a.to_array());
+        axes.fold(Ordering::Equal, |order, (c, d)| order.then(c.total_cmp(&d)))
+    };
     let order = |c: &ContactPixel, d: &ContactPixel| {
-        (place(c).cmp(&place(d))).then(d.gap.total_cmp(&c.gap))
+        let by_gap = (pixel(c).cmp(&pixel(d))).then(d.gap.total_cmp(&c.gap));
+        by_gap.then_with(|| place(c, d))
     };
     if !contacts.is_sorted_by(|c, d| order(c, d).is_le()) {
-        contacts.sort_by(order);
+        contacts.sort_unstable_by(order);
     }
 }

@@ -107,11 +107,11 @@ impl Scratch {
             camera.point_at(u, v, depth)
         };
         let b_from_a = query.a_from_b.inverse();
-        let around = &mut self.patches.lone_points.around;
+        let lone_points = &mut self.patches.lone_points;
         let mut is_lone = |meeting: &Meeting| {
             let before = place(meeting.pixel, meeting.depth - meeting.distance);
             let mut of = |surface: &Surface, place: Vec3| match surface {
-                Surface::Cloud(cloud) => around.is_alone(cloud, place),
+                Surface::Cloud(cloud) => lone_points.is_alone(cloud, place),
                 Surface::Exact(_) | Surface::Device(_) => false,
             };
             of(&query.a, place(meeting.pixel, meeting.depth)) || of(&query.b, b_from_a * before)
