@@ -406,6 +406,34 @@ mod tests {
         assert!(is_alone(&twice, lone));
     }
 
+    /// Wherever the cloud is, its lone point is found where a cull has it, to the bit: it is taken out of what was culled by
+    /// its place.
+    #[test]
+    fn a_lone_point_far_from_the_origin_is_the_culled_one() {
+        let turn = Vec3::new(0.3, 0.7, -0.4);
+        for far in [0.0, 10.0, 100.0, 1000.0] {
+            let pose = Pose3::new(far * Vec3::new(1.0, 0.3, -0.8), turn);
+            let lone = Vec3::new(0.2, 0.12, 0.2);
+            let points = grid(0.02, Vec3::ZERO).into_iter().chain([lone]);
+            let own = points.map(|p| pose.inverse_transform_point(p));
+            let cloud = cloud(own.collect());
+            let everything = cloud.bounds().transformed(&pose).loosened(1.0);
+            let region = Region {
+                overlap: everything,
+                other_from_frame: Pose3::IDENTITY,
+                other_bounds: everything,
+                ring: Ring::default(),
+                included: 0.0,
+            };
+            let (mut culled, mut scratch) = (Survivors::default(), CullScratch::default());
+            cull(&cloud, &pose, &region, 1, &mut scratch, &mut culled);
+            let mut around = Surroundings::default();
+            around.find(&cloud, &pose, None, &[lone]);
+            let found = around.lone_point(&cloud, lone).expect("it stands alone");
+            assert!(culled.points().any(|point| point == found), "{far} m");
+        }
+    }
+
     /// Wires, coarse parts of a scan and bodies of few points.
     #[test]
     fn what_is_thin_or_coarse_is_not_alone() {
