@@ -261,7 +261,8 @@ fn points_are_on_the_surface_even_and_close_it() {
     }
 }
 
-/// A mesh of a torus, whose area is known, in either winding; and with a hole in it.
+/// A mesh of a torus, whose area is known, in either winding, in mixed winding with vertices of its own for each face (as in
+/// STL files), and with a hole in it.
 #[test]
 fn meshes_are_sampled_on_their_outside() {
     let (large, small, n) = (0.3, 0.1, 96);
@@ -287,11 +288,37 @@ fn meshes_are_sampled_on_their_outside() {
     let turned: Vec<[u32; 3]> = faces.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
     // Both corners' faces of one of 9,216 squares are missing.
     let holed = faces[2..].to_vec();
+    let every_third = |faces: &[[u32; 3]]| -> Vec<[u32; 3]> {
+        let turned = |(k, [a, b, c]): (usize, &[u32; 3])| {
+            if k % 3 == 0 {
+                [*a, *c, *b]
+            } else {
+                [*a, *b, *c]
+            }
+        };
+        faces.iter().enumerate().map(turned).collect()
+    };
+    let soup = |faces: &[[u32; 3]]| {
+        let corners: Vec<Vector> = faces
+            .iter()
+            .flatten()
+            .map(|i| vertices[*i as usize])
+            .collect();
+        let faces = (0..faces.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
+        (corners, faces.collect::<Vec<_>>())
+    };
     // Faces are inside the torus, and outside where it is a saddle, by up to the heights of two arcs.
     let sagitta = (large + 2.0 * small) * (1.0 - (PI / n as f32).cos());
     let mut counts = Vec::new();
-    for faces in [faces, turned, holed] {
-        let mesh = TriMesh::new(vertices.clone(), faces).expect("a mesh");
+    let meshes = [
+        (vertices.clone(), every_third(&faces)),
+        soup(&every_third(&holed)),
+        (vertices.clone(), faces),
+        (vertices.clone(), turned),
+        (vertices.clone(), holed),
+    ];
+    for (vertices, faces) in meshes {
+        let mesh = TriMesh::new(vertices, faces).expect("a mesh");
         let cloud = sample_shape(&mesh, SPACING).expect("a torus");
         for (p, n) in cloud
             .points()

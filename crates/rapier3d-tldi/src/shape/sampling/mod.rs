@@ -3,6 +3,7 @@
 mod error;
 mod patch;
 mod scatter;
+mod winding;
 
 pub use error::SampleError;
 use patch::{Patch, patches_of};
@@ -27,7 +28,7 @@ const MOST_SQUARES: f64 = 8_388_608.0; // 2²³
 ///   are the normals of its faces.
 /// - **Outward**, where the shape is solid. The faces of a mesh without gaps tell its inside, whichever
 ///   way they wind. Those of an open one are taken to run anticlockwise as seen from outside,
-///   and a height field's outside is +y. Inside of other parts of a compound there are no points.
+///   and a height field's outside is +y. Faces of a mesh that share edges are made to wind alike, as most of their area does. Inside of other parts of a compound there are no points.
 ///
 /// Faces without area are passed over. The same shape and spacing give the same points. Time and memory are
 /// in proportion to area / spacing².

@@ -1,6 +1,7 @@
 //! What the surface of a shape consists of: flat triangles, and triangles around curved solids.
 
 use super::error::SampleError;
+use super::winding;
 use crate::ExactShape;
 use crate::narrow_phase::parts::{part, part_count};
 use rapier3d::glamx::{DVec3, Vec3};
@@ -68,7 +69,7 @@ impl Patch<'_> {
     }
 }
 
-fn vector_area(corners: &[Vec3; 3]) -> DVec3 {
+pub(super) fn vector_area(corners: &[Vec3; 3]) -> DVec3 {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     0.5 * (b - a).cross(c - a)
 }
@@ -122,13 +123,14 @@ fn flat<'a>(
     faces: &[[u32; 3]],
     pose: Pose,
 ) -> Result<Vec<Patch<'a>>, SampleError> {
-    let triangles: Vec<[Vec3; 3]> = (faces.iter())
+    let mut triangles: Vec<[Vec3; 3]> = (faces.iter())
         .map(|face| face.map(|i| vertices[i as usize]))
         .collect();
     let finite = |triangle: &[Vec3; 3]| triangle.iter().all(|corner| corner.is_finite());
     if let Some(face) = triangles.iter().position(|triangle| !finite(triangle)) {
         return Err(SampleError::NotFinite { face });
     }
+    winding::make_agree(&mut triangles);
     let outside = outside(&triangles);
     let patch = |corners: [Vec3; 3]| {
         let normal = (outside * vector_area(&corners)).try_normalize()?.as_vec3();
