@@ -79,7 +79,8 @@ pub enum CloudError {
     },
     /// Radii cannot be made from nearest neighbours, since all points are at one position.
     #[error(
-        "all {count} points are at one position, so that neighbours give no radius: give one with CloudBuilder::radius"
+        "all {count} points are at one position, so that neighbours give no radius: give one with CloudBuilder::radius; \
+         if they were apart before they became f32, move their origin nearer"
     )]
     NoSpacing {
         /// Number of points.
