@@ -11,7 +11,7 @@ use tldi_examples::depth::{
     DepthScene, DepthSimulation, DepthSnapshot, FrameSource, GeneratedCamera, camera_up,
 };
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
-use tldi_examples::scan::positive;
+use tldi_examples::scan::{positive, within};
 use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::NamedCloud;
 use tldi_examples::spots::{Demand, NoSpot, Spot, find_spots_where};
@@ -38,7 +38,7 @@ struct Args {
     #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
     size: Option<f32>,
     /// Seconds for which the first frame stays, so that the bodies land before things move
-    #[arg(long, value_name = "S", default_value_t = 1.5)]
+    #[arg(long, value_name = "S", default_value_t = 1.5, value_parser = within(0.0, 3600.0), allow_hyphen_values = true)]
     hold: f32,
     /// How often the frames are shown
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
@@ -105,9 +105,6 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> anyhow::Result<()> {
     args.common.check_outputs()?;
-    if !(0.0..=3600.0).contains(&args.hold) {
-        bail!("--hold must be from 0 to 3600 seconds");
-    }
     let (source, missing) = open(args)?;
     let model = SensorModel {
         noise: args.sensor_noise,

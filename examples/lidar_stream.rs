@@ -2,6 +2,7 @@
 
 use anyhow::{Context, bail, ensure};
 use clap::Parser;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::glamx::{Pose3, Vec3};
@@ -26,8 +27,8 @@ struct Args {
     #[arg(long, value_name = "DIR")]
     sweeps: Option<PathBuf>,
     /// Most sweeps to take
-    #[arg(long, value_name = "N", default_value_t = 30)]
-    count: usize,
+    #[arg(long, value_name = "N", default_value = "30")]
+    count: NonZeroUsize,
     /// Direction against gravity in the frame of the poses; auto takes the z axis of the first sweep
     #[arg(
         long,
@@ -72,12 +73,9 @@ fn run(args: &Args) -> anyhow::Result<()> {
     args.common.check_outputs()?;
     let source = match &args.sweeps {
         Some(folder) => SweepSource::open(folder)?,
-        None => SweepSource::Generated(Scanner::new(args.count, args.common.seed)),
+        None => SweepSource::Generated(Scanner::new(args.count.get(), args.common.seed)),
     };
-    let count = source.len().min(args.count);
-    if count == 0 {
-        bail!("there is no sweep to take: give --count of at least 1");
-    }
+    let count = source.len().min(args.count.get());
     let scene = scene(args, [&source.sweep(0)?, &source.sweep(count - 1)?])?;
     let mut simulation = LidarSimulation::new(scene, args.common.backend.open()?)?;
     let bar = output::progress_bar(count, "sweeps");

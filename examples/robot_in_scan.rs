@@ -14,7 +14,7 @@ use tldi_examples::robot::{
     BUILT_IN, Base, DT, Description, MeshFolders, Motion, RobotScene, RobotSimulation,
     RobotSnapshot, Walk, quadruped,
 };
-use tldi_examples::scan::{ScanSource, choose_up, load_scan};
+use tldi_examples::scan::{ScanSource, choose_up, load_scan, within};
 use tldi_examples::terrain::{Ground, Terrain};
 use tldi_examples::{load, output};
 use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, thinned, viewpoint};
@@ -60,7 +60,7 @@ struct Args {
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
     /// Standard deviation of the scan's points in metres, for the self-filter
-    #[arg(long, value_name = "M", default_value_t = 0.003)]
+    #[arg(long, value_name = "M", default_value_t = 0.003, value_parser = within(0.0, 1.0), allow_hyphen_values = true)]
     sensor_noise: f32,
     /// The scan comes anew 30 times a second, from a camera that sees the robot too
     #[arg(long)]
@@ -115,9 +115,6 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> anyhow::Result<()> {
     args.common.check_outputs()?;
-    if !(args.sensor_noise.is_finite() && args.sensor_noise >= 0.0) {
-        bail!("--sensor-noise must be a number that is not negative");
-    }
     let robot = load_robot(args)?;
     let terrain = args
         .terrain
@@ -164,6 +161,12 @@ fn run(args: &Args) -> anyhow::Result<()> {
     if !args.common.no_pictures {
         draw(&simulation, up, &snapshots, &hardest, args)?;
     }
+    if let Some(link) = simulation.thrown_out() {
+        bail!(
+            "link {link} was thrown out of the scan in step {}: do the robot's links start inside it, or is the robot's own image in it?",
+            report.totals.steps
+        );
+    }
     if !simulation.is_on_scan() {
         bail!("the robot fell out of the scan");
     }
@@ -191,7 +194,7 @@ fn load_robot(args: &Args) -> anyhow::Result<Description> {
     Ok(robot)
 }
 
-/// Takes all steps; a snapshot before the first, and after every [`ANIMATION_STEPS`], and one of the moment in which a
+/// Takes all steps, up to that in which a link is thrown out; a snapshot before the first, and after every [`ANIMATION_STEPS`], and one of the moment in which a
 /// link is pushed most.
 fn simulate(
     simulation: &mut RobotSimulation,
@@ -218,6 +221,10 @@ fn simulate(
         }
         if simulation.largest_force() > hardest.0 {
             hardest = (simulation.largest_force(), simulation.snapshot());
+        }
+        if simulation.thrown_out().is_some() {
+            snapshots.push(simulation.snapshot());
+            break;
         }
         bar.inc(1);
     }

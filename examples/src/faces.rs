@@ -18,7 +18,7 @@ const LARGE_SHARE: f64 = 0.1;
 pub(crate) fn are_large(raw: &RawCloud, spacing: f32) -> bool {
     let mut is_corner = vec![false; raw.points.len()];
     let (mut large, mut all) = (0.0, 0.0);
-    for face in finite_faces(raw) {
+    for face in finite(raw) {
         let [a, b, c] = face.map(|i| raw.points[i as usize]);
         let area = f64::from((b - a).cross(c - a).length());
         let longest = (a.distance(b)).max(b.distance(c)).max(c.distance(a));
@@ -39,7 +39,7 @@ pub(crate) fn are_large(raw: &RawCloud, spacing: f32) -> bool {
 /// # Errors
 /// Those of the sampling.
 pub(crate) fn sampled(raw: RawCloud, spacing: f32) -> anyhow::Result<RawCloud> {
-    let mesh = TriMesh::new(raw.points.clone(), finite_faces(&raw).collect())?;
+    let mesh = TriMesh::new(raw.points.clone(), finite(&raw).collect())?;
     let cloud = sample_shape(&mesh, spacing)?;
     let colors = match raw.colors {
         Some(colors) => {
@@ -68,7 +68,7 @@ pub(crate) fn sampled(raw: RawCloud, spacing: f32) -> anyhow::Result<RawCloud> {
 }
 
 /// The faces whose corners are all finite.
-fn finite_faces(raw: &RawCloud) -> impl Iterator<Item = [u32; 3]> {
+pub(crate) fn finite(raw: &RawCloud) -> impl Iterator<Item = [u32; 3]> {
     let is_finite = |face: &[u32; 3]| face.iter().all(|i| raw.points[*i as usize].is_finite());
     raw.faces.iter().copied().filter(is_finite)
 }

@@ -67,7 +67,15 @@ fn read(path: &Path, spacing: impl Fn(Vec3) -> f32) -> anyhow::Result<RawCloud> 
         let corners = raw.points.iter().copied().filter(|p| p.is_finite());
         let spacing = spacing(corners.fold(Aabb::EMPTY, Aabb::including).extents());
         if is_mesh || faces::are_large(&raw, spacing) {
-            return faces::sampled(raw, spacing);
+            let left_out = raw.faces.len() - faces::finite(&raw).count();
+            if left_out > 0 {
+                eprintln!(
+                    "warning: {left_out} of {} faces of {} have corners that are not finite: they are left out",
+                    raw.faces.len(),
+                    path.display()
+                );
+            }
+            raw = faces::sampled(raw, spacing)?;
         }
     }
     if !raw.has_unsigned_normals

@@ -45,6 +45,14 @@ pub fn positive(text: &str) -> Result<f32, String> {
     }
 }
 
+/// A parser of numbers from `least` to `most`.
+pub fn within(least: f32, most: f32) -> impl Fn(&str) -> Result<f32, String> + Clone {
+    move |text| match text.parse() {
+        Ok(number) if least <= number && number <= most => Ok(number),
+        _ => Err(format!("expected a number from {least} to {most}")),
+    }
+}
+
 /// Loads the scan, or generates a room.
 ///
 /// # Errors

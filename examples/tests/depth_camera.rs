@@ -171,7 +171,7 @@ fn what_is_wrong_is_said() {
             1,
             "no level surface",
         ),
-        (&["--hold", "-1"], 2, "unexpected argument"),
+        (&["--hold", "-1"], 2, "from 0 to 3600"),
     ];
     assert_refused(BINARY, &folder, &cases);
     // A frame that is missing is named, and passed over.

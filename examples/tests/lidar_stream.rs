@@ -186,5 +186,5 @@ fn what_is_missing_is_named() {
     fs::write(data.join("calib.txt"), "P0: 1\n").unwrap();
     refused("no line `Tr:`");
     let output = run(BINARY, &folder, &["--count", "0"]);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(2));
 }

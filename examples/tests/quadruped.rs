@@ -57,11 +57,12 @@ fn walk(ground: Ground, seed: u64) -> StandingReport {
 
 /// What of a walk is not as it should be.
 fn faults(r: &StandingReport) -> Vec<&'static str> {
+    let [least, last] = [r.least_height, r.last_height].map(|height| height / r.start_height);
     [
         (r.feet == 4, "feet"),
         // Legs give way by 2 % under a quarter of the weight, and by twice of that while one is up; the rest is
         // for landing.
-        (r.least_height > 0.9 && r.last_height > 0.95, "height"),
+        (least > 0.9 && last > 0.95, "height"),
         // At 0.125 m/s for 5.4 s, without slip, 0.68 m. The rough ground begins 8 cm in front of the front feet.
         ((0.3..0.7).contains(&r.way), "way"),
         (r.deepest_radii < 0.5, "depth"),
@@ -112,8 +113,8 @@ fn all_walks() {
             let r = walk(ground, seed);
             eprintln!(
                 "| {ground:?} | {seed} | {:.1} | {:.1} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} |",
-                1e2 * r.least_height,
-                1e2 * r.last_height,
+                1e2 * r.least_height / r.start_height,
+                1e2 * r.last_height / r.start_height,
                 r.way,
                 r.deepest_radii,
                 r.max_foot_force,

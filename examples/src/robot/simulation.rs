@@ -14,7 +14,6 @@ use super::{Motion, SelfFilter};
 use crate::load;
 use crate::step_totals::StepTotals;
 use crate::terrain::Terrain;
-use anyhow::bail;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 use std::collections::HashMap;
@@ -258,7 +257,7 @@ impl RobotSimulation {
     /// Takes one step of 1/60 s.
     ///
     /// # Errors
-    /// Those of the pipeline, and a robot that is nowhere any more.
+    /// Those of the pipeline.
     pub fn step(&mut self) -> anyhow::Result<()> {
         let start = Instant::now();
         if self.totals.steps.is_multiple_of(STEPS_PER_FRAME) {
@@ -279,18 +278,6 @@ impl RobotSimulation {
         self.totals.count(&report, touches);
         self.totals.add_wall_seconds(seconds);
         self.max_penetration = self.max_penetration.max(report.max_penetration);
-        let bounds = self.scan.bounds();
-        let farthest = FAR_AWAY * bounds.extents().length().max(self.build.size);
-        let is_lost = |pose: &Pose3| {
-            let distance = pose.translation.distance(bounds.center());
-            distance.is_nan() || distance > farthest
-        };
-        if let Some(k) = self.scan_from_link().iter().position(is_lost) {
-            bail!(
-                "link {} was thrown out of the scan: do the robot's links start inside it, or is the robot's own image in it?",
-                self.clouds[k].name
-            );
-        }
         Ok(())
     }
 
@@ -434,6 +421,18 @@ impl RobotSimulation {
                 .collect(),
             warnings: self.robot.warnings.clone(),
         }
+    }
+
+    /// The name of a link that is too far from the scan to come back.
+    pub fn thrown_out(&self) -> Option<&str> {
+        let bounds = self.scan.bounds();
+        let farthest = FAR_AWAY * bounds.extents().length().max(self.build.size);
+        let is_lost = |pose: &Pose3| {
+            let distance = pose.translation.distance(bounds.center());
+            distance.is_nan() || distance > farthest
+        };
+        let lost = self.scan_from_link().iter().position(is_lost)?;
+        Some(&self.clouds[lost].name)
     }
 
     /// Whether the robot is fixed or still on the scan: not below its lowest point.

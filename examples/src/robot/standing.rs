@@ -20,9 +20,11 @@ pub struct StandingReport {
     pub feet: usize,
     /// Weight that a foot carries when it stands, N.
     pub weight_share: f32,
-    /// Height of the root over the mean ground under the feet by that at the start: least, and last.
+    /// Height of the root over the lowest link at the start, metres.
+    pub start_height: f32,
+    /// Least height of the root over the mean ground under the feet, metres.
     pub least_height: f32,
-    /// After the last step.
+    /// That height after the last step.
     pub last_height: f32,
     /// How far the root moved over ground, metres.
     pub way: f32,
@@ -48,12 +50,13 @@ impl StandingReport {
     pub fn write_line(&self, out: &mut impl Write) -> io::Result<()> {
         writeln!(
             out,
-            "went {:.2} m; base at least at {:.1} % of its height, {:.1} % at the end; contacts at most {:.2} r \
+            "went {:.2} m; base {:.3} m high at the start, at least {:.3} m, {:.3} m at the end; contacts at most {:.2} r \
              deep (step {}); at most {:.2} of its share of {:.0} N on a foot (step {}); under the true ground: \
              feet {:.1} mm, other links {:.1} mm",
             self.way,
-            1e2 * self.least_height,
-            1e2 * self.last_height,
+            self.start_height,
+            self.least_height,
+            self.last_height,
             self.deepest_radii,
             self.deepest_step,
             self.max_foot_force,
@@ -70,7 +73,6 @@ pub(super) struct Standing {
     terrain: Terrain,
     tree: KdTree,
     feet: Vec<bool>,
-    nominal: f32,
     start: Vec3,
     step: usize,
     report: StandingReport,
@@ -94,18 +96,20 @@ impl Standing {
         let least = heights.iter().copied().fold(f32::MAX, f32::min);
         let feet: Vec<bool> = heights.iter().map(|h| *h < least + FOOT_HEIGHT).collect();
         let count = feet.iter().filter(|is_foot| **is_foot).count();
-        let mut standing = Self {
+        // The start is above the ground by the drop.
+        let start_height = root.translation.z - least;
+        Self {
             terrain,
             tree: KdTree::new(scan),
             feet,
-            nominal: 1.0,
             start: root.translation,
             step: 0,
             report: StandingReport {
                 feet: count,
                 weight_share: weight / count as f32,
-                least_height: f32::INFINITY,
-                last_height: 1.0,
+                start_height,
+                least_height: start_height,
+                last_height: start_height,
                 way: 0.0,
                 deepest_radii: 0.0,
                 deepest_step: 0,
@@ -114,10 +118,7 @@ impl Standing {
                 feet_under_ground: 0.0,
                 links_under_ground: 0.0,
             },
-        };
-        // The start is above the ground by the drop.
-        standing.nominal = root.translation.z - least;
-        standing
+        }
     }
 
     /// After a step: contacts (point and depth) with the scan, and the contact force of each link.
@@ -149,8 +150,7 @@ impl Standing {
             };
             *worst = worst.max(deepest);
         }
-        let height = root.translation.z - ground / report.feet as f32;
-        report.last_height = height / self.nominal;
+        report.last_height = root.translation.z - ground / report.feet as f32;
         report.least_height = report.least_height.min(report.last_height);
         report.way = (root.translation - self.start).truncate().length();
         let mut near = Vec::new();
