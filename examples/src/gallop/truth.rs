@@ -63,14 +63,17 @@ impl TrueDepths {
     }
 }
 
-/// How deep the deepest of these points, in the world, is below the ground at a time; negative over it. To first order
-/// in the height over the surface, which bends by less than 2 % over a hoof.
+/// How deep the deepest of these points, in the world, is below the ground at a time; negative over it and beside it. To
+/// first order in the height over the surface, which bends by less than 2 % over a hoof.
 pub(super) fn below_ground(ground: &Ground, time: f32, points: impl Iterator<Item = Vec3>) -> f32 {
+    let [along, across] = ground.half_size;
     let depth = |p: Vec3| {
         let (surface, normal) = ground.surface(p.x, p.z, time);
         (surface - p).dot(normal)
     };
-    points.map(depth).fold(f32::NEG_INFINITY, f32::max)
+    (points.filter(|p| p.x.abs() <= along && p.z.abs() <= across))
+        .map(depth)
+        .fold(f32::NEG_INFINITY, f32::max)
 }
 
 /// A generated body's true surface, in the frame of its cloud.
