@@ -4,6 +4,7 @@ use crate::TldiConfig;
 use rapier3d::math::Pose;
 use rapier3d::parry::query::{ShapeCastHit, ShapeCastStatus};
 use rapier3d::parry::shape::Shape;
+use tldi::plan::first_is_smaller;
 use tldi::{Impact, Params};
 
 /// Distance in pixels up to which surfaces count as touching. It is twice the scatter of measured
@@ -20,8 +21,8 @@ pub(super) struct Moving<'a> {
 
 impl<'a> Moving<'a> {
     pub(super) fn new([part1, part2]: [&'a dyn Shape; 2]) -> Self {
-        let size = |shape: &dyn Shape| shape.compute_local_aabb().extents().length_squared();
-        let is_swapped = size(part1) < size(part2);
+        let extents = [part1, part2].map(|part| part.compute_local_aabb().extents());
+        let is_swapped = first_is_smaller(extents);
         Self {
             parts: if is_swapped {
                 [part2, part1]

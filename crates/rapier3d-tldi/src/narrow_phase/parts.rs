@@ -5,7 +5,7 @@ use crate::{PointCloudShape, TldiConfig};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::bounding_volume::{Aabb, BoundingVolume};
 use rapier3d::parry::shape::{Shape, ShapeType};
-use tldi::plan::{largest_pixel, least_pixel};
+use tldi::plan::{first_is_smaller, largest_pixel, least_pixel};
 use tldi::{PairQuery, Params, PointCloud, Surface, Variant, View};
 
 /// Contacts are searched up to this many standard deviations of given noise. So the fit at a light
@@ -146,13 +146,10 @@ impl TldiConfig {
     pub(crate) fn params(&self, parts: [&dyn Shape; 2], prediction: f32) -> Option<Params> {
         let radius = |part: &dyn Shape| cloud_of(part).map(|shape| shape.cloud().mean_radius());
         let coarsest = parts.into_iter().filter_map(radius).reduce(f32::max)?;
-        let size = |part: &&dyn Shape| part.compute_local_aabb().extents();
-        let [first, second] = parts;
-        let smaller = match size(&first).length_squared() < size(&second).length_squared() {
-            true => first,
-            false => second,
-        };
-        let to_resolve = largest_pixel(size(&smaller), radius(smaller).unwrap_or(0.0));
+        let extents = parts.map(|part| part.compute_local_aabb().extents());
+        let smaller = usize::from(!first_is_smaller(extents));
+        let own_radius = radius(parts[smaller]).unwrap_or(0.0);
+        let to_resolve = largest_pixel(extents[smaller], own_radius);
         let params = match self.variant {
             Variant::Paper => Params::paper(coarsest),
             Variant::Oriented => Params::for_radius(coarsest),

@@ -7,10 +7,11 @@ use crate::step::candidates::{Candidate, contact_reach, effective_prediction, pa
 use crate::step::measured::Measured;
 use crate::step::prepared::{Batch, PreparedPair, Question};
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet};
-use rapier3d::geometry::{Aabb, Collider, ColliderHandle, ColliderSet};
+use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, Once};
+use tldi::plan::first_is_smaller;
 
 /// All that a batch is made from.
 pub(crate) struct Frame<'a> {
@@ -193,12 +194,12 @@ impl LastAxis {
         let axis1 = pose1.rotation.inverse() * self.axis;
         let axis2 = pair.pos12.rotation.inverse() * axis1;
         let [aabb1, aabb2] = [pair.shape1, pair.shape2].map(|shape| shape.compute_local_aabb());
-        let size = |aabb: &Aabb| aabb.half_extents().length();
         // Of the smaller shape: its bounds and the axis in its own frame; its poses and the axis in that of the other.
-        let (bounds, own_axis, poses, axis) = match size(&aabb1) < size(&aabb2) {
-            true => (aabb1, axis1, poses.map(|pose| pose.inverse()), axis2),
-            false => (aabb2, axis2, poses, axis1),
-        };
+        let (bounds, own_axis, poses, axis) =
+            match first_is_smaller([aabb1.extents(), aabb2.extents()]) {
+                true => (aabb1, axis1, poses.map(|pose| pose.inverse()), axis2),
+                false => (aabb2, axis2, poses, axis1),
+            };
         let [before, now] = poses.map(|pose| pose * bounds.center());
         let half_width = bounds.half_extents().dot(own_axis.abs());
         (now - before).dot(axis).abs() > half_width

@@ -11,7 +11,7 @@ use crate::narrow_phase::parts::{PartPair, ShapePair, cloud_shapes_of, clouds_of
 use rapier3d::math::Pose;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::shape::Shape;
-use tldi::plan::largest_pixel;
+use tldi::plan::{first_is_smaller, largest_pixel};
 use tldi::{ContactPatch, PairResult};
 
 /// Whether a pair touches in one or two round spots or lines. Such a pair rolls, and a point that
@@ -57,17 +57,16 @@ impl Measured {
             .map(|cloud| cloud.mean_radius())
             .reduce(f32::max)?;
         let bounds = [pair.shape1, pair.shape2].map(|shape| shape.compute_local_aabb());
-        let size = bounds.map(|bounds| bounds.extents().length_squared());
-        let shape1_is_smaller = size[0] < size[1];
-        let smaller = bounds[usize::from(!shape1_is_smaller)].extents();
+        let shape1_is_smaller = first_is_smaller(bounds.map(|bounds| bounds.extents()));
+        let smaller = bounds[usize::from(!shape1_is_smaller)];
         // Otherwise a body smaller than the spacing of the points would be through them before they
         // are compared again.
-        let max_drift = config.scatter * coarsest.min(largest_pixel(smaller, 0.0));
+        let max_drift = config.scatter * coarsest.min(largest_pixel(smaller.extents(), 0.0));
         (max_drift > 0.0).then_some(Self {
             pos12: pair.pos12,
             prediction: pair.prediction,
             revision: revision_of(pair),
-            bounds: bounds[usize::from(!shape1_is_smaller)],
+            bounds: smaller,
             shape1_is_smaller,
             max_drift,
         })

@@ -6,6 +6,7 @@
 //! [uneven](PointCloud::is_uneven) one, they reach at least that far.
 
 use crate::pair::pixels::largest_pixel;
+use crate::pair::surface::first_is_smaller;
 use crate::{Params, PointCloud, Radii, Surface};
 
 /// How many times as large as `expected` a mean radius is where surfaces are near: the nearest
@@ -158,11 +159,9 @@ impl Place {
         let [a, b] = surfaces;
         let [near_a, near_b] = near;
         let expected = a.mean_radius().max(b.mean_radius());
-        let [extents_a, extents_b] = surfaces.map(|surface| surface.bounds().extents());
-        let resolving = match extents_a.length_squared() < extents_b.length_squared() {
-            true => largest_pixel(extents_a, near_a),
-            false => largest_pixel(extents_b, near_b),
-        };
+        let extents = surfaces.map(|surface| surface.bounds().extents());
+        let smaller = usize::from(!first_is_smaller(extents));
+        let resolving = largest_pixel(extents[smaller], near[smaller]);
         let coarser = coarsening(near_a.max(near_b), expected.max(params.pixel_size))
             .min(resolving / params.pixel_size)
             .max(1.0);

@@ -13,6 +13,7 @@ pub use crate::cpu::zone::ZoneGrid;
 pub use crate::pair::pixels::{largest_pixel, least_pixel};
 pub use crate::pair::sampling::{AIM_SAMPLES, first_taken, is_aim_sample, stride};
 pub use crate::pair::stage_constants::stage_constants;
+pub use crate::pair::surface::first_is_smaller;
 pub use crate::view::approach::{Approach, Body};
 pub use crate::view::camera_policy::MAX_VIEWS;
 
@@ -195,20 +196,20 @@ fn bounds_with_inside(query: &PairQuery) -> [Aabb; 2] {
         let sunk = to_middle.min(SUNK * query.params.pixel_size + moved);
         larger.reached_through(body_in_larger).loosened(sunk)
     };
-    if a.extents().length() >= b.extents().length() {
-        [with_inside(a, b, b.transformed(&query.a_from_b)), b]
-    } else {
+    if first_is_smaller([a.extents(), b.extents()]) {
         let a_in_b = a.transformed(&query.a_from_b.inverse());
         [a, with_inside(b, a, a_in_b)]
+    } else {
+        [with_inside(a, b, b.transformed(&query.a_from_b)), b]
     }
 }
 
-/// See [`SidePlan::body`].
+/// See [`SidePlan::body`]. Two that are equal are both bodies.
 fn bodies(query: &PairQuery) -> [Option<Aabb>; 2] {
     let (a, b) = (query.a.bounds(), query.b.bounds());
-    let (size_a, size_b) = (a.extents().length(), b.extents().length());
+    let is_smaller = |one: Aabb, other: Aabb| first_is_smaller([one.extents(), other.extents()]);
     [
-        (size_a <= size_b).then_some(a),
-        (size_b <= size_a).then_some(b),
+        (!is_smaller(b, a)).then_some(a),
+        (!is_smaller(a, b)).then_some(b),
     ]
 }

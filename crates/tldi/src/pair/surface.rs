@@ -94,3 +94,16 @@ impl Surface<'_> {
         }
     }
 }
+
+/// Whether the first of two surfaces is the smaller one, by the diagonals of their bounds, which have these extents in
+/// metres. Of two that are equal, the second counts as the smaller one.
+///
+/// ```
+/// use tldi::{glamx::Vec3, plan::first_is_smaller};
+/// let (body, floor) = (Vec3::ONE, Vec3::new(9.0, 0.0, 9.0));
+/// assert!(first_is_smaller([body, floor]));
+/// assert!(!first_is_smaller([floor, body]) && !first_is_smaller([body, body]));
+/// ```
+pub fn first_is_smaller([first, second]: [Vec3; 2]) -> bool {
+    first.length_squared() < second.length_squared()
+}

@@ -1,6 +1,7 @@
 //! Where two surfaces are and how they move against each other, as the stage `aim` asks.
 
 use crate::Aabb;
+use crate::pair::surface::first_is_smaller;
 use glamx::{Pose3, Quat, Vec3};
 
 /// Least weight of the direction to `b`, see [`Approach::plainness`]. Half: 16 of 636 stability rows fail instead of 3, all
@@ -88,20 +89,20 @@ impl Approach {
     ) -> Self {
         // A small body on a large scan lies on the side of its own middle. In the frame of the
         // smaller surface the larger one would fill its bounds, and they would tell nothing.
-        let size = |bounds: &Aabb| bounds.extents().length_squared();
+        let is_b = !first_is_smaller([a.extents(), b.extents()]);
         let meeting = |larger: &Aabb, smaller: &Aabb| {
             let (low, high) = (larger.min.max(smaller.min), larger.max.min(smaller.max));
             let half_extents = 0.5 * (high - low).abs();
             (smaller.center() - 0.5 * (low + high), half_extents)
         };
         let b_from_a = a_from_b.inverse();
-        let (toward_b, half_extents, larger_from_a, body) = if size(b) <= size(a) {
+        let (toward_b, half_extents, larger_from_a, body) = if is_b {
             let (toward_b, half_extents) = meeting(a, &b.transformed(a_from_b));
             let body = Body {
                 middle: *a_from_b * b.center(),
                 half_extents: 0.5 * b.extents(),
                 from_a: b_from_a.rotation,
-                is_b: true,
+                is_b,
             };
             (toward_b, half_extents, Quat::IDENTITY, body)
         } else {
@@ -111,7 +112,7 @@ impl Approach {
                 middle: a.center(),
                 half_extents: 0.5 * a.extents(),
                 from_a: Quat::IDENTITY,
-                is_b: false,
+                is_b,
             };
             (toward_b, half_extents, b_from_a.rotation, body)
         };
