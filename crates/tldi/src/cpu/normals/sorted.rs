@@ -1,12 +1,16 @@
 //! Points in a grid of cells, so that each finds its neighbours in 27 of them.
 
 use crate::cpu::lanes::{bounds, multiversioned, truncated};
+use crate::cpu::zone::cells_over;
 use glamx::Vec3;
 use std::ops::Range;
 
 /// Most cells per point: on a surface of 4 million points there are as many. Sparser ones get
 /// larger cells, which only makes for more candidates.
 const CELLS_PER_POINT: usize = 16;
+
+/// Empty cells along each axis, one on either side.
+const RIM: f32 = 2.0;
 
 /// Most candidates whose distances are looked at, for all points of a cell: five times what a
 /// surface has. Of more, an even selection represents them.
@@ -53,17 +57,11 @@ pub(crate) struct Grid {
 impl Grid {
     fn new(min: Vec3, max: Vec3, support: f32, points: usize) -> Self {
         let limit = (CELLS_PER_POINT * points + 4096) as f32;
-        let extents = max - min;
-        let dims = |cell: f32| (extents / cell).floor() + Vec3::splat(3.0);
-        let mut cell = support;
-        while dims(cell).element_product() > limit {
-            cell *= 1.26; // a third of an octave: twice fewer cells
-        }
-        let d = dims(cell);
+        let (cell, dims) = cells_over(max - min, support, RIM, limit);
         Self {
             min,
             inv_cell: 1.0 / cell,
-            dims: [d.x as usize, d.y as usize, d.z as usize],
+            dims,
         }
     }
 
@@ -78,7 +76,7 @@ impl Grid {
 
     #[inline(always)]
     fn cell_at(&self, [x, y, z]: [f32; 3]) -> u32 {
-        let most = self.dims.map(|d| d as f32 - 3.0);
+        let most = self.dims.map(|d| d as f32 - (1.0 + RIM));
         let [width, height] = [self.dims[0] as u32, self.dims[1] as u32];
         let x = 1 + truncated((x - self.min.x) * self.inv_cell, most[0]);
         let y = 1 + truncated((y - self.min.y) * self.inv_cell, most[1]);

@@ -9,6 +9,16 @@ use glamx::Vec3;
 /// get larger cells, and the stage then keeps more points.
 const MAX_CELLS: f32 = (1 << 22) as f32;
 
+/// Edge in metres and numbers of the cells of a grid over `extents`, with `rim` more along each axis: of at least `edge`
+/// metres, and larger where there would be more than `most`.
+pub(crate) fn cells_over(extents: Vec3, mut edge: f32, rim: f32, most: f32) -> (f32, [usize; 3]) {
+    let dims = |edge: f32| (extents / edge).floor() + Vec3::splat(1.0 + rim);
+    while dims(edge).element_product() > most {
+        edge *= 1.26; // the cube root of 2: half as many cells
+    }
+    (edge, dims(edge).to_array().map(|n| n as usize))
+}
+
 /// Cells of at least the zone's reach over the overlap of both bounds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ZoneGrid {
@@ -29,16 +39,7 @@ impl ZoneGrid {
     /// The same with at most `most` cells, and at least one.
     pub(crate) fn with_cells(bounds: &Aabb, reach: f32, most: f32) -> Self {
         let extents = bounds.extents().max(Vec3::ZERO);
-        let mut cell = reach.max(f32::MIN_POSITIVE);
-        let count = |cell: f32| {
-            let n = (extents / cell).floor() + Vec3::ONE;
-            n.x * n.y * n.z
-        };
-        while count(cell) > most {
-            cell *= 1.26; // the cube root of 2: half as many cells
-        }
-        let dims = (extents / cell).floor() + Vec3::ONE;
-        let dims = [dims.x as usize, dims.y as usize, dims.z as usize];
+        let (cell, dims) = cells_over(extents, reach.max(f32::MIN_POSITIVE), 0.0, most);
         Self {
             min: bounds.min,
             inv_cell: 1.0 / cell,

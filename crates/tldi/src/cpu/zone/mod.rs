@@ -12,6 +12,7 @@ mod grid;
 
 pub(crate) use around_places::AroundPlaces;
 pub use grid::ZoneGrid;
+pub(crate) use grid::cells_over;
 
 use super::cull::Survivors;
 use super::fold::{SpaceFold, is_coarse};
