@@ -10,6 +10,7 @@
 mod aabb;
 mod cloud;
 mod contact;
+mod counting_sort;
 mod cpu;
 mod pair;
 pub mod paper;

@@ -1,5 +1,6 @@
 //! Which contact pixels continue each other, and which penetrations their neighbours confirm.
 
+use crate::counting_sort::ends_of;
 use crate::{ContactPixel, PairResult, Params};
 use std::ops::Range;
 
@@ -196,11 +197,7 @@ impl Links {
             self.starts[k as usize] += 1;
             self.starts[l as usize] += 1;
         }
-        let mut end = 0;
-        for start in &mut self.starts {
-            end += *start;
-            *start = end;
-        }
+        let end = ends_of(&mut self.starts);
         // Filled from the end, so that each start ends up where it belongs.
         self.neighbors.clear();
         self.neighbors.resize(end as usize, 0);
@@ -235,11 +232,7 @@ impl Groups {
         for &root in roots {
             self.starts[root as usize] += 1;
         }
-        let mut end = 0;
-        for start in &mut self.starts {
-            end += *start;
-            *start = end;
-        }
+        ends_of(&mut self.starts);
         // Filled from the end, so that each start ends up where it belongs.
         self.members.clear();
         self.members.resize(roots.len(), 0);

@@ -10,6 +10,7 @@ use super::cull::PointRadii;
 use super::lanes::{multiversioned, truncated};
 use super::rect::Rect;
 use super::splat_radius::{LEAST_RADIUS_PX, splat_radius};
+use crate::counting_sort::{ends_of, starts_of};
 use crate::stage::stage;
 use crate::{Params, Projection, VirtualCamera};
 use glamx::Vec3;
@@ -200,11 +201,7 @@ impl Fragments {
         for &i in points.kept {
             self.tiles[points.columns.tile[i as usize] as usize] += 1;
         }
-        let mut sum = 0;
-        for tile in &mut self.tiles {
-            sum += *tile;
-            *tile = sum;
-        }
+        ends_of(&mut self.tiles);
         self.splats.resize(points.kept.len(), Splat::default());
         make_splats(points, imaging, &mut self.tiles, &mut self.splats);
         imaging.rect.size[1].div_ceil(BAND_ROWS)
@@ -234,14 +231,9 @@ impl Fragments {
             }
         }
         // alloc
-        let mut sum = 0;
-        for offset in &mut self.offsets {
-            let count = *offset;
-            *offset = sum;
-            sum += count;
-        }
-        if self.fragments.len() < sum as usize {
-            self.fragments.resize(sum as usize, Fragment::default());
+        let count = starts_of(&mut self.offsets) as usize;
+        if self.fragments.len() < count {
+            self.fragments.resize(count, Fragment::default());
         }
         self.ends.clear();
         self.ends.extend_from_slice(&self.offsets[..pixels]);

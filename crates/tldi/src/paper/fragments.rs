@@ -4,6 +4,7 @@
 //! The cylinders are sorted by front depth once; binning them by pixel keeps that order, so that no
 //! pixel is sorted on its own, however many fragments it has.
 
+use crate::counting_sort::starts_of;
 use crate::{PointCloud, Projection, VirtualCamera};
 use glamx::{Pose3, Vec3};
 use rayon::prelude::*;
@@ -229,10 +230,7 @@ impl Bins {
                 }
             }
         }
-        let mut total = 0;
-        for end in &mut self.ends {
-            total += std::mem::replace(end, total);
-        }
+        let total = starts_of(&mut self.ends);
         let unset = Fragment {
             near: 0.0,
             far: 0.0,

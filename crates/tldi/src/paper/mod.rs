@@ -55,6 +55,7 @@ mod visibility;
 
 pub use compare::{PaperComparison, colliding_pixels, compare};
 
+use crate::counting_sort::starts_of;
 use crate::{Layer, Params, PointCloud, Tldi, VirtualCamera};
 use blending::blending;
 use counter::counter;
@@ -202,10 +203,7 @@ fn bin_by_band(
             band_ends[band] += 1;
         }
     }
-    let mut total = 0;
-    for end in band_ends.iter_mut() {
-        total += std::mem::replace(end, total);
-    }
+    let total = starts_of(band_ends);
     band_cylinders.resize(total, 0);
     for (index, cylinder) in (0..).zip(cylinders) {
         for band in bands_of(cylinder) {

@@ -6,6 +6,7 @@
 //! no search for neighbours, no normals of points, no splats. Sums are integers: they do not depend
 //! on the order of the points.
 
+use crate::counting_sort::ends_of;
 use crate::cpu::columns::Columns;
 use crate::cpu::first_look::cell_plane::{Plane, Sums, moved};
 use crate::cpu::lanes::multiversioned;
@@ -227,11 +228,7 @@ impl Cells {
         for (pixel, _) in &self.located {
             self.starts[*pixel as usize] += 1;
         }
-        let mut end = 0;
-        for start in &mut self.starts {
-            end += *start;
-            *start = end;
-        }
+        let end = ends_of(&mut self.starts);
         // Filled from the end, so that each start ends up where it belongs.
         self.points.clear();
         self.points.resize(end as usize, Point::default());

@@ -1,5 +1,6 @@
 //! Points in a grid of cells, so that each finds its neighbours in 27 of them.
 
+use crate::counting_sort::ends_of;
 use crate::cpu::lanes::{bounds, multiversioned, truncated};
 use crate::cpu::zone::cells_over;
 use glamx::Vec3;
@@ -124,11 +125,7 @@ impl Sorted {
         for &cell in &*cells {
             offsets[cell as usize + 1] += 1;
         }
-        let mut sum = 0;
-        for offset in &mut *offsets {
-            sum += *offset;
-            *offset = sum;
-        }
+        ends_of(offsets);
         entries.resize(support.len(), Entry::default());
         for coordinate in &mut *coordinates {
             coordinate.resize(support.len() + RUN, 0.0);
