@@ -60,6 +60,41 @@ pub(crate) fn part(shape: &dyn Shape, index: u32) -> (Option<&Pose>, &dyn Shape)
     }
 }
 
+/// A part of each of two shapes.
+pub(crate) struct Parts<'a> {
+    /// In their compounds; 0 where the shape is not one.
+    pub(crate) indices: [u32; 2],
+    /// In the frames of the wholes (none: the same frame).
+    pub(crate) poses: [Option<&'a Pose>; 2],
+    pub(crate) shapes: [&'a dyn Shape; 2],
+}
+
+impl Parts<'_> {
+    /// From the frames of the parts into those of the wholes.
+    pub(crate) fn wholes_from_parts(&self) -> [Pose; 2] {
+        self.poses
+            .map(|pose| pose.copied().unwrap_or(Pose::IDENTITY))
+    }
+}
+
+/// Each part of the first shape with each of the second, in the order of their indices.
+pub(crate) fn pairs_of_parts<'a>(
+    shape1: &'a dyn Shape,
+    shape2: &'a dyn Shape,
+) -> impl Iterator<Item = Parts<'a>> {
+    (0..part_count(shape1)).flat_map(move |i| {
+        let (pose1, part1) = part(shape1, i);
+        (0..part_count(shape2)).map(move |j| {
+            let (pose2, part2) = part(shape2, j);
+            Parts {
+                indices: [i, j],
+                poses: [pose1, pose2],
+                shapes: [part1, part2],
+            }
+        })
+    })
+}
+
 /// The pose with a unit quaternion: those of joints that turn for minutes drift, and rapier leaves them so.
 pub(crate) fn rigid(pose: Pose) -> Pose {
     match pose.rotation.is_normalized() {
@@ -180,46 +215,47 @@ pub(crate) fn append_part_pairs<'a>(
     mut hint: impl FnMut([u32; 2], Option<&Pose>, Vector) -> Hint,
 ) {
     let prediction = pair.prediction;
-    for i in 0..part_count(pair.shape1) {
-        let (pose1, part1) = part(pair.shape1, i);
-        for j in 0..part_count(pair.shape2) {
-            let (pose2, part2) = part(pair.shape2, j);
-            let mut a_from_b = pair.pos12;
-            if let Some(pose2) = pose2 {
-                a_from_b *= *pose2;
-            }
-            if let Some(pose1) = pose1 {
-                a_from_b = pose1.inv_mul(&a_from_b);
-            }
-            let a_from_b = rigid(a_from_b);
-            let is_near = within_reach(part1, part2, &a_from_b, prediction);
-            if !(is_near && has_surface(part1) && has_surface(part2)) {
-                continue;
-            }
-            let comparison = config.params([part1, part2], prediction).map(|params| {
-                let a = part1.compute_local_aabb().loosened(prediction);
-                let b = part2.compute_aabb(&a_from_b);
-                let Hint { motion, last_axis } = hint([i, j], pose1, middle_of_meeting(&a, &b));
-                let query = sides.len();
-                sides.push([ExactShape(part1), ExactShape(part2)]);
-                Comparison {
-                    view: View::Aim {
-                        policy: config.camera_policy,
-                        motion,
-                        last_axis,
-                    },
-                    params,
-                    scatter: config.scatter * 0.5 * params.thickness,
-                    query,
-                }
-            });
-            parts.push(PartPair {
-                parts: [i, j],
-                poses: [pose1.copied(), pose2.copied()],
-                a_from_b,
-                comparison,
-            });
+    for Parts {
+        indices,
+        poses: [pose1, pose2],
+        shapes: [part1, part2],
+    } in pairs_of_parts(pair.shape1, pair.shape2)
+    {
+        let mut a_from_b = pair.pos12;
+        if let Some(pose2) = pose2 {
+            a_from_b *= *pose2;
         }
+        if let Some(pose1) = pose1 {
+            a_from_b = pose1.inv_mul(&a_from_b);
+        }
+        let a_from_b = rigid(a_from_b);
+        let is_near = within_reach(part1, part2, &a_from_b, prediction);
+        if !(is_near && has_surface(part1) && has_surface(part2)) {
+            continue;
+        }
+        let comparison = config.params([part1, part2], prediction).map(|params| {
+            let a = part1.compute_local_aabb().loosened(prediction);
+            let b = part2.compute_aabb(&a_from_b);
+            let Hint { motion, last_axis } = hint(indices, pose1, middle_of_meeting(&a, &b));
+            let query = sides.len();
+            sides.push([ExactShape(part1), ExactShape(part2)]);
+            Comparison {
+                view: View::Aim {
+                    policy: config.camera_policy,
+                    motion,
+                    last_axis,
+                },
+                params,
+                scatter: config.scatter * 0.5 * params.thickness,
+                query,
+            }
+        });
+        parts.push(PartPair {
+            parts: indices,
+            poses: [pose1.copied(), pose2.copied()],
+            a_from_b,
+            comparison,
+        });
     }
 }
 

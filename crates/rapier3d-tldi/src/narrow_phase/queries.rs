@@ -9,7 +9,7 @@ mod discs;
 mod nearest;
 
 use crate::ExactShape;
-use crate::narrow_phase::parts::{PartPair, ShapePair, cloud_of, part, part_count};
+use crate::narrow_phase::parts::{PartPair, ShapePair, cloud_of, pairs_of_parts, part};
 use crate::step::prepared::Shared;
 use discs::DiscSurface;
 use nearest::{CloudTarget, ExactTarget, Nearest, nearest};
@@ -43,25 +43,21 @@ pub(crate) fn closest(
     limit: f32,
 ) -> Result<Option<Closest>, Unsupported> {
     let mut best: Option<Closest> = None;
-    for i in 0..part_count(shape1) {
-        for j in 0..part_count(shape2) {
-            let limit = best.as_ref().map_or(limit, |best| best.distance);
-            if limit <= 0.0 {
-                return Ok(best);
-            }
-            let (pose1, part1) = part(shape1, i);
-            let (pose2, part2) = part(shape2, j);
-            let pose1 = pose1.copied().unwrap_or(Pose::IDENTITY);
-            let pose2 = pose2.copied().unwrap_or(Pose::IDENTITY);
-            let a_from_b = pose1.inv_mul(&(*pos12 * pose2));
-            if let Some(found) = closest_of_parts(&a_from_b, part1, part2, limit)? {
-                best = Some(Closest {
-                    distance: found.distance,
-                    points: found.points.map(|point| pose1 * point),
-                    normal: pose1.rotation * found.normal,
-                    parts: [i, j],
-                });
-            }
+    for parts in pairs_of_parts(shape1, shape2) {
+        let limit = best.as_ref().map_or(limit, |best| best.distance);
+        if limit <= 0.0 {
+            return Ok(best);
+        }
+        let [pose1, pose2] = parts.wholes_from_parts();
+        let [part1, part2] = parts.shapes;
+        let a_from_b = pose1.inv_mul(&(*pos12 * pose2));
+        if let Some(found) = closest_of_parts(&a_from_b, part1, part2, limit)? {
+            best = Some(Closest {
+                distance: found.distance,
+                points: found.points.map(|point| pose1 * point),
+                normal: pose1.rotation * found.normal,
+                parts: parts.indices,
+            });
         }
     }
     Ok(best)

@@ -5,7 +5,7 @@ use super::queries;
 use super::turning::Turning;
 use crate::corrections::sweeps::SweptPair;
 use crate::narrow_phase::parts::{
-    ShapePair, has_cloud, has_surface, part, part_count, rigid, surface,
+    ShapePair, has_cloud, has_surface, pairs_of_parts, part_count, rigid, surface,
 };
 use crate::narrow_phase::straight_way::StraightWay;
 use crate::shape::exact::ExactShape;
@@ -154,27 +154,25 @@ fn first_of_parts(
 ) -> Result<Option<ShapeCastHit>, Unsupported> {
     let is_single = part_count(pair.shape1) * part_count(pair.shape2) == 1;
     let mut first: Option<ShapeCastHit> = None;
-    for i in 0..part_count(pair.shape1) {
-        for j in 0..part_count(pair.shape2) {
-            let ((pose1, part1), (pose2, part2)) = (part(pair.shape1, i), part(pair.shape2, j));
-            let [pose1, pose2] = [pose1, pose2].map(|p| p.copied().unwrap_or(Pose::IDENTITY));
-            let hit = match cast([part1, part2], [i, j], [pose1, pose2]) {
-                Ok(Some(hit)) => hit,
-                Err(Unsupported) if is_single => return Err(Unsupported),
-                // A part without a surface passes, and the others meet.
-                Ok(None) | Err(Unsupported) => continue,
-            };
-            if first.is_none_or(|first| hit.time_of_impact < first.time_of_impact) {
-                first = Some(ShapeCastHit {
-                    witness1: pose1 * hit.witness1,
-                    witness2: pose2 * hit.witness2,
-                    normal1: pose1.rotation * hit.normal1,
-                    normal2: pose2.rotation * hit.normal2,
-                    subshape1: i,
-                    subshape2: j,
-                    ..hit
-                });
-            }
+    for parts in pairs_of_parts(pair.shape1, pair.shape2) {
+        let [pose1, pose2] = parts.wholes_from_parts();
+        let hit = match cast(parts.shapes, parts.indices, [pose1, pose2]) {
+            Ok(Some(hit)) => hit,
+            Err(Unsupported) if is_single => return Err(Unsupported),
+            // A part without a surface passes, and the others meet.
+            Ok(None) | Err(Unsupported) => continue,
+        };
+        if first.is_none_or(|first| hit.time_of_impact < first.time_of_impact) {
+            let [subshape1, subshape2] = parts.indices;
+            first = Some(ShapeCastHit {
+                witness1: pose1 * hit.witness1,
+                witness2: pose2 * hit.witness2,
+                normal1: pose1.rotation * hit.normal1,
+                normal2: pose2.rotation * hit.normal2,
+                subshape1,
+                subshape2,
+                ..hit
+            });
         }
     }
     Ok(first)
