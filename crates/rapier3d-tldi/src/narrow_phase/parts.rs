@@ -27,6 +27,12 @@ pub(crate) fn cloud_shapes_of(shape: &dyn Shape) -> impl Iterator<Item = &PointC
     (0..part_count(shape)).filter_map(move |i| cloud_of(part(shape, i).1))
 }
 
+/// Mean radius of the coarsest of the clouds that two shapes consist of, metres; none where there is no cloud.
+pub(crate) fn coarsest_radius(shapes: [&dyn Shape; 2]) -> Option<f32> {
+    let clouds = shapes.into_iter().flat_map(clouds_of);
+    clouds.map(|cloud| cloud.mean_radius()).reduce(f32::max)
+}
+
 /// Whether the shape is a cloud or a compound that holds one.
 pub(crate) fn has_cloud(shape: &dyn Shape) -> bool {
     clouds_of(shape).next().is_some()
@@ -179,11 +185,10 @@ impl TldiConfig {
     /// Parameters of a pair of parts for contacts up to a gap of `prediction` metres; none where no
     /// part is a cloud.
     pub(crate) fn params(&self, parts: [&dyn Shape; 2], prediction: f32) -> Option<Params> {
-        let radius = |part: &dyn Shape| cloud_of(part).map(|shape| shape.cloud().mean_radius());
-        let coarsest = parts.into_iter().filter_map(radius).reduce(f32::max)?;
+        let coarsest = coarsest_radius(parts)?;
         let extents = parts.map(|part| part.compute_local_aabb().extents());
         let smaller = usize::from(!first_is_smaller(extents));
-        let own_radius = radius(parts[smaller]).unwrap_or(0.0);
+        let own_radius = cloud_of(parts[smaller]).map_or(0.0, |shape| shape.cloud().mean_radius());
         let to_resolve = largest_pixel(extents[smaller], own_radius);
         let params = match self.variant {
             Variant::Paper => Params::paper(coarsest),

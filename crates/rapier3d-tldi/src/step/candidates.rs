@@ -4,7 +4,7 @@
 //! step, by the same rules: enabled colliders, parents, joints, body types, groups, sleep, and bounds
 //! loosened like those in its broad phase. A pair that is missed here is compared on the spot.
 
-use crate::narrow_phase::parts::{clouds_of, has_cloud};
+use crate::narrow_phase::parts::{coarsest_radius, has_cloud};
 use rapier3d::dynamics::{
     ImpulseJointSet, IntegrationParameters, MultibodyJointSet, RigidBody, RigidBodyHandle,
     RigidBodySet, RigidBodyType,
@@ -285,10 +285,8 @@ pub(crate) fn contact_reach(
         let body = parent_of(collider, bodies);
         body.map_or(Vector::ZERO, RigidBody::linvel)
     });
-    let coarsest = clouds_of(collider1.shape())
-        .chain(clouds_of(collider2.shape()))
-        .map(|cloud| cloud.mean_radius())
-        .fold(0.0, f32::max);
+    let shapes = [collider1.shape(), collider2.shape()];
+    let coarsest = coarsest_radius(shapes).unwrap_or(0.0);
     let way = (velocity2 - velocity1).length() * integration.dt;
     effective_prediction(collider1, collider2, bodies, integration).max(way.min(AHEAD * coarsest))
 }

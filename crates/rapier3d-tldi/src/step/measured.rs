@@ -7,7 +7,7 @@
 //! distance that does not depend on the cloud.
 
 use crate::TldiConfig;
-use crate::narrow_phase::parts::{PartPair, ShapePair, cloud_shapes_of, clouds_of};
+use crate::narrow_phase::parts::{PartPair, ShapePair, cloud_shapes_of, coarsest_radius};
 use rapier3d::math::Pose;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::shape::Shape;
@@ -52,10 +52,7 @@ impl Measured {
         if deforms(pair.shape1) || deforms(pair.shape2) {
             return None;
         }
-        let coarsest = clouds_of(pair.shape1)
-            .chain(clouds_of(pair.shape2))
-            .map(|cloud| cloud.mean_radius())
-            .reduce(f32::max)?;
+        let coarsest = coarsest_radius([pair.shape1, pair.shape2])?;
         let bounds = [pair.shape1, pair.shape2].map(|shape| shape.compute_local_aabb());
         let shape1_is_smaller = first_is_smaller(bounds.map(|bounds| bounds.extents()));
         let smaller = bounds[usize::from(!shape1_is_smaller)];
