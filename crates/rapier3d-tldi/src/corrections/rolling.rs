@@ -45,8 +45,7 @@ pub(crate) fn move_to_mid_step(
                 continue;
             };
             let pose1 = pose_of(collider1, bodies);
-            let world_from_a = part.poses[0].map_or(pose1, |pose| pose1 * pose);
-            let a_from_world = world_from_a.inverse();
+            let a_from_world = part.world_from_a(&pose1).inverse();
             let center_of_mass = a_from_world * body.center_of_mass();
             let turn = a_from_world.rotation * turn;
             for patch in &mut results[comparison.query].patches {

@@ -131,11 +131,8 @@ fn contacts<'a>(
     pose1: &'a Pose,
 ) -> impl Iterator<Item = ([Vector; 2], Vector, f32)> + 'a {
     parts.iter().flat_map(move |part| {
-        let world_from_a = part.poses[0].map_or(*pose1, |pose| *pose1 * pose);
-        let patches = part
-            .comparison
-            .as_ref()
-            .map(|comparison| &results[comparison.query].patches);
+        let world_from_a = part.world_from_a(pose1);
+        let patches = part.result(results).map(|result| &result.patches);
         patches.into_iter().flatten().flat_map(move |patch| {
             let normal = world_from_a.rotation * patch.normal;
             let points = patch.points.iter();

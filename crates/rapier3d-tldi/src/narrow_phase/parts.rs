@@ -6,7 +6,7 @@ use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::bounding_volume::{Aabb, BoundingVolume};
 use rapier3d::parry::shape::{Shape, ShapeType};
 use tldi::plan::{first_is_smaller, largest_pixel, least_pixel};
-use tldi::{PairQuery, Params, PointCloud, Surface, Variant, View};
+use tldi::{PairQuery, PairResult, Params, PointCloud, Surface, Variant, View};
 
 /// Contacts are searched up to this many standard deviations of given noise. So the fit at a light
 /// contact has points around it on all sides. Half or twice: no row of any suite changes.
@@ -154,6 +154,28 @@ pub(crate) struct PartPair {
     pub(crate) a_from_b: Pose,
     /// The comparison; none where no side is a cloud, which rapier's own dispatcher answers.
     pub(crate) comparison: Option<Comparison>,
+}
+
+impl PartPair {
+    /// From the frame of the first part into the world; `pose1` is that of the first collider.
+    pub(crate) fn world_from_a(&self, pose1: &Pose) -> Pose {
+        self.poses[0].map_or(*pose1, |pose| *pose1 * pose)
+    }
+
+    /// The result of its comparison among those of all; none where there is no comparison.
+    pub(crate) fn result<'r>(&self, results: &'r [PairResult]) -> Option<&'r PairResult> {
+        self.comparison
+            .as_ref()
+            .map(|comparison| &results[comparison.query])
+    }
+}
+
+/// The results of the comparisons of some parts among those of all.
+pub(crate) fn results_of<'r>(
+    parts: &[PartPair],
+    results: &'r [PairResult],
+) -> impl Iterator<Item = &'r PairResult> + Clone {
+    parts.iter().filter_map(move |part| part.result(results))
 }
 
 /// What a backend is asked about a pair of parts.

@@ -7,7 +7,9 @@
 //! distance that does not depend on the cloud.
 
 use crate::TldiConfig;
-use crate::narrow_phase::parts::{PartPair, ShapePair, cloud_shapes_of, coarsest_radius};
+use crate::narrow_phase::parts::{
+    PartPair, ShapePair, cloud_shapes_of, coarsest_radius, results_of,
+};
 use rapier3d::math::Pose;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::shape::Shape;
@@ -18,9 +20,7 @@ use tldi::{ContactPatch, PairResult};
 /// is fixed to the bodies would soon be late. A contact point that lags by a tenth of a
 /// radius accelerates a ball as a slope would.
 pub(crate) fn rolls(parts: &[PartPair], results: &[PairResult]) -> bool {
-    let patches = (parts.iter())
-        .filter_map(|part| part.comparison.as_ref())
-        .flat_map(|comparison| &results[comparison.query].patches);
+    let patches = results_of(parts, results).flat_map(|result| &result.patches);
     parts.iter().all(|part| part.comparison.is_some())
         && (1..=2).contains(&patches.clone().count())
         && patches.clone().all(ContactPatch::is_round)

@@ -2,7 +2,7 @@
 //! workspaces for pairs that are not in it, and the errors that rapier would drop.
 
 use crate::narrow_phase::parts::{
-    Hint, PartPair, ShapePair, append_part_pairs, append_queries, within_reach,
+    Hint, PartPair, ShapePair, append_part_pairs, append_queries, results_of, within_reach,
 };
 use crate::step::measured::{Measured, rolls};
 use crate::{TldiConfig, TldiError};
@@ -206,15 +206,14 @@ impl Batch {
     }
 }
 
-pub(crate) fn count_pixels(parts: &[PartPair], results: &[PairResult]) -> usize {
-    let comparisons = parts.iter().filter_map(|part| part.comparison.as_ref());
-    comparisons.map(|c| results[c.query].contacts.len()).sum()
+fn count_pixels(parts: &[PartPair], results: &[PairResult]) -> usize {
+    let results = results_of(parts, results);
+    results.map(|result| result.contacts.len()).sum()
 }
 
 fn coarser_pixels(parts: &[PartPair], results: &[PairResult]) -> Option<f32> {
-    let comparisons = parts.iter().filter_map(|part| part.comparison.as_ref());
-    let coarser = comparisons.filter_map(|c| results[c.query].coarser);
-    coarser.reduce(f32::max)
+    let results = results_of(parts, results);
+    results.filter_map(|result| result.coarser).reduce(f32::max)
 }
 
 /// A CPU backend and its memory, for one pair at a time.
