@@ -276,7 +276,7 @@ impl Scratch {
                 ..self.seen(query, plan, camera, axes, view)
             },
             &query.params,
-            &mut self.crossings,
+            Some(&mut self.crossings),
             result,
         );
     }

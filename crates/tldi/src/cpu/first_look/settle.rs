@@ -246,9 +246,9 @@ impl Scratch {
             ..self.seen(query, plan, camera, axes, view)
         };
         let [a, b] = [&self.a.image, &self.b.image];
-        let mut counted = Crossings::default();
         let first = result.contacts.len();
-        compare::compare(a, b, &seen, &query.params, &mut counted, result);
+        // Of crossings, `find_windows` says where they are.
+        compare::compare(a, b, &seen, &query.params, None, result);
         find_windows(
             [a, b],
             &seen,
@@ -282,7 +282,7 @@ impl Scratch {
             &self.b.image,
             seen,
             &query.params,
-            crossings,
+            Some(crossings),
             &mut nothing,
         );
     }
