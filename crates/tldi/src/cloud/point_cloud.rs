@@ -138,8 +138,8 @@ impl<'a> PointCloud<'a> {
         self.normals.as_deref()
     }
 
-    /// Whether the normals point outward (given, or oriented towards a viewpoint), so that their
-    /// sign means something.
+    /// Whether there are normals that point outward (given, or oriented towards a viewpoint), so that
+    /// their sign means something.
     pub fn normals_oriented(&self) -> bool {
         self.normals_oriented
     }

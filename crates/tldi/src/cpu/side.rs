@@ -102,14 +102,10 @@ pub(super) enum Scope {
 }
 
 impl CloudView<'_> {
-    fn oriented(&self) -> bool {
-        self.cloud.normals().is_some() && self.cloud.normals_oriented()
-    }
-
     /// Whether the normals beside an edge are those of its faces, and not means of both.
     fn knows_faces(&self) -> bool {
         match self.cloud.normals() {
-            Some(_) => self.oriented(),
+            Some(_) => self.cloud.normals_oriented(),
             None => self.sharpens,
         }
     }
@@ -285,7 +281,7 @@ impl Side {
             columns: &self.columns,
             kept: &self.kept,
             normals: &self.kept_normals,
-            oriented: view.oriented(),
+            oriented: view.cloud.normals_oriented(),
             radii: PointRadii::new(view.cloud, &self.points),
         };
         let index = |k: u32| self.points.index[self.kept[k as usize] as usize] as usize;
@@ -323,7 +319,10 @@ impl Side {
         self.columns.modelled(touching, &mut self.kept);
         let along = imaging.camera.view_from_frame.rotation * view.frame_from_cloud.rotation;
         let along = along.inverse() * Vec3::Z;
-        let given = view.cloud.normals().filter(|_| view.oriented());
+        let given = view
+            .cloud
+            .normals()
+            .filter(|_| view.cloud.normals_oriented());
         let index = &self.points.index;
         let is_exit = given.map(|given| move |i: usize| given[index[i] as usize].dot(along) > 0.0);
         let exits = is_exit

@@ -71,7 +71,7 @@ impl Surface<'_> {
     /// Whether the surface's normals tell its inside from its outside.
     pub(crate) fn is_oriented(&self) -> bool {
         match self {
-            Surface::Cloud(cloud) => cloud.normals().is_some() && cloud.normals_oriented(),
+            Surface::Cloud(cloud) => cloud.normals_oriented(),
             Surface::Exact(surface) => surface.is_closed(),
             Surface::Device(_) => false,
         }

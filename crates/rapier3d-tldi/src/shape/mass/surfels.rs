@@ -83,7 +83,7 @@ pub(super) fn surfels(cloud: &PointCloud<'_>) -> Vec<Surfel> {
             }
         })
         .collect();
-    if cloud.normals().is_none() || !cloud.normals_oriented() {
+    if !cloud.normals_oriented() {
         orient(&mut surfels);
     }
     let areas: Vec<f64> = surfels
