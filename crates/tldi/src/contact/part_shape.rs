@@ -276,11 +276,7 @@ impl Shape {
     }
 
     fn point(&self, middle: Vec3, gap: f32) -> ContactPoint {
-        ContactPoint {
-            point_a: middle - 0.5 * gap * self.normal,
-            point_b: middle + 0.5 * gap * self.normal,
-            gap,
-        }
+        ContactPoint::about(middle, gap, self.normal)
     }
 }
 

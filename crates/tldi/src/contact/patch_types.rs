@@ -49,6 +49,15 @@ pub struct ContactPoint {
 }
 
 impl ContactPoint {
+    /// The point about `middle` where the surfaces are `gap` metres apart along a unit normal.
+    pub(crate) fn about(middle: Vec3, gap: f32, normal: Vec3) -> Self {
+        Self {
+            point_a: middle - 0.5 * gap * normal,
+            point_b: middle + 0.5 * gap * normal,
+            gap,
+        }
+    }
+
     /// Midway between the surfaces, metres.
     pub fn middle(&self) -> Vec3 {
         0.5 * (self.point_a + self.point_b)

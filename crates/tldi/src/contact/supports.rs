@@ -121,12 +121,7 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         let nearest = (points.iter())
             .min_by(|p, q| off(p).length_squared().total_cmp(&off(q).length_squared()));
         let above = nearest.map_or(0.0, |p| (p.middle() - middle).dot(normal));
-        let middle = middle + above * normal;
-        ContactPoint {
-            point_a: middle - 0.5 * gap * normal,
-            point_b: middle + 0.5 * gap * normal,
-            gap,
-        }
+        ContactPoint::about(middle + above * normal, gap, normal)
     };
     let lowest_of_bowl = bowl.lowest(slope, roughness).map(|(place, above)| {
         let aside = bowl.place_per_slope() * sigma;
