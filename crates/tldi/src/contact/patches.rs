@@ -196,9 +196,7 @@ impl PatchScratch {
                 }
                 !in_plane
             });
-            let first = out.len();
             if !self.push_round_spots(contacts, params, out) {
-                out.truncate(first);
                 let members = std::mem::take(&mut self.patch);
                 out.push(self.patch_of(&members, contacts, params));
                 self.patch = members;
@@ -207,7 +205,7 @@ impl PatchScratch {
     }
 
     /// Pushes one patch for each group on one plane, if there are several groups and each is a
-    /// single spot. A body that touches in two spots rolls on both. Returns whether they are.
+    /// single spot. A body that touches in two spots rolls on both. Returns whether they are; else `out` is as before.
     fn push_round_spots(
         &mut self,
         contacts: &[ContactPixel],
@@ -222,7 +220,8 @@ impl PatchScratch {
             }
         }
         let mut spot = std::mem::take(&mut self.spot);
-        let most = MAX_PATCHES - out.len();
+        let first = out.len();
+        let most = MAX_PATCHES - first;
         let are_spots = (2..=most).contains(&groups.len())
             && groups.into_iter().all(|group| {
                 spot.clear();
@@ -232,6 +231,9 @@ impl PatchScratch {
                 (out.last()).is_some_and(|patch| patch.is_round() && patch.points.len() == 1)
             });
         self.spot = spot;
+        if !are_spots {
+            out.truncate(first);
+        }
         are_spots
     }
 
