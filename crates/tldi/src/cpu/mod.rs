@@ -18,7 +18,7 @@ mod lanes;
 mod motion;
 pub(crate) mod normals;
 mod pair;
-mod rect;
+pub(crate) mod rect;
 pub(crate) mod room;
 mod scratch;
 mod side;

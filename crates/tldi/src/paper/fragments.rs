@@ -5,6 +5,7 @@
 //! pixel is sorted on its own, however many fragments it has.
 
 use crate::counting_sort::starts_of;
+use crate::cpu::rect::Rect;
 use crate::{PointCloud, Projection, VirtualCamera};
 use glamx::{Pose3, Vec3};
 use rayon::prelude::*;
@@ -125,13 +126,6 @@ fn centers_within(position: f32, reach: f32) -> [i32; 2] {
     ]
 }
 
-/// A rectangle of pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Rect {
-    pub(super) origin: [i32; 2],
-    pub(super) size: [u32; 2],
-}
-
 /// The cylinders of all points that the camera sees, in order of front depth; `keys` is memory to
 /// sort in.
 pub(super) fn project(
@@ -220,9 +214,8 @@ impl Bins {
     /// Bins the fragments of the cylinders `indices`, in that order, by the pixels of `rect`.
     /// Cost: linear in pixels and fragments.
     pub(super) fn fill(&mut self, rect: &Rect, cylinders: &[Cylinder], indices: &[u32]) {
-        let pixels = rect.size[0] as usize * rect.size[1] as usize;
         self.ends.clear();
-        self.ends.resize(pixels, 0);
+        self.ends.resize(rect.pixels(), 0);
         for &index in indices {
             for (_, columns, row_start) in spans(&cylinders[index as usize], rect) {
                 for i in columns {

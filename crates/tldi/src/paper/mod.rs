@@ -56,10 +56,11 @@ mod visibility;
 pub use compare::{PaperComparison, colliding_pixels, compare};
 
 use crate::counting_sort::starts_of;
+use crate::cpu::rect::Rect;
 use crate::{Layer, Params, PointCloud, Tldi, VirtualCamera};
 use blending::blending;
 use counter::counter;
-use fragments::{Bins, Cylinder, Fragment, Rect};
+use fragments::{Bins, Cylinder, Fragment};
 use glamx::Pose3;
 use rayon::prelude::*;
 use stacking::{MAX_SEGMENTS, stacking};
@@ -225,8 +226,7 @@ impl Band {
         self.layers.clear();
         self.layer_ends.clear();
         if indices.is_empty() {
-            self.layer_ends
-                .resize((rows.size[0] * rows.size[1]) as usize, 0);
+            self.layer_ends.resize(rows.pixels(), 0);
             return;
         }
         self.bins.fill(rows, cylinders, indices);
