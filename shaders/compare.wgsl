@@ -216,8 +216,11 @@ fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_ot
             continue;
         }
         let depth = layers[kf].depth - layers[kb].depth;
+        let is_sure = facing_of(front, kf) == EXIT && facing_of(back, kb) == ENTRY;
+        let is_too_far = is_sure && depth > FARTHEST * max(left - entered, thickness);
+        let is_opposed = opposed(layers[kb].normal, layers[kf].normal);
         let is_met = select(
-            depth <= thickness || opposed(layers[kb].normal, layers[kf].normal),
+            depth <= thickness || (is_opposed && !is_too_far),
             depth <= thickness && entered + depth <= left,
             is_other_side,
         );
@@ -257,7 +260,10 @@ fn contact_pixels(
         }
         if gap > (*look).params.prediction {
             atomicMax(&found[pair * PAIR_WORDS + GAP], ordered(-gap));
-            continue;
+            // It is no contact, but tells other views how deep theirs can be.
+            if is_other_side || (*look).other_count == 0u {
+                continue;
+            }
         }
         let slot = atomicAdd(&work[CONTACTS], 1u);
         if slot >= batch.contacts {

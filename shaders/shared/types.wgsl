@@ -28,6 +28,7 @@ override MAX_DEPTH: f32;
 override DEPTH_STEPS: u32;
 override STEEP: f32;
 override FACING: f32;
+override FARTHEST: f32;
 override BESIDE: f32;
 override SWAPPED: u32;
 override PIERCED: u32;

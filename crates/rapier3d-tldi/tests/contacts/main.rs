@@ -7,6 +7,7 @@ mod debug_render;
 mod dispatcher;
 mod manifolds;
 mod resolution;
+mod shallow;
 mod shared_shapes;
 mod thin_shapes;
 mod uneven;

@@ -3,6 +3,7 @@
 //! A view from the side of a shallow overlap sees its width: true, but not how deep it is. Along the way that such a
 //! contact pixel would push the bodies apart, another view sees them overlap by much less.
 
+use crate::contact::links::Links;
 use crate::view::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, PairResult, Params, VirtualCamera};
 use arrayvec::ArrayVec;
@@ -21,25 +22,34 @@ const MOST_PLACES: f32 = 16.0;
 #[derive(Debug, Default)]
 pub(crate) struct WayOut {
     is_wide: Vec<bool>,
+    /// For each contact pixel, the first of those that links join it with.
+    roots: Vec<u32>,
+    /// For each of these, how many of its deep pixels are wide, less those that are not.
+    wide_balance: Vec<i32>,
 }
 
 impl WayOut {
     /// Drops the contact pixels deeper than a layer that lead through a place where another view sees the surfaces apart or
-    /// in each other by less than half of that. Contact pixels are ordered by view, row and column.
+    /// in each other by less than half of that. If at least half of linked deep pixels go so, all of them do: they are one
+    /// overlap, and no view sees every place. Then drops the pixels that are apart by more than contacts are asked for.
+    /// Contact pixels are ordered by view, row and column; `links` are overwritten.
     ///
-    /// Cost: for each such pixel and each other view up to 17 binary searches.
-    pub(crate) fn keep_least(&mut self, result: &mut PairResult, params: &Params) {
+    /// Cost: for each deep pixel and each other view up to 17 binary searches; links, if any pixel goes.
+    pub(crate) fn keep_least(
+        &mut self,
+        result: &mut PairResult,
+        params: &Params,
+        links: &mut Links,
+    ) {
         let PairResult { axes, contacts, .. } = result;
-        if axes.len() < 2 {
-            return;
-        }
         let pixel = params.pixel_size;
         let cameras: ArrayVec<_, MAX_VIEWS> = (axes.iter())
             .map(|axis| VirtualCamera::along(*axis, pixel))
             .collect();
         self.is_wide.clear();
+        let is_deep = |contact: &ContactPixel| contact.gap < -params.thickness;
         self.is_wide.extend(contacts.iter().map(|contact| {
-            contact.gap < -params.thickness
+            is_deep(contact)
                 && (cameras.iter().enumerate())
                     .filter(|(view, _)| *view != contact.view as usize)
                     .any(|(view, camera)| {
@@ -47,8 +57,25 @@ impl WayOut {
                         is_less_elsewhere(contact, contacts, camera, params)
                     })
         }));
+        if self.is_wide.contains(&true) {
+            links.find(contacts, params);
+            links.components(contacts.len(), &mut self.roots);
+            self.wide_balance.clear();
+            self.wide_balance.resize(contacts.len(), 0);
+            let deep = |k: &usize| is_deep(&contacts[*k]);
+            for k in (0..contacts.len()).filter(deep) {
+                let balance = &mut self.wide_balance[self.roots[k] as usize];
+                *balance += if self.is_wide[k] { 1 } else { -1 };
+            }
+            for k in (0..contacts.len()).filter(deep) {
+                self.is_wide[k] |= self.wide_balance[self.roots[k] as usize] >= 0;
+            }
+        }
         let mut is_wide = self.is_wide.iter();
-        contacts.retain(|_| !is_wide.next().is_some_and(|is_wide| *is_wide));
+        contacts.retain(|contact| {
+            let is_wide = is_wide.next().is_some_and(|is_wide| *is_wide);
+            !is_wide && contact.gap <= params.prediction
+        });
     }
 }
 

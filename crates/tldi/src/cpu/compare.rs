@@ -170,7 +170,9 @@ impl<'a> Column<'a> {
     }
 }
 
-/// Contacts in a pixel, where the ray leaves the body in `front` and enters the one in `back`.
+/// Contacts in a pixel, where the ray leaves the body in `front` and enters the one in `back`. If there are other views,
+/// surfaces that are apart by more than contacts are asked for count, too, until
+/// [`WayOut::keep_least`](crate::contact::way_out::WayOut::keep_least).
 fn contact_pixels(
     [front, back]: [Column; 2],
     side: Side,
@@ -191,7 +193,13 @@ fn contact_pixels(
             .find(|(layer, left)| {
                 let depth = exit.depth - layer.depth;
                 match side {
-                    Side::Main => depth <= params.thickness || opposed(layer, exit),
+                    Side::Main => {
+                        let is_sure = front.facing(exit) == Facing::Exit
+                            && back.facing(layer) == Facing::Entry;
+                        let way_back = (left - entered).max(params.thickness);
+                        depth <= params.thickness
+                            || opposed(layer, exit) && !(is_sure && depth > FARTHEST * way_back)
+                    }
                     // The least way out counts.
                     Side::Other => depth <= params.thickness && entered + depth <= *left,
                 }
@@ -208,7 +216,10 @@ fn contact_pixels(
         }
         if gap > params.prediction {
             result.gap = Some(result.gap.map_or(gap, |g| g.min(gap)));
-            continue;
+            // It is no contact, but tells other views how deep theirs can be.
+            if side == Side::Other || at.others.is_empty() {
+                continue;
+            }
         }
         let in_frame = |v: Vec3| at.frame_from_view.rotation * v;
         let [u, v] = at.pixel.map(|c| c as f32 + 0.5);
@@ -238,8 +249,14 @@ fn contact_pixels(
 /// but no overlap of 300 is falsely deep instead of 4; twice: depths of deep edges twice as wrong.
 const FACING: f32 = 0.5;
 
+/// The largest depth in ways out on the other side of both bodies. A body that was pushed most of the way through a wall
+/// still goes out where it came from. But where a ray passes both bodies at their rims, the other side is a layer away, and
+/// the axis has the wrong sign there.
+const FARTHEST: f32 = 4.0;
+
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 1] = [("FACING", FACING as f64)];
+pub(crate) const CONSTANTS: [(&str, f64); 2] =
+    [("FACING", FACING as f64), ("FARTHEST", FARTHEST as f64)];
 
 /// Whether two layers face each other and the view, as surfaces do that push bodies apart.
 fn opposed(entry: &Layer, exit: &Layer) -> bool {

@@ -224,7 +224,8 @@ impl Scratch {
         };
         let pixel = query.params.pixel_size;
         let at_most = self.a.columns.greatest_overlap(&self.b.columns);
-        if at_most < DEEP * pixel {
+        // One of several views has to be looked at all the same: it may show that others see widths for depths.
+        if at_most < DEEP * pixel && axes.len() == 1 {
             return at_most;
         }
         let imaging = CellImaging {
