@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
-use tldi_examples::cli::{Common, RangeArgument, UpChoice};
+use tldi_examples::cli::{Common, RangeArgument, UpChoice, ended};
 use tldi_examples::depth::{
     DepthScene, DepthSimulation, DepthSnapshot, FrameSource, GeneratedCamera, camera_up,
 };
@@ -93,14 +93,7 @@ const ANIMATION_FRAMES: usize = 3;
 const ANIMATION_POINT_STEP: usize = 4;
 
 fn main() -> ExitCode {
-    let args = Args::parse();
-    match run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Args::parse()))
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
-use tldi_examples::cli::Common;
+use tldi_examples::cli::{Common, ended};
 use tldi_examples::load::Located;
 use tldi_examples::report::DropReport;
 use tldi_examples::scan::{ScanSource, choose_up, load_scan, positive};
@@ -67,14 +67,7 @@ const ANIMATION_SECONDS: f32 = 2.0 * ANIMATION_STEPS as f32 / 60.0;
 const ANIMATION_HOLD: usize = 22;
 
 fn main() -> ExitCode {
-    let args = Args::parse();
-    match run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Args::parse()))
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {

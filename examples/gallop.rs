@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tldi::glamx::{DVec3, Pose3, Vec3};
 use tldi::{KdTree, PointCloud, VirtualCamera};
-use tldi_examples::cli::{Common, UpChoice};
+use tldi_examples::cli::{Common, UpChoice, ended};
 use tldi_examples::gallop::{
     DT, GallopScene, GallopSimulation, GallopSnapshot, Ground, Runner, creature,
 };
@@ -88,14 +88,7 @@ const ANIMATION_SIZE: [u32; 2] = [640, 360];
 const ANIMATION_STEPS: usize = 3;
 
 fn main() -> ExitCode {
-    let args = Args::parse();
-    match run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Args::parse()))
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {

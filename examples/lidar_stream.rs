@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{KdTree, PointCloud};
-use tldi_examples::cli::{Common, UpChoice};
+use tldi_examples::cli::{Common, UpChoice, ended};
 use tldi_examples::lidar::{LidarReport, LidarScene, LidarSimulation, Scanner, Sweep, SweepSource};
 use tldi_examples::scan::positive;
 use tldi_examples::scene::BodyShape;
@@ -60,13 +60,7 @@ const NEAR: f32 = 0.6;
 const PICTURE_SIZE: [u32; 2] = [1280, 720];
 
 fn main() -> ExitCode {
-    match run(&Args::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Args::parse()))
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {

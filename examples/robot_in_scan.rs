@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::glamx::{DVec3, Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
-use tldi_examples::cli::{Common, Triple};
+use tldi_examples::cli::{Common, Triple, ended};
 use tldi_examples::load::Located;
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::robot::{
@@ -103,14 +103,7 @@ const LINK_COLORS: [[f32; 3]; 2] = [[0.90, 0.90, 0.88], [0.30, 0.34, 0.40]];
 const TOUCHING_COLOR: [f32; 3] = [0.92, 0.30, 0.16];
 
 fn main() -> ExitCode {
-    let args = Args::parse();
-    match run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Args::parse()))
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {

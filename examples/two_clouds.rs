@@ -5,7 +5,7 @@ use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::glamx::{DVec3, Pose3};
-use tldi_examples::cli::{Common, PoseArgument, Triple};
+use tldi_examples::cli::{Common, PoseArgument, Triple, ended};
 use tldi_examples::load::Located;
 use tldi_examples::query::{Answer, CloudQuery};
 use tldi_examples::scene::BodyShape;
@@ -60,14 +60,7 @@ const MOTION_PICTURE_SIZE: [u32; 2] = [640, 360];
 const PICTURE_SIZE: [u32; 2] = [1280, 720];
 
 fn main() -> ExitCode {
-    let args = Args::parse();
-    match run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run(&Args::parse()))
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {

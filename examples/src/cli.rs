@@ -2,10 +2,22 @@
 
 use crate::output;
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::str::FromStr;
 use thiserror::Error;
 use tldi::glamx::{DPose3, DQuat, DVec3, EulerRot, Pose3, Vec3};
 use tldi_wgpu::BackendChoice;
+
+/// How a binary ends: with 0, or with 1 and what went wrong on the standard error.
+pub fn ended(outcome: anyhow::Result<()>) -> ExitCode {
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
 
 /// Options that every binary has; flatten into the binary's own arguments.
 #[derive(clap::Args, Clone, Debug)]
