@@ -25,7 +25,7 @@ use tldi_sources::{MovingPoints, ReadOptions};
 #[command(version)]
 struct Args {
     /// Positions: a NumPy array of frames × points × 3 (.npy, .npy.gz) or a folder with a cloud for
-    /// each frame, in order of their names
+    /// each frame, in order of the numbers in their names
     #[arg(long, value_name = "FILE|DIR")]
     frames: Option<PathBuf>,
     /// A mesh with the faces that connect the points (PLY, also as .gz): exact normals

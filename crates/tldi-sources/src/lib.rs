@@ -1,4 +1,4 @@
-//! Point clouds from files, cameras and meshes.
+//! Point clouds from files, messages and cameras.
 //!
 //! | format | extensions | read |
 //! |---|---|---|

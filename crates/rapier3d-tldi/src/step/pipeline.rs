@@ -26,7 +26,7 @@ use web_time::Instant;
 ///
 /// Before each of rapier's steps the pairs of colliders that may touch and of which one is a cloud
 /// are compared in one batch ([`prepare`](Self::prepare)); rapier then finds the results through
-/// the dispatcher that [`attach`](Self::attach) installs. [`step`](Self::step) does both.
+/// the dispatcher that [`attach`](Self::attach) installs. [`step`](Self::step) prepares, steps rapier and finishes.
 ///
 /// Several worlds may be attached to one pipeline if each is prepared, stepped and finished before
 /// the next is prepared, and if no surface changes; a pipeline for each remembers more (the view axes of its pairs, and the
@@ -141,7 +141,7 @@ impl TldiPipeline {
     ///
     /// The arguments are those of the [`PhysicsPipeline::step`](rapier3d::pipeline::PhysicsPipeline)
     /// that follows. What is changed in between is compared on the spot. After the step, call
-    /// [`finish`](Self::finish). Queries of your own that failed since the last step are told to the [`log`], and
+    /// [`finish`](Self::finish). Queries of your own that failed since the last step are reported in the [`log`], and
     /// fail no step.
     ///
     /// # Errors
@@ -369,7 +369,7 @@ impl TldiPipeline {
         Ok(report)
     }
 
-    /// Steps the world: [`prepare`](Self::prepare), rapier's step, [`finish`](Self::finish).
+    /// Steps the world: [`prepare`](Self::prepare), [`push`](Self::push), rapier's step, [`finish`](Self::finish).
     ///
     /// # Errors
     /// Those of `prepare`, and [`TldiError::NotAttached`]: the world was not stepped. Those of

@@ -125,7 +125,7 @@ impl<'a> CloudBuilder<'a> {
     /// range model; 0 unless told. Of clouds with noise, the least gap is less than that of their surfaces:
     /// where noise alone explains a collision, there is none. Contacts stay where they are.
     ///
-    /// With σ = r̄ (of both clouds, pixels of r̄) it takes the wrong answers from 2.6 to 0.9 % (see
+    /// With σ = r̄ (of both clouds, pixels of r̄) it takes the wrong answers from 2.5 to 0.7 % (see
     /// `docs/benchmarks.md`). Fails with [`CloudError::BadParameter`] for a value that is negative or not
     /// finite.
     pub fn noise(mut self, sigma: f32) -> Self {

@@ -39,14 +39,14 @@ pub enum CloudError {
     /// An attribute has another number of entries than there are points.
     #[error("{attribute} has {actual} entries for {expected} points: give one per point")]
     LengthMismatch {
-        /// The attribute: "radii", "normals", "colors", "y", "z".
+        /// The attribute: "radii", "normals" or "colors".
         attribute: &'static str,
         /// Number of points.
         expected: usize,
         /// Number of entries.
         actual: usize,
     },
-    /// More points than an index can address.
+    /// More points than the limit: 67,108,863, which is u32::MAX / 64.
     #[error("{count} points are more than the limit of {limit}: split or thin the cloud")]
     TooManyPoints {
         /// Points given.
