@@ -191,7 +191,7 @@ fn noisy(points: &[Vec3], noise: f32, seed: u64) -> anyhow::Result<PointCloud<'s
     Ok(builder.noise(sigma).build()?)
 }
 
-/// Every method with every of its settings; `noise` is the standard deviation that some are told, metres.
+/// Every method with every of its settings; `noise` is the standard deviation that some get, metres.
 fn contenders(args: &Args, model: &Model, noise: f32) -> anyhow::Result<Vec<Contender>> {
     let has = |choice| match args.variant.is_empty() {
         true => matches!(choice, VariantChoice::Paper | VariantChoice::Default),

@@ -37,7 +37,7 @@ struct Args {
     /// Take the points from this model in place of a generated body: any format, also gzipped
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Frames that each is measured; medians and quartiles are told
+    /// Frames that each is measured; medians and quartiles are reported
     #[arg(long, value_name = "N", default_value_t = 5)]
     repeats: usize,
     /// Only these placements, several by commas: near-miss, slight, deep, coincident, body on scan

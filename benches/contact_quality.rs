@@ -1,4 +1,4 @@
-//! How well normals and depths of contacts are told, and how long it takes: ours, and what a user would
+//! How well methods find normals and depths of contacts, and how long it takes: ours, and what a user would
 //! pick instead.
 
 #![allow(

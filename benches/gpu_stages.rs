@@ -29,7 +29,7 @@ struct Args {
         default_value = "10000,100000"
     )]
     points: Vec<usize>,
-    /// Times that each is measured; medians are told
+    /// Times that each is measured; medians are reported
     #[arg(long, value_name = "N", default_value_t = 9)]
     repeats: usize,
     /// Give the clouds normals (without, the backend estimates them)

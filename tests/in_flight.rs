@@ -146,7 +146,7 @@ fn a_batch_that_is_dropped_leaves_nothing_behind() {
     });
 }
 
-/// A device that is lost under a batch is told, and nobody waits for it.
+/// A device that is lost under a batch is reported, and nobody waits for it.
 #[test]
 fn a_device_that_is_lost_is_told() {
     with_batch(|batch| {

@@ -1,4 +1,4 @@
-//! Clouds whose noise is told: noise alone makes them not collide, and hides nothing deeper than itself.
+//! Clouds whose noise is given: noise alone makes them not collide, and hides nothing deeper than itself.
 
 use rapier3d::math::Pose;
 use rapier3d::parry::query::QueryDispatcher;

@@ -1,4 +1,4 @@
-//! How often closed clouds that overlap are told to be much deeper in each other than they are.
+//! How often the reported depth of closed clouds that overlap is far more than the true one.
 
 use anyhow::Context;
 use clap::Parser;
@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use tldi_tests::{ClosedShape, Overlap, measure_overlaps};
 
-/// Pushes spheres, boxes, capsules and, where they are at hand, models into each other at random; prints how many are told
-/// to be deeper than three times the least way out and a point's radius.
+/// Pushes spheres, boxes, capsules and, where they are at hand, models into each other at random; prints for how many
+/// the reported depth exceeds three times the least way out plus a point's radius.
 #[derive(Parser)]
 struct Args {
     /// Write what is falsely deep, and the counts, to this file as JSON

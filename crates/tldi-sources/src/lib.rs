@@ -40,7 +40,7 @@
 //! Besides, [`PointCloud2`] reads messages of ROS, [`depth`] has folders of depth frames, and [`MovingPoints`] deforming meshes as NumPy arrays
 //! or folders of clouds.
 //!
-//! Any file may be packed with gzip (`.gz`), which is told by its content. Positions, normals, colours
+//! Any file may be packed with gzip (`.gz`), which its content shows. Positions, normals, colours
 //! and radii are kept, whatever their order and type in the file; all else is skipped. Units are
 //! those of the file: scale, where it is not in metres, before you build a cloud.
 //!

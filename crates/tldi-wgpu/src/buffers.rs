@@ -57,7 +57,7 @@ impl Growable {
 }
 
 /// Bytes of the largest buffer that the stages can use. They are whole words, though drivers tell 2³¹ - 1: no other buffer
-/// can be bound or copied. A stage is told them in a word.
+/// can be bound or copied. A stage gets them in a word.
 pub(crate) fn most_bytes(gpu: &Gpu) -> u64 {
     let limits = gpu.device.limits();
     let most = (limits.max_buffer_size).min(limits.max_storage_buffer_binding_size);

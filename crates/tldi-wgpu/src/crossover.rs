@@ -172,7 +172,7 @@ fn difference_of(expected: &PairResult, found: &PairResult, radius: f32) -> Opti
 mod tests {
     use super::*;
 
-    /// Each kind of answer that is off by more than rounding is told; what rounding does is not.
+    /// Each kind of answer that is off by more than rounding is reported; what rounding does is not.
     #[test]
     fn answers_that_differ_are_told() {
         let sheets = Sheets::new(1 << 10).expect("the points are valid");
