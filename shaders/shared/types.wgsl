@@ -1,5 +1,5 @@
 // What all stages share: the batch, its pairs and sides, their views, and the arena of counters.
-// Layouts are those of `tldi::Params` and of `tldi-wgpu`'s `batch` module.
+// Layouts are those of `tldi::Params` and of `tldi-wgpu`'s `layout` module.
 
 // Numbers of the stages, filled from `tldi-wgpu`'s `layout::stage_constants`.
 override BLOCK: u32;

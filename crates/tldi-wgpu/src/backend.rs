@@ -26,7 +26,8 @@ use tldi::{
 ///
 /// What it does not take is compared on the CPU meanwhile, with the same results: pairs with an
 /// exact surface, [uneven clouds](tldi::PointCloud::is_uneven), [`Variant::Paper`](tldi::Variant::Paper), perspective
-/// cameras; pairs of which a pixel has more than 1024 fragments, and pairs that need larger buffers than the device
+/// cameras; clouds whose splats are larger than 70 pixels in radius, or 64 times as crowded as those with radii from
+/// neighbours; pairs of which a pixel has more than 1024 fragments, and pairs that need larger buffers than the device
 /// allows. An uneven cloud and one that only the device holds are compared by their mean radii: a body smaller than the
 /// points are apart may pass where these are coarse.
 ///

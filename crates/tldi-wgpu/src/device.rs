@@ -120,7 +120,8 @@ impl Gpu {
     }
 
     /// Takes a device that the caller has: clouds that already live in its buffers need no copy to
-    /// the host. Errors of the device that nothing else catches are handled here from now on.
+    /// the host. Errors of the device that nothing else catches are handled here from now on: call it once for a device and
+    /// clone the [`Gpu`] for several backends, since a second call takes the errors that the first waits for.
     pub fn shared(device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let adapter: Arc<str> = device.adapter_info().name.into();
         let failure = Arc::new(Mutex::new(None));

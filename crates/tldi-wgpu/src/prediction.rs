@@ -30,18 +30,19 @@ pub(crate) fn predicted(query: &PairQuery, plan: &PairPlan, blocks: [usize; 2]) 
     let extents = plan.overlap.extents();
     // Half the surface of the overlap's box. A view sees no more of it, and a convex body no more than twice of it.
     let area = extents.x * extents.y + extents.y * extents.z + extents.z * extents.x;
-    let (mut survivors, mut reach_px) = (0.0, 0.0f32);
+    let image = area / (params.pixel_size * params.pixel_size);
+    let (mut survivors, mut fragments) = (0.0, 0.0);
     for (surface, blocks) in [query.a, query.b].iter().zip(blocks) {
         let radius = surface.mean_radius();
         let stride = stride(radius, params.pixel_size) as f32;
         let on_surface = 2.0 * area * DENSITY / (radius * radius);
-        survivors += on_surface.min((blocks * BLOCK) as f32) / stride;
-        reach_px = reach_px.max(radius * stride.sqrt() / params.pixel_size);
+        let of_side = on_surface.min((blocks * BLOCK) as f32) / stride;
+        survivors += of_side;
+        // A splat is counted in all pixels of the square around it that the image has.
+        let reach_px = (radius * stride.sqrt() / params.pixel_size).max(1.0);
+        fragments += VIEWS * of_side * (2.0 * reach_px + 0.5).powi(2).min(image + 1.0);
     }
     let splats = VIEWS * survivors;
-    // A splat is counted in all pixels of the square around it.
-    let per_splat = (2.0 * reach_px.max(1.0) + 0.5).powi(2);
-    let image = area / (params.pixel_size * params.pixel_size);
     // Two views, each with whole workgroups.
     let pixels = (2.0 * image).min(PIXELS * survivors) + (MAX_VIEWS * GROUP) as f32;
     // A tile has at least a pixel, and around them is a rim.
@@ -52,7 +53,7 @@ pub(crate) fn predicted(query: &PairQuery, plan: &PairPlan, blocks: [usize; 2]) 
         tiles: tiles as u32,
         pixels: pixels as u32,
         splats: splats as u32,
-        fragments: (per_splat * splats) as u32,
+        fragments: fragments as u32,
         layers: splats as u32,
         contacts: (CONTACTS * pixels) as u32,
     }

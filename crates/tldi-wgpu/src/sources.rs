@@ -7,6 +7,7 @@ use crate::resident::{Place, Resident};
 use crate::{Gpu, GpuError};
 use bytemuck::{Pod, Zeroable};
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 use tldi::glamx::Vec3;
 use tldi::{Aabb, DeviceCloud};
 use wgpu::BufferUsages;
@@ -83,7 +84,6 @@ enum Source {
 #[derive(Debug, Default)]
 pub(crate) struct Sources {
     all: HashMap<u64, Source>,
-    next_id: u64,
     unproject: Option<wgpu::ComputePipeline>,
     /// Those of the current batch, with the first words of their points, and how many points they have.
     used: Vec<(u64, u32, u32)>,
@@ -91,9 +91,9 @@ pub(crate) struct Sources {
 
 impl Sources {
     fn add(&mut self, source: Source) -> u64 {
-        // Not among the numbers of clouds with points on the host.
-        let id = u64::MAX - self.next_id;
-        self.next_id += 1;
+        // Not among the numbers of clouds with points on the host, nor among those of other backends.
+        static LAST: AtomicU64 = AtomicU64::new(u64::MAX);
+        let id = LAST.fetch_sub(1, Ordering::Relaxed);
         self.all.insert(id, source);
         id
     }
@@ -104,6 +104,7 @@ impl Sources {
         points: &wgpu::Buffer,
         mut cloud: DeviceCloud,
     ) -> Result<DeviceCloud, GpuError> {
+        told(&cloud)?;
         let needed = 4 * POINT_WORDS * cloud.len as u64;
         if points.size() < needed || !points.usage().contains(BufferUsages::COPY_SRC) {
             return Err(GpuError::BadSource {
@@ -115,7 +116,6 @@ impl Sources {
                 ),
             });
         }
-        told(&cloud)?;
         cloud.id = self.add(Source::Buffer(points.clone(), cloud.len));
         Ok(cloud)
     }

@@ -216,10 +216,15 @@ impl WgpuBackend {
             let reason = "its counters never settled".to_owned();
             return Err(self.gpu.failed(reason).into());
         }
-        run.first_views = None;
+        let first_tiles = run.first_views.take().map_or(0, |first| first.tiles);
         let grown = self.capacities.grown(&needed, &self.most);
         let redone = grown.and_then(|grown| {
-            self.capacities = grown;
+            // Tiles and pixels share a buffer: no more of them than are needed.
+            self.capacities = Counters {
+                tiles: needed.tiles.max(first_tiles),
+                pixels: self.capacities.pixels.max(needed.pixels),
+                ..grown
+            };
             self.traffic.redos += 1;
             self.submit()
         });
@@ -423,5 +428,87 @@ mod tests {
         assert_eq!(pair, 2);
         assert!(reason.contains("larger buffers"), "{reason}");
         assert_eq!(whole, compared(&mut backend, &batch[..2]));
+    }
+
+    /// A pair whose first try was too small stays on the device: what it needs fits, though twice of it does not.
+    #[test]
+    fn a_redo_asks_for_no_more_than_it_needs() {
+        let Some(gpu) = testing::open_small(1 << 20) else {
+            return;
+        };
+        let mut backend = WgpuBackend::new(gpu).expect("the stages fit");
+        let step = 8.0 * R / 1.2;
+        let at = |i: usize| Vec3::new((i % 27) as f32, 0.0, (i / 27) as f32) * step;
+        let points: Vec<Vec3> = (0..27 * 27).map(at).collect();
+        let normals = vec![Vec3::Y; points.len()];
+        let cloud = PointCloud::builder(points).radius(R).normals(normals);
+        let cloud = cloud.build().expect("the points are valid");
+        let batch = [PairQuery {
+            a_from_b: Pose3::translation(0.0, 0.5 * R, 0.0),
+            params: Params::for_radius(R).with_pixel_size(R / 1.2),
+            ..queries(&cloud, 1)[0]
+        }];
+        compared(&mut backend, &batch);
+        assert_eq!(backend.pairs_on_cpu(), 0);
+        assert!(backend.traffic().redos > 0, "the test shows nothing");
+    }
+
+    /// Clouds with splats of 140 pixels, and with hundreds of points in the square of a radius.
+    #[test]
+    fn large_and_crowded_splats_are_the_cpus() {
+        let Some(gpu) = testing::open() else {
+            return;
+        };
+        let mut backend = WgpuBackend::new(gpu).expect("the stages fit");
+        let with_radius = |radius: f32| {
+            let cloud = PointCloud::builder(sheet(40).points().to_vec()).radius(radius);
+            cloud.build().expect("the points are valid")
+        };
+        for (radius, pixel, on_cpu) in [(R, R, 0), (R, R / 140.0, 1), (16.0 * R, 16.0 * R, 1)] {
+            let cloud = with_radius(radius);
+            let query = PairQuery {
+                params: Params::for_radius(radius).with_pixel_size(pixel),
+                ..queries(&cloud, 1)[0]
+            };
+            compared(&mut backend, &[query]);
+            assert_eq!(backend.pairs_on_cpu(), on_cpu, "{radius}, {pixel}");
+        }
+    }
+
+    /// Two backends of one device do not take each other's points.
+    #[test]
+    fn points_are_those_of_one_backend() {
+        let Some(gpu) = testing::open() else {
+            return;
+        };
+        let points: Vec<[f32; 4]> = vec![[0.0, 0.0, 0.0, R]; 8];
+        let bytes: &[u8] = bytemuck::cast_slice(&points);
+        let buffer = crate::buffers::create(
+            &gpu,
+            "points",
+            wgpu::BufferUsages::COPY_SRC,
+            bytes.len() as u64,
+        );
+        let buffer = buffer.expect("there is room");
+        let small = sheet(4);
+        let told = tldi::DeviceCloud {
+            id: 0,
+            len: points.len(),
+            bounds: small.bounds(),
+            mean_radius: R,
+            max_radius: R,
+        };
+        let mut backends = [0, 1].map(|_| WgpuBackend::new(gpu.clone()).expect("the stages fit"));
+        let clouds =
+            (backends.each_mut()).map(|b| b.adopt(&buffer, told.clone()).expect("it is valid"));
+        let query = PairQuery {
+            b: Surface::Device(&clouds[0]),
+            ..queries(&small, 1)[0]
+        };
+        let refused = backends[1].compare(&[query], &mut Vec::new());
+        assert!(
+            matches!(refused, Err(BackendError::Unsupported { pair: 0, .. })),
+            "{refused:?}"
+        );
     }
 }

@@ -61,8 +61,8 @@ impl WgpuBackend {
     }
 
     /// Zeroes the arena from word `from` to the ends of the pixels: all in it that is counted. What lies behind is
-    /// written before it is read. The tiles and pixels that were foreseen are a few bytes more than there are; to clear
-    /// only those would take dispatches.
+    /// written before it is read. The tiles and pixels that were foreseen are more than there are; to clear only
+    /// those would take dispatches.
     fn clear(&mut self, encoder: &mut wgpu::CommandEncoder, from: u32, data: &BatchData) {
         let Some(work) = self.buffers.work.get() else {
             return;
