@@ -10,7 +10,7 @@ pub use in_flight::InFlight;
 use crate::batch_buffers::BatchBuffers;
 use crate::buffers::most_bytes;
 use crate::counters::Counters;
-use crate::layout::{is_for_device, lives_on_device};
+use crate::division::{is_for_device, lives_on_device};
 use crate::measure::stage_bytes::stage_bytes;
 use crate::measure::timer::Timer;
 use crate::resident::Resident;

@@ -5,9 +5,7 @@ use crate::resident::Place;
 use bytemuck::{Pod, Zeroable};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
 use tldi::plan::{DepthScale, PairPlan, SidePlan, ZoneGrid};
-use tldi::{
-    Aabb, CameraPolicy, PairQuery, Params, Projection, Radii, Surface, Variant, View, plan,
-};
+use tldi::{Aabb, CameraPolicy, PairQuery, Params, Radii, Surface, View, plan};
 
 /// Words of 32 bits, and bytes, of what only lives on the device.
 pub(crate) const SURVIVOR_BYTES: u64 = 32;
@@ -327,57 +325,6 @@ fn pose_rows(pose: &Pose3) -> [[f32; 4]; 3] {
     let t = pose.translation.to_array();
     let r = rows(&pose.rotation);
     [0, 1, 2].map(|k| [r[k][0], r[k][1], r[k][2], t[k]])
-}
-
-/// Whether only the device has the points of a cloud of the pair.
-pub(crate) fn lives_on_device(query: &PairQuery) -> bool {
-    let is_resident = |surface| matches!(surface, Surface::Device(_));
-    is_resident(query.a) || is_resident(query.b)
-}
-
-/// Largest radius of a splat in pixels. One invocation draws a splat, pixel by pixel in up to three views: software
-/// adapters give up after 65,535 turns of a loop. Twice as much: such pairs have false contacts there.
-const MOST_REACH_PX: f32 = 70.0;
-
-/// Most points in the square of a mean radius: 64 times those of radii that come from neighbours. For each point an
-/// invocation reads all others around it.
-const MOST_DENSITY: f32 = 60.0;
-
-/// Whether an invocation of each stage has little to do for a cloud.
-fn is_light(surface: Surface<'_>, pixel_size: f32) -> bool {
-    let Surface::Cloud(cloud) = surface else {
-        return true;
-    };
-    let radius = cloud.mean_radius();
-    let [x, y, z] = cloud.bounds().loosened(radius).extents().to_array();
-    // Half the surface of the bounds' box.
-    let area = x * y + y * z + z * x;
-    let reach = cloud.max_radius() * (plan::stride(radius, pixel_size) as f32).sqrt();
-    reach <= MOST_REACH_PX * pixel_size
-        && cloud.len() as f32 * radius * radius <= MOST_DENSITY * area
-}
-
-/// Whether the device takes a pair: two clouds, oriented splats and an orthographic view. All else
-/// is compared by the CPU backend. So are uneven clouds, since the device goes by their mean radii, and clouds with large or
-/// crowded splats, which take it long, unless it alone has the points of one of them.
-pub(crate) fn is_for_device(query: &PairQuery) -> bool {
-    let is_orthographic = match query.view {
-        View::Fixed(camera) => matches!(
-            camera.projection,
-            Projection::Orthographic { pixel_size } if pixel_size == query.params.pixel_size
-        ),
-        View::Aim { .. } => true,
-    };
-    let is_cloud = |surface| !matches!(surface, Surface::Exact(_));
-    let is_light = |surface| is_light(surface, query.params.pixel_size);
-    let is_even = |surface| !matches!(surface, Surface::Cloud(cloud) if cloud.is_uneven());
-    query.params.check().is_ok()
-        && is_orthographic
-        && is_cloud(query.a)
-        && is_cloud(query.b)
-        && (is_even(query.a) && is_even(query.b) && is_light(query.a) && is_light(query.b)
-            || lives_on_device(query))
-        && query.params.variant() == Variant::Oriented
 }
 
 #[cfg(test)]

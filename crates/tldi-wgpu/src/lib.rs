@@ -14,6 +14,7 @@ mod choice;
 mod counters;
 mod crossover;
 mod device;
+mod division;
 mod error;
 mod layout;
 mod measure;

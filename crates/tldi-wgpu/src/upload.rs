@@ -1,10 +1,11 @@
 //! What a batch uploads: its pairs, their sides, and the blocks of points in reach.
 
 use crate::counters::Counters;
+use crate::division::is_for_device;
 use crate::error::numbered;
 use crate::layout::{
     BatchData, CONTACT_WORDS, COUNTERS, CloudFacts, MAX_VIEWS, PAIR_WORDS, PIXEL_BYTES, PairData,
-    SIDE_WORDS, SideData, TILE_BYTES, VIEW_WORDS, is_for_device,
+    SIDE_WORDS, SideData, TILE_BYTES, VIEW_WORDS,
 };
 use crate::prediction::predicted;
 use crate::resident::Resident;

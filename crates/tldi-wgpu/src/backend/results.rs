@@ -5,7 +5,7 @@ use super::WgpuBackend;
 use super::parts::{Returned, Run};
 use crate::GpuError;
 use crate::counters::Counters;
-use crate::layout::lives_on_device;
+use crate::division::lives_on_device;
 use crate::readback::Readback;
 use tldi::{PairQuery, PairResult};
 
