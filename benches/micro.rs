@@ -1,9 +1,10 @@
 //! Times of the CPU's stages, as far as they can be called apart: clouds, images, casts, whole
-//! comparisons, and a surface that pushes a body.
+//! comparisons, also with rapier's meshes, and a surface that pushes a body.
 
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rapier3d::prelude::*;
-use rapier3d_tldi::prelude::{TldiConfig, TldiPipeline};
+use rapier3d_tldi::ExactShape;
+use rapier3d_tldi::prelude::{TldiConfig, TldiPipeline, sample_shape};
 use std::hint::black_box;
 use std::time::Duration;
 use tldi::glamx::{Pose3, Vec3};
@@ -117,6 +118,38 @@ fn comparisons(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// A ball of points in a bowl of each kind that rapier has, and in one of points.
+fn bowls(criterion: &mut Criterion) {
+    const CELLS: usize = 56;
+    let mut group = criterion.benchmark_group("ball of 3,000 points in a bowl of 6,272 triangles");
+    let height = |i: usize, j: usize| {
+        let [x, z] = [i, j].map(|k| 4.0 * (k as f32 / CELLS as f32 - 0.5));
+        0.15 * (x * x + z * z)
+    };
+    let places = (0..=CELLS).flat_map(|j| (0..=CELLS).map(move |i| height(i, j)));
+    let heights = Array2::new(CELLS + 1, CELLS + 1, places.collect());
+    let field = HeightField::new(heights, Vec3::new(4.0, 1.0, 4.0));
+    let (vertices, triangles) = field.to_trimesh();
+    let mesh = TriMesh::new(vertices, triangles).expect("has triangles");
+    let spacing = 0.02;
+    let sampled = sample_shape(&mesh, spacing).expect("has a surface");
+    let ball = sample_shape(&Ball::new(0.3), spacing).expect("has a surface");
+    let up = Pose3::translation(0.0, 0.3 - 0.1 * spacing, 0.0);
+    let (mut backend, mut results) = (CpuBackend::new(), Vec::<PairResult>::new());
+    for (name, bowl) in [
+        ("triangle mesh", Surface::Exact(&ExactShape(&mesh))),
+        ("height field", Surface::Exact(&ExactShape(&field))),
+        ("sampled points", Surface::Cloud(&sampled)),
+    ] {
+        let query = query(bowl, &ball, up, ball.mean_radius());
+        group.bench_function(name, |bench| {
+            bench.iter(|| backend.compare(&[query], &mut results));
+        });
+        assert!(results[0].gap.is_some_and(|gap| gap < 0.0), "they touch");
+    }
+    group.finish();
+}
+
 /// Sixteen pairs at once, on one worker and on one a core.
 fn batches(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("batch of 16 pairs");
@@ -212,6 +245,6 @@ criterion_group! {
         .sample_size(10)
         .warm_up_time(Duration::from_millis(500))
         .measurement_time(Duration::from_secs(2));
-    targets = clouds, images, comparisons, batches, casts, pushes
+    targets = clouds, images, comparisons, bowls, batches, casts, pushes
 }
 criterion_main!(stages);

@@ -308,7 +308,7 @@ impl Touching {
         tiles: &Tiles,
         rect: &Rect,
         support_px: f32,
-        meet: impl Fn(usize) -> bool,
+        mut meet: impl FnMut(usize) -> bool,
     ) -> Option<Rect> {
         let [width, height] = tiles.dims;
         self.modelled.clear();

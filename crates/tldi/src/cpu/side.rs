@@ -3,7 +3,8 @@
 use super::columns::{Columns, Tiles, Touching};
 use super::cull::{CullScratch, PointRadii, Survivors};
 use super::exact::cast::{self, Rays};
-use super::exact::placed::{CellDistances, Placed};
+use super::exact::cell_distances::CellDistances;
+use super::exact::placed::Placed;
 use super::first_look::cells::{CellImaging, Cells};
 use super::fold::{FARTHEST_PIXEL, ViewFold};
 use super::motion::core::BORDER;
@@ -254,9 +255,11 @@ impl Side {
         self.columns.reduce_both(&tiles);
         let support_px = self.support_radius(view.cloud) / seen.pixel_size;
         let reach = reach + tiles.half_diagonal() * seen.pixel_size;
+        let (columns, cells) = (&self.columns, &mut self.cell_distances);
         let meets = |tile: usize| {
-            let depths = self.columns.depths(tile);
-            exact.meets(view.camera, fold.place(tiles.middle(tile)), depths, reach)
+            let depths = columns.depths(tile);
+            let middle = fold.place(tiles.middle(tile));
+            exact.meets(cells, view.camera, middle, depths, reach)
         };
         let rect = touching.mark(&tiles, &seen.rect, support_px, meets)?;
         Some(Imaging {

@@ -5,13 +5,19 @@ use super::projection::Projection;
 use super::triangle::{self, ShearedLine};
 use rapier3d::glamx::{DVec3, Vec3};
 use rapier3d::parry::partitioning::BvhNode;
-use rapier3d::parry::query::PointQuery;
 use rapier3d::parry::shape::{HeightField, TriMesh, TriMeshFlags, Triangle};
 use tldi::RayHit;
 
 /// Part of a mesh's size by which boxes are grown against rounding in `f32`. Half or twice: no test of shapes or
 /// queries fails.
 const ROUNDING: f64 = 1e-6;
+
+/// Cosine of the angle between a face's normal and the way to a point beyond which the point is straight above the face:
+/// the rounding of an `f64` a million times.
+const STRAIGHT: f64 = 1.0 - 1e-10;
+
+/// Part of a place's coordinates by which it is rounded. What is shorter has no direction.
+const NOTHING: f64 = 1e-12;
 
 pub(super) fn cross_triangle(shape: &Triangle, line: &Line, hits: &mut Vec<RayHit>) {
     let vertices = triangle::vertices(shape);
@@ -60,17 +66,29 @@ pub(super) fn project_on_trimesh(mesh: &TriMesh, point: DVec3) -> Projection {
     let p = point.as_vec3();
     let nearest = mesh.bvh().find_best(
         f32::MAX,
-        |node: &BvhNode, _| node.aabb().distance_to_local_point(p, true),
+        |node: &BvhNode, _| {
+            let away = (node.mins() - p).max(p - node.maxs()).max(Vec3::ZERO);
+            away.length_squared()
+        },
         |id, _| {
             let vertices = triangle::vertices(&mesh.triangle(id));
-            Some(point.distance(triangle::nearest(point, vertices)) as f32)
+            Some(point.distance_squared(triangle::nearest(point, vertices)) as f32)
         },
     );
     let Some((id, _)) = nearest else {
         // Only a point that is not finite has no nearest triangle.
         return (f64::INFINITY, DVec3::Y);
     };
-    let foot = triangle::nearest(point, triangle::vertices(&mesh.triangle(id)));
+    let vertices = triangle::vertices(&mesh.triangle(id));
+    let (foot, normal) = (
+        triangle::nearest(point, vertices),
+        triangle::normal(vertices),
+    );
+    let (delta, height) = (point - foot, normal.dot(point - foot));
+    // No other face is more directly below or above the point.
+    if height.abs() > STRAIGHT * delta.length() && delta.length() > NOTHING * point.length() {
+        return signed(point, foot, [normal]);
+    }
     let margin = ROUNDING * foot.abs().max_element();
     let touches = |node: &BvhNode| {
         let aabb = node.aabb();
@@ -99,7 +117,7 @@ fn signed(point: DVec3, foot: DVec3, normals: impl IntoIterator<Item = DVec3>) -
         sum += normal;
     }
     // So close that the direction is rounding.
-    if delta.length() <= 1e-12 * point.length() || height == 0.0 {
+    if delta.length() <= NOTHING * point.length() || height == 0.0 {
         return (delta.length(), sum.try_normalize().unwrap_or(DVec3::Y));
     }
     let side = height.signum();
@@ -173,33 +191,88 @@ fn cells(a: f64, b: f64, count: usize) -> std::ops::RangeInclusive<usize> {
     first.min(last)..=end.min(last)
 }
 
+/// Searches the cells in rings around that below the point, until those that are left are farther than the nearest
+/// triangle found.
 pub(super) fn project_on_height_field(field: &HeightField, point: DVec3) -> Projection {
-    let p = point.as_vec3();
-    // parry finds the nearest point within f32 rounding; the triangles around it make it exact.
-    let guess = field.project_local_point(p, false).point.as_dvec3();
-    let aabb = field.root_aabb();
-    let margin = ROUNDING * f64::from(aabb.mins.abs().max(aabb.maxs.abs()).max_element());
     let scale = field.scale().as_dvec3();
-    let column = (guess.x / scale.x + 0.5) * field.ncols() as f64;
-    let row = (guess.z / scale.z + 0.5) * field.nrows() as f64;
-    let around = || {
-        let columns = cells(column, column, field.ncols());
-        columns.flat_map(move |j| {
-            cells(row, row, field.nrows())
-                .flat_map(move |i| cell_triangles(field, i, j).into_iter().flatten())
-        })
+    let counts = [field.ncols(), field.nrows()];
+    // Of the cell that holds a place, or of the nearest one.
+    let cell_at = |place: DVec3| {
+        let place = [place.x / scale.x, place.z / scale.z];
+        [0, 1].map(|k| (place[k] + 0.5) * counts[k] as f64)
     };
-    let foot = around()
-        .map(|vertices| triangle::nearest(point, vertices))
-        .min_by(|a, b| {
-            a.distance_squared(point)
-                .total_cmp(&b.distance_squared(point))
-        });
-    let Some(foot) = foot else {
-        return (point.distance(guess), DVec3::Y);
+    let aabb = field.root_aabb();
+    let beyond = |low: f32, value: f64, high: f32| {
+        (f64::from(low) - value)
+            .max(value - f64::from(high))
+            .max(0.0)
     };
-    let normals = around()
+    let above = beyond(aabb.mins.y, point.y, aabb.maxs.y);
+    let edge = (scale.x / counts[0] as f64).min(scale.z / counts[1] as f64);
+    let first = cell_at(point);
+    let [column, row] = [0, 1].map(|k| *cells(first[k], first[k], counts[k]).start());
+    let mut nearest = (f64::INFINITY, None);
+    for ring in 0..counts[0].max(counts[1]) {
+        let away = (edge * (ring as f64 - 1.0 - CELL_MARGIN)).max(0.0);
+        if away * away + above * above > nearest.0 {
+            break;
+        }
+        for [column, row] in ring_around([column, row], ring, counts) {
+            let [left, right] = [field.x_at(column), field.x_at(column + 1)];
+            let [front, back] = [field.z_at(row), field.z_at(row + 1)];
+            let heights = [
+                (row, column),
+                (row + 1, column),
+                (row, column + 1),
+                (row + 1, column + 1),
+            ];
+            let heights = heights.map(|at| field.heights()[at] * field.scale().y);
+            let low = heights.into_iter().fold(f32::INFINITY, f32::min);
+            let high = heights.into_iter().fold(f32::NEG_INFINITY, f32::max);
+            let away = DVec3::new(
+                beyond(left, point.x, right),
+                beyond(low, point.y, high),
+                beyond(front, point.z, back),
+            );
+            if away.length_squared() > nearest.0 {
+                continue;
+            }
+            for vertices in cell_triangles(field, row, column).into_iter().flatten() {
+                let foot = triangle::nearest(point, vertices);
+                if foot.distance_squared(point) < nearest.0 {
+                    nearest = (foot.distance_squared(point), Some(foot));
+                }
+            }
+        }
+    }
+    let Some(foot) = nearest.1 else {
+        // All triangles are removed.
+        return (f64::INFINITY, DVec3::Y);
+    };
+    let margin = ROUNDING * f64::from(aabb.mins.abs().max(aabb.maxs.abs()).max_element());
+    let [column, row] = cell_at(foot);
+    let around = cells(column, column, counts[0])
+        .flat_map(|j| cells(row, row, counts[1]).map(move |i| (i, j)));
+    let normals = around
+        .flat_map(|(i, j)| cell_triangles(field, i, j).into_iter().flatten())
         .filter(|&vertices| foot.distance(triangle::nearest(foot, vertices)) <= margin)
         .map(triangle::normal);
     signed(point, foot, normals)
+}
+
+/// The cells, as column and row, that are `ring` cells away from `middle` along one axis, and not farther along the other.
+fn ring_around(
+    middle: [usize; 2],
+    ring: usize,
+    counts: [usize; 2],
+) -> impl Iterator<Item = [usize; 2]> {
+    let [column, row] = middle;
+    let rows = row.saturating_sub(ring)..=(row + ring).min(counts[1] - 1);
+    rows.flat_map(move |j| {
+        let is_end = j.abs_diff(row) == ring;
+        let step = if is_end { 1 } else { 2 * ring };
+        let columns = (column..=column + 2 * ring).step_by(step);
+        let columns = columns.filter_map(move |c| c.checked_sub(ring));
+        columns.filter(move |&i| i < counts[0]).map(move |i| [i, j])
+    })
 }

@@ -2,7 +2,9 @@
 
 use super::{check_projection, crossings, in_box, tolerance, unit};
 use rapier3d::glamx::{DVec3, Vec3};
-use rapier3d::parry::shape::{HeightField, Shape, TriMesh, TriMeshFlags, Triangle};
+use rapier3d::parry::shape::{
+    HeightField, HeightFieldCellStatus, Shape, TriMesh, TriMeshFlags, Triangle,
+};
 use rapier3d::parry::utils::Array2;
 use rapier3d_tldi::{ExactShape, RaySurface};
 
@@ -306,20 +308,22 @@ pub(crate) fn hills() -> HeightField {
     HeightField::new(Array2::new(7, 9, heights), Vec3::new(1.7, 1.1, 2.3))
 }
 
+fn upward(field: &HeightField) -> Vec<[DVec3; 3]> {
+    let triangles = field.triangles().map(|t| {
+        let [a, b, c] = [t.a, t.b, t.c].map(|v| v.as_dvec3());
+        if (b - a).cross(c - a).y < 0.0 {
+            [a, c, b]
+        } else {
+            [a, b, c]
+        }
+    });
+    triangles.collect()
+}
+
 #[test]
 fn height_fields_are_crossed_like_their_triangles_and_point_up() {
     let field = hills();
-    let triangles: Vec<_> = field
-        .triangles()
-        .map(|t| {
-            let [a, b, c] = [t.a, t.b, t.c].map(|v| v.as_dvec3());
-            if (b - a).cross(c - a).y < 0.0 {
-                [a, c, b]
-            } else {
-                [a, b, c]
-            }
-        })
-        .collect();
+    let triangles = upward(&field);
     assert_eq!(triangles.len(), 2 * 6 * 8);
     assert!(compare_with_brute_force("hills", &field, &triangles, 12) > 300);
     assert!(!ExactShape(&field).is_closed());
@@ -336,13 +340,45 @@ fn height_fields_are_crossed_like_their_triangles_and_point_up() {
             assert!(hits[0].normal.y > 0.0);
         }
     }
+}
+
+/// Wherever the nearest triangle is: in the cell below, behind hills, beside the field, or beyond removed cells.
+#[test]
+fn height_fields_tell_distance_side_and_normal() {
+    let mut field = hills();
     let mut rng = fastrand::Rng::with_seed(13);
+    for half in [0.8, 4.0] {
+        let triangles = upward(&field);
+        let samples = samples_on(&triangles, 500, &mut rng);
+        let on = |p| distance_to_triangles(&triangles, p);
+        for _ in 0..200 {
+            let point = in_box(&mut rng, half);
+            let distance = check_projection("hills", &field, point, on, &samples);
+            let is_over_or_below = point.x.abs() < 0.85 && point.z.abs() < 1.15;
+            if half < 1.0 && is_over_or_below {
+                let below = crossings(&field, point, Vec3::Y, 10.0).len() == 1;
+                assert_eq!(distance < 0.0, below, "{point}: {distance}");
+            }
+        }
+    }
+    for (row, column) in (0..6).flat_map(|i| (0..8).map(move |j| (i, j))) {
+        let status = match (row, column) {
+            (0..3, _) => HeightFieldCellStatus::CELL_REMOVED,
+            (3, _) => HeightFieldCellStatus::LEFT_TRIANGLE_REMOVED,
+            _ => HeightFieldCellStatus::empty(),
+        };
+        field.set_cell_status(row, column, status);
+    }
+    let triangles = upward(&field);
+    assert_eq!(triangles.len(), 8 + 2 * 2 * 8);
     let samples = samples_on(&triangles, 500, &mut rng);
     let on = |p| distance_to_triangles(&triangles, p);
     for _ in 0..200 {
-        let point = in_box(&mut rng, 0.8);
-        let distance = check_projection("hills", &field, point, on, &samples);
-        let below = crossings(&field, point, Vec3::Y, 10.0).len() == 1;
-        assert_eq!(distance < 0.0, below, "{point}: {distance}");
+        let point = in_box(&mut rng, 1.5);
+        check_projection("hills with a hole", &field, point, on, &samples);
     }
+    for (row, column) in (0..6).flat_map(|i| (0..8).map(move |j| (i, j))) {
+        field.set_cell_status(row, column, HeightFieldCellStatus::CELL_REMOVED);
+    }
+    assert_eq!(ExactShape(&field).project(Vec3::ONE).0, f32::INFINITY);
 }

@@ -1,19 +1,16 @@
 //! Stage `zone` for a cloud and an exact surface: which of the culled points are near it.
 //!
-//! The distance to a surface is expensive, and few points are near. So it is computed once for each cell of a coarse
-//! grid that holds points. A point can be nearer than the middle of its cell by half the cell's diagonal, not by more.
-//! The camera is aimed by an even selection of the points in cells that may be near. If that finds few near points,
-//! all points are asked: no contact is too small to be found.
+//! The distance to a surface is expensive, and few points are near. [Cells](super::cell_distances) tell which may be
+//! near. The camera is aimed by an even selection of these. If that finds few near points, all of them are asked: no
+//! contact is too small to be found.
 
-use crate::cpu::exact::placed::{CellDistances, Placed};
-use crate::cpu::fold::is_coarse;
+use crate::PointCloud;
+use crate::cpu::exact::placed::Placed;
 use crate::cpu::normals;
 use crate::cpu::side::{NearSamples, Side};
-use crate::cpu::zone::ZoneGrid;
 use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
 use crate::stage::stage;
-use crate::{Aabb, PointCloud};
-use glamx::{Pose3, Vec3};
+use glamx::Pose3;
 
 /// Fewest near points of a selection that stand for all. Half: no test of queries or contacts fails.
 const ENOUGH: usize = 32;
@@ -64,59 +61,20 @@ impl Side {
         true
     }
 
-    /// Fills `kept` with the points in cells that reach within `reach` metres of the surface, and `support`
-    /// with those within `beyond` metres more; with coarser ones of cells farther away.
+    /// Fills `kept` with the points that may be within `reach` metres of the surface, and `support` with those within
+    /// `beyond` metres more; with coarser ones farther away.
     fn in_near_cells(&mut self, exact: &Placed, reach: f32, beyond: f32) {
-        let points = self.points.points();
-        let CellDistances {
-            least,
-            fold,
-            middles,
-        } = &mut self.cell_distances;
-        fold.clear();
-        let count = points.len() as f32;
-        let mut bounds = points.clone().fold(Aabb::EMPTY, Aabb::including);
-        let mut grid = ZoneGrid::with_cells(&bounds, reach, count);
-        if is_coarse(grid.inv_cell, reach) {
-            fold.find(reach, points.clone());
-            let folded = points.map(|point| fold.folded(point));
-            bounds = folded.fold(Aabb::EMPTY, Aabb::including);
-            grid = ZoneGrid::with_cells(&bounds, reach, count);
-        }
-        let half_diagonal = 0.5 * 3.0f32.sqrt() / grid.inv_cell;
-        least.clear();
-        least.resize(grid.dims.iter().product(), f32::NAN);
-        middles.clear();
-        if !fold.is_identity() {
-            middles.resize(least.len(), Vec3::INFINITY);
-        }
+        let cells = &mut self.cell_distances;
+        cells.begin(self.points.points(), reach);
         self.support.clear();
         self.kept.clear();
         for i in 0..self.points.len() {
-            let point = self.points.point(i);
-            let folded = fold.folded(point);
-            let at = ((folded - bounds.min) * grid.inv_cell).floor();
-            let cell = [at.x, at.y, at.z];
-            let [x, y, z] = [0, 1, 2].map(|k| (cell[k] as usize).min(grid.dims[k] - 1));
-            let cell = (z * grid.dims[1] + y) * grid.dims[0] + x;
-            let least = &mut least[cell];
-            // After folding, one cell may hold points from both sides of a gap. The stored distance then holds for one side
-            // only and is computed again for the other.
-            let is_beyond_gap =
-                (middles.get(cell)).is_some_and(|middle| middle.distance(point) > half_diagonal);
-            if least.is_nan() || is_beyond_gap {
-                let middle = Vec3::new(x as f32, y as f32, z as f32) + 0.5;
-                let mut middle = bounds.min + middle / grid.inv_cell;
-                if let Some(unfolded) = middles.get_mut(cell) {
-                    middle += point - folded;
-                    *unfolded = middle;
-                }
-                *least = exact.project(middle).0 - half_diagonal;
-            }
             let further = self.points.further(i);
-            if *least <= reach + beyond + (1.0 + normals::SUPPORT) * further {
+            let within = reach + beyond + (1.0 + normals::SUPPORT) * further;
+            let least = cells.at_least(exact, self.points.point(i), within);
+            if least <= within {
                 self.support.push(i as u32);
-                if *least <= reach + further {
+                if least <= reach + further {
                     self.kept.push(i as u32);
                 }
             }
@@ -149,45 +107,15 @@ mod tests {
     use super::*;
     use crate::cloud::reach::Ring;
     use crate::cpu::cull::{self, Region};
-    use crate::cpu::exact::placed::MOST_STEPS;
-    use crate::{RayHit, RaySurface, VirtualCamera};
+    use crate::cpu::exact::test_surface::TestSurface;
     use fastrand::Rng;
-    use std::sync::atomic::{AtomicUsize, Ordering};
-
-    /// A ball of one metre.
-    struct Ball;
-
-    impl RaySurface for Ball {
-        fn bounds(&self) -> Aabb {
-            Aabb {
-                min: Vec3::NEG_ONE,
-                max: Vec3::ONE,
-            }
-        }
-
-        fn crossings(&self, _: Vec3, _: Vec3, _: f32, _: &mut Vec<RayHit>) {}
-
-        fn project(&self, point: Vec3) -> (f32, Vec3) {
-            (point.length() - 1.0, point.normalize_or(Vec3::Y))
-        }
-
-        fn is_closed(&self) -> bool {
-            true
-        }
-    }
+    use glamx::Vec3;
 
     fn random(rng: &mut Rng) -> Vec3 {
         Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5)
     }
 
     const REACH: f32 = 0.02;
-
-    fn here(surface: &dyn RaySurface) -> Placed<'_> {
-        Placed {
-            surface,
-            frame_from_surface: &Pose3::IDENTITY,
-        }
-    }
 
     fn side_of(cloud: &PointCloud) -> Side {
         let everything = Region {
@@ -218,7 +146,7 @@ mod tests {
         let at = |height: &f32| (1.0 + height) * random(&mut rng).normalize();
         let points: Vec<Vec3> = heights.iter().map(at).collect();
         let mut side = side_of(&cloud_of(&points));
-        side.in_near_cells(&here(&Ball), REACH, 0.5 * REACH);
+        side.in_near_cells(&TestSurface::ball().here(), REACH, 0.5 * REACH);
         for (found, within) in [(&side.kept, REACH), (&side.support, 1.5 * REACH)] {
             for (i, height) in heights.iter().enumerate() {
                 if *height < 0.999 * within {
@@ -250,7 +178,8 @@ mod tests {
         let cloud = cloud.build().expect("a valid cloud");
         let mut side = side_of(&cloud);
         let mut samples = NearSamples::default();
-        let (exact, frame) = (here(&Ball), Pose3::IDENTITY);
+        let ball = TestSurface::ball();
+        let (exact, frame) = (ball.here(), Pose3::IDENTITY);
         let mean = cloud.mean_radius();
         assert!(side.near_exact(&cloud, &frame, &exact, mean, &mut samples));
         for (k, &height) in heights.iter().enumerate() {
@@ -260,59 +189,6 @@ mod tests {
                 assert_eq!(is_near, height < reach, "{height} of {reach}");
             }
         }
-    }
-
-    /// Where a step is less than a depth can tell.
-    #[test]
-    fn columns_far_away_end() {
-        let pose = Pose3::from_translation(1e7 * Vec3::Z);
-        let ball = Placed {
-            surface: &Ball,
-            frame_from_surface: &pose,
-        };
-        let camera = VirtualCamera::along(Vec3::Z, 0.1);
-        let [.., depth] = camera.view_from_point(pose.translation).to_array();
-        assert!(ball.meets(&camera, [12.0, 0.0], [depth, depth + 1e6], 0.01));
-    }
-
-    /// The plane x = 0, which counts what it is asked.
-    #[derive(Default)]
-    struct Wall(AtomicUsize);
-
-    impl RaySurface for Wall {
-        fn bounds(&self) -> Aabb {
-            Aabb {
-                min: Vec3::NEG_INFINITY,
-                max: Vec3::INFINITY,
-            }
-        }
-
-        fn crossings(&self, _: Vec3, _: Vec3, _: f32, _: &mut Vec<RayHit>) {}
-
-        fn project(&self, point: Vec3) -> (f32, Vec3) {
-            self.0.fetch_add(1, Ordering::Relaxed);
-            (point.x, Vec3::X)
-        }
-
-        fn is_closed(&self) -> bool {
-            false
-        }
-    }
-
-    /// Along a plane that is hardly farther than the reach.
-    #[test]
-    fn marches_along_a_plane_end() {
-        let wall = Wall::default();
-        let exact = here(&wall);
-        let camera = VirtualCamera::along(Vec3::Z, 0.1);
-        let across = |x: f32| {
-            let view = camera.view_from_point(x * Vec3::X);
-            camera.pixel_from_view(view)
-        };
-        assert!(exact.meets(&camera, across(1.06 * REACH), [0.0, 1e4], REACH));
-        assert!(wall.0.load(Ordering::Relaxed) <= MOST_STEPS);
-        // What is far enough is passed within them.
-        assert!(!exact.meets(&camera, across(3.0 * REACH), [0.0, REACH], REACH));
     }
 
     /// Three of 5,000 that are all in cells that can be near.
@@ -329,7 +205,8 @@ mod tests {
         let cloud = cloud_of(&points);
         let mut side = side_of(&cloud);
         let mut samples = NearSamples::default();
-        let exact = here(&Ball);
+        let ball = TestSurface::ball();
+        let exact = ball.here();
         assert!(side.near_exact(&cloud, &Pose3::IDENTITY, &exact, REACH, &mut samples));
         assert_eq!(side.near, near.map(|i| i as u32));
         for (k, i) in near.into_iter().enumerate() {
@@ -337,36 +214,5 @@ mod tests {
             assert!(samples.normals[k].dot(outward) > 0.999);
             assert!(samples.points[k].distance(outward) < 1e-5);
         }
-    }
-
-    /// By the least distance of a line to the ball's middle.
-    #[test]
-    fn columns_that_a_ball_is_near_are_found() {
-        let mut rng = Rng::with_seed(21);
-        let (mut near, mut far) = (0, 0);
-        for _ in 0..2000 {
-            let pose = Pose3::from_translation(2.0 * random(&mut rng));
-            let ball = Placed {
-                surface: &Ball,
-                frame_from_surface: &pose,
-            };
-            let camera = VirtualCamera::along(random(&mut rng), 0.1);
-            let pixel = [40.0 * (rng.f32() - 0.5), 40.0 * (rng.f32() - 0.5)];
-            let depths = [-2.0 * rng.f32(), 2.0 * rng.f32()];
-            let reach = 0.05 + 0.3 * rng.f32();
-            let [from, to] = depths.map(|depth| camera.point_at(pixel[0], pixel[1], depth));
-            let along = (pose.translation - from).dot(to - from) / (to - from).length_squared();
-            let nearest = from.lerp(to, along.clamp(0.0, 1.0));
-            let distance = nearest.distance(pose.translation) - 1.0;
-            let found = ball.meets(&camera, pixel, depths, reach);
-            if distance <= reach {
-                assert!(found, "{distance} of {reach}");
-                near += 1;
-            } else if distance > 1.1 * reach {
-                assert!(!found, "{distance} of {reach}");
-                far += 1;
-            }
-        }
-        assert!(near > 300 && far > 300, "{near} {far}");
     }
 }

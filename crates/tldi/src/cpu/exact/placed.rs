@@ -1,7 +1,7 @@
-//! An exact surface where a pair has it, and how far it is from cells and columns.
+//! An exact surface where a pair has it, and whether columns come near it.
 
 use crate::cpu::columns::rect_of;
-use crate::cpu::fold::SpaceFold;
+use crate::cpu::exact::cell_distances::CellDistances;
 use crate::cpu::rect::Rect;
 use crate::{RaySurface, VirtualCamera};
 use glamx::{Pose3, Vec3};
@@ -13,17 +13,7 @@ const LEAST_FREE: f32 = 0.05;
 /// Steps of a march along a column, after which a surface counts as near. Spheres that grow past a surface leave it in
 /// about ten; a march along a plane that is hardly farther than the reach would take as many as the column is long.
 /// Half as many draw a few columns more in which nothing meets; twice as many cost as much again.
-pub(crate) const MOST_STEPS: usize = 64;
-
-/// How far the cells of a grid are from the surface; kept from call to call.
-#[derive(Default)]
-pub(crate) struct CellDistances {
-    /// The least distance that a point in each cell can have, metres. It is not a number until it is asked for.
-    pub(crate) least: Vec<f32>,
-    pub(crate) fold: SpaceFold,
-    /// Middles of the cells that were asked for, before gaps were folded. None where nothing is folded.
-    pub(crate) middles: Vec<Vec3>,
-}
+const MOST_STEPS: usize = 64;
 
 /// An exact surface where a pair has it.
 #[derive(Clone, Copy)]
@@ -56,23 +46,107 @@ impl Placed<'_> {
     /// Marches along it, each time as far as nothing can be near; where that does not end, it may come so near.
     pub(crate) fn meets(
         &self,
+        cells: &mut CellDistances,
         camera: &VirtualCamera,
         [u, v]: [f32; 2],
         [mut depth, end]: [f32; 2],
         reach: f32,
     ) -> bool {
+        let near = (1.0 + LEAST_FREE) * reach;
         for _ in 0..MOST_STEPS {
             if depth > end {
                 return false;
             }
-            let (distance, _) = self.project(camera.point_at(u, v, depth));
+            let place = camera.point_at(u, v, depth);
+            let mut distance = cells.at_least(self, place, near);
+            if distance <= near {
+                (distance, _) = self.project(place);
+            }
             let free = distance - reach;
             // A depth so great that it does not grow is no reason to march for ever.
-            if free.is_nan() || free <= LEAST_FREE * reach || depth + free == depth {
+            if distance.is_nan() || distance <= near || depth + free == depth {
                 return true;
             }
             depth += free;
         }
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cpu::exact::test_surface::TestSurface;
+    use fastrand::Rng;
+
+    const REACH: f32 = 0.02;
+
+    fn random(rng: &mut Rng) -> Vec3 {
+        Vec3::new(rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5)
+    }
+
+    /// Where a step is less than a depth can tell.
+    #[test]
+    fn columns_far_away_end() {
+        let pose = Pose3::from_translation(1e7 * Vec3::Z);
+        let ball = Placed {
+            surface: &TestSurface::ball(),
+            frame_from_surface: &pose,
+        };
+        let camera = VirtualCamera::along(Vec3::Z, 0.1);
+        let [.., depth] = camera.view_from_point(pose.translation).to_array();
+        let cells = &mut CellDistances::default();
+        assert!(ball.meets(cells, &camera, [12.0, 0.0], [depth, depth + 1e6], 0.01));
+    }
+
+    /// Along a plane that is hardly farther than the reach.
+    #[test]
+    fn marches_along_a_plane_end() {
+        let wall = TestSurface::wall();
+        let (exact, cells) = (wall.here(), &mut CellDistances::default());
+        let camera = VirtualCamera::along(Vec3::Z, 0.1);
+        let across = |x: f32| {
+            let view = camera.view_from_point(x * Vec3::X);
+            camera.pixel_from_view(view)
+        };
+        assert!(exact.meets(cells, &camera, across(1.06 * REACH), [0.0, 1e4], REACH));
+        assert!(wall.asked() <= MOST_STEPS);
+        // What is far enough is passed within them.
+        assert!(!exact.meets(cells, &camera, across(3.0 * REACH), [0.0, REACH], REACH));
+    }
+
+    /// By the least distance of a line to the ball's middle.
+    #[test]
+    fn columns_that_a_ball_is_near_are_found() {
+        let mut rng = Rng::with_seed(21);
+        let (mut near, mut far) = (0, 0);
+        let mut cells = CellDistances::default();
+        for k in 0..2000 {
+            // Every other time with cells over a part of the view.
+            let places: Vec<Vec3> = (0..k % 2 * 50).map(|_| 3.0 * random(&mut rng)).collect();
+            cells.begin(places.iter().copied(), 0.2);
+            let pose = Pose3::from_translation(2.0 * random(&mut rng));
+            let ball = Placed {
+                surface: &TestSurface::ball(),
+                frame_from_surface: &pose,
+            };
+            let camera = VirtualCamera::along(random(&mut rng), 0.1);
+            let pixel = [40.0 * (rng.f32() - 0.5), 40.0 * (rng.f32() - 0.5)];
+            let depths = [-2.0 * rng.f32(), 2.0 * rng.f32()];
+            let reach = 0.05 + 0.3 * rng.f32();
+            let [from, to] = depths.map(|depth| camera.point_at(pixel[0], pixel[1], depth));
+            let along = (pose.translation - from).dot(to - from) / (to - from).length_squared();
+            let nearest = from.lerp(to, along.clamp(0.0, 1.0));
+            let distance = nearest.distance(pose.translation) - 1.0;
+            let found = ball.meets(&mut cells, &camera, pixel, depths, reach);
+            if distance <= reach {
+                assert!(found, "{distance} of {reach}");
+                near += 1;
+            } else if distance > 1.1 * reach {
+                assert!(!found, "{distance} of {reach}");
+                far += 1;
+            }
+        }
+        assert!(near > 300 && far > 300, "{near} {far}");
     }
 }

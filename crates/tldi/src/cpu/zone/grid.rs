@@ -58,14 +58,19 @@ impl ZoneGrid {
         (self.strides()[2] * self.dims[2]).div_ceil(64)
     }
 
+    /// Column, row and plane of the cell that holds `point`; `None` outside.
+    #[inline]
+    pub(crate) fn cell(&self, point: Vec3) -> Option<[usize; 3]> {
+        let at = (point - self.min) * self.inv_cell;
+        let dims = Vec3::from_array(self.dims.map(|n| n as f32));
+        let is_inside = at.cmpge(Vec3::ZERO).all() && at.cmplt(dims).all();
+        is_inside.then(|| at.to_array().map(|c| c as usize))
+    }
+
     /// Bit of the cell that holds `point`; `None` outside.
     pub(super) fn bit(&self, point: Vec3) -> Option<usize> {
-        let cell = ((point - self.min) * self.inv_cell).floor();
-        let [lx, ly, lz] = self.dims.map(|n| n as f32);
-        let is_inside = cell.cmpge(Vec3::ZERO).all() && cell.cmplt(Vec3::new(lx, ly, lz)).all();
-        let [x, y, z] = cell.to_array().map(|c| c as usize);
         let [_, row, plane] = self.strides();
-        is_inside.then(|| z * plane + y * row + x)
+        self.cell(point).map(|[x, y, z]| z * plane + y * row + x)
     }
 
     pub(super) fn mark<'c>(&self, cells: impl Iterator<Item = &'c u32>, bits: &mut Vec<u64>) {
