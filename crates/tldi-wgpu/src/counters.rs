@@ -27,7 +27,8 @@ const ELEMENT_NAMES: [&str; 7] = [
     "contacts",
 ];
 
-/// Elements that a batch needs of each buffer whose size is not known before.
+/// Elements that a batch needs of each buffer whose size is not known before. In the order of the stages' counters, from
+/// [`SURVIVORS`](tldi_shaders::numbers::SURVIVORS) to [`CONTACTS`](tldi_shaders::numbers::CONTACTS).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Counters {
@@ -68,17 +69,24 @@ impl Counters {
         share(self.tiles, other.tiles).max(share(self.pixels, other.pixels))
     }
 
+    fn words(&self) -> [u32; 7] {
+        bytemuck::cast(*self)
+    }
+
+    fn zip(&self, other: &Self, op: impl Fn(u32, u32) -> u32) -> Self {
+        let (own, other) = (self.words(), other.words());
+        let all: [u32; 7] = std::array::from_fn(|k| op(own[k], other[k]));
+        bytemuck::cast(all)
+    }
+
     /// Each with its name.
     pub(crate) fn named(&self) -> [(&'static str, u32); 7] {
-        let words: [u32; 7] = bytemuck::cast(*self);
-        std::array::from_fn(|k| (ELEMENT_NAMES[k], words[k]))
+        std::array::from_fn(|k| (ELEMENT_NAMES[k], self.words()[k]))
     }
 
     /// Whether buffers of this size are large enough.
     pub(crate) fn holds(&self, needed: &Self) -> bool {
-        let words = |c| -> [u32; 7] { bytemuck::cast(c) };
-        let mut all = words(*self).into_iter().zip(words(*needed));
-        all.all(|(own, needed)| needed <= own)
+        self.max(needed) == *self
     }
 
     /// The most that a device takes whose buffers have at most `allowed` bytes, and that the
@@ -99,26 +107,17 @@ impl Counters {
 
     /// The sum of each, or the largest word.
     pub(crate) fn plus(self, other: &Self) -> Self {
-        let words = |c: Self| -> [u32; 7] { bytemuck::cast(c) };
-        let (own, other) = (words(self), words(*other));
-        let sum: [u32; 7] = std::array::from_fn(|k| own[k].saturating_add(other[k]));
-        bytemuck::cast(sum)
+        self.zip(other, u32::saturating_add)
     }
 
     /// The greater of each.
-    pub(crate) fn max(self, other: &Self) -> Self {
-        let words = |c: Self| -> [u32; 7] { bytemuck::cast(c) };
-        let (own, other) = (words(self), words(*other));
-        let most: [u32; 7] = std::array::from_fn(|k| own[k].max(other[k]));
-        bytemuck::cast(most)
+    pub(crate) fn max(&self, other: &Self) -> Self {
+        self.zip(other, u32::max)
     }
 
     /// The lesser of each.
     pub(crate) fn min(self, other: &Self) -> Self {
-        let words = |c: Self| -> [u32; 7] { bytemuck::cast(c) };
-        let (own, other) = (words(self), words(*other));
-        let least: [u32; 7] = std::array::from_fn(|k| own[k].min(other[k]));
-        bytemuck::cast(least)
+        self.zip(other, u32::min)
     }
 
     /// What is too small is grown by doubling, to at most `most`.
@@ -126,8 +125,7 @@ impl Counters {
     /// # Errors
     /// [`GpuError::TooLarge`] where more than `most` is needed.
     pub(crate) fn grown(self, needed: &Self, most: &Self) -> Result<Self, GpuError> {
-        let words = |c: Self| -> [u32; 7] { bytemuck::cast(c) };
-        let (mut own, needed, most) = (words(self), words(*needed), words(*most));
+        let (mut own, needed, most) = (self.words(), needed.words(), most.words());
         for k in 0..own.len() {
             let bytes = |count: u32| ELEMENT_BYTES[k] * u64::from(count);
             if needed[k] > most[k] {
