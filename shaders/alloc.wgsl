@@ -34,8 +34,9 @@ fn alloc(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
     }
     if k == 0u {
         let whole = (min(atomicLoad(&work[SPLATS]), batch.splats) + GROUP - 1u) / GROUP;
-        splat_groups[0] = min(whole, MAX_GROUPS);
-        splat_groups[1] = (whole + MAX_GROUPS - 1u) / MAX_GROUPS;
-        splat_groups[2] = 1u;
+        let sizes = split_groups(whole);
+        splat_groups[0] = sizes.x;
+        splat_groups[1] = sizes.y;
+        splat_groups[2] = sizes.z;
     }
 }

@@ -184,21 +184,6 @@ fn columns_depths(
     }
 }
 
-fn view_of_tile(tile: u32) -> u32 {
-    var low = 0u;
-    var high = batch.pairs * MAX_VIEWS;
-    // Ends: the middle is between them, so that they come closer.
-    while high - low > 1u {
-        let middle = (low + high) / 2u;
-        if views[middle].first_tile <= tile {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
-
 var<workgroup> touched: array<atomic<u32>, 4>;
 
 // Least depth in a tile and its neighbours.
@@ -220,7 +205,7 @@ fn columns_touch(
 ) {
     let tile = group_index(group) * GROUP + lane;
     let exists = tile < min(atomicLoad(&work[TILES]), batch.tiles);
-    let view = view_of_tile(tile);
+    let view = view_of(tile, true);
     let k = tile - views[view].first_tile;
     let dims = views[view].tile_dims;
     if exists && k < views[view].tile_count {

@@ -312,7 +312,7 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         || atomicLoad(&work[LAYERS]) > batch.layers {
         return;
     }
-    let view = view_of_pixel(k);
+    let view = view_of(k, false);
     let in_image = k - views[view].first_pixel;
     if in_image >= views[view].pixel_count {
         return;

@@ -90,14 +90,10 @@ fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
     }
     let scaled = radius * (*facts).radius_scale;
     survivors[slot] = Survivor(position, scaled, side_index, index, NONE, 0u);
-    // The cell of the zone's grid; points outside count to the nearest one.
     let dims = pairs[pair_index].zone_dims;
-    let at = (position - pairs[pair_index].overlap_min) * pairs[pair_index].zone_inv_cell;
-    let cx = truncated(at.x, f32(dims.x - 1u));
-    let cy = truncated(at.y, f32(dims.y - 1u));
-    let cz = truncated(at.z, f32(dims.z - 1u));
-    let row = (cz * dims.y + cy) * pairs[pair_index].zone_row_words;
+    let cell = grid_cell(position, pairs[pair_index].overlap_min, pairs[pair_index].zone_inv_cell, dims);
+    let row = (cell.z * dims.y + cell.y) * pairs[pair_index].zone_row_words;
     let of_side = (side_index % 2u) * pairs[pair_index].zone_words;
-    let word = batch.zone_at + pairs[pair_index].zone_first + of_side + row + cx / 32u;
-    atomicOr(&work[word], 1u << (cx % 32u));
+    let word = batch.zone_at + pairs[pair_index].zone_first + of_side + row + cell.x / 32u;
+    atomicOr(&work[word], 1u << (cell.x % 32u));
 }

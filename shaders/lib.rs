@@ -1,7 +1,10 @@
 //! The stages of the GPU backend in WGSL, under the names of the CPU backend's stages.
 //!
-//! One file a stage; what they share is in `shared/` and put in front. Their constants are
-//! overrides, filled by `tldi-wgpu` from the numbers of the CPU's stages.
+//! One file a stage; what they share is in `shared/` and put in front. [`numbers`] are those that the host shares. The
+//! numbers of the CPU's stages are overrides, which `tldi-wgpu` fills.
+
+#[macro_use]
+pub mod numbers;
 
 /// One compute stage: an entry point of a shader.
 #[derive(Clone, Copy, Debug)]
@@ -14,23 +17,23 @@ pub struct Stage {
     pub bindings: &'static [u32],
 }
 
+/// A stage of a batch: the numbers, `types` and `math` in front of its own files.
 macro_rules! shader {
     ($($file:literal),+) => {
-        concat!($(include_str!($file)),+)
+        concat!(
+            numbers_wgsl!(),
+            include_str!("shared/types.wgsl"),
+            include_str!("shared/math.wgsl"),
+            $(include_str!($file)),+
+        )
     };
 }
 
-const CULL: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "cull.wgsl");
-const ZONE: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "zone.wgsl");
-const NORMALS_ALLOC: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
-    "normals_alloc.wgsl"
-);
-const NORMALS_SORT: &str = shader!("shared/types.wgsl", "shared/math.wgsl", "normals_sort.wgsl");
+const CULL: &str = shader!("cull.wgsl");
+const ZONE: &str = shader!("zone.wgsl");
+const NORMALS_ALLOC: &str = shader!("normals_alloc.wgsl");
+const NORMALS_SORT: &str = shader!("normals_sort.wgsl");
 const NORMALS: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
     "shared/eigen.wgsl",
     "shared/bare_normal.wgsl",
     "shared/modelled.wgsl",
@@ -38,72 +41,34 @@ const NORMALS: &str = shader!(
     "normals.wgsl"
 );
 const NORMALS_SHARPEN: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
     "shared/eigen.wgsl",
     "shared/bare_normal.wgsl",
     "normals_sharpen.wgsl"
 );
 const SAMPLE: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
     "shared/eigen.wgsl",
     "shared/bare_normal.wgsl",
+    "shared/given_normal.wgsl",
     "sample.wgsl"
 );
 const AIM: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
     "shared/eigen.wgsl",
     "shared/view_along.wgsl",
     "aim_side.wgsl",
     "aim.wgsl"
 );
-const FURTHER: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
-    "shared/view_along.wgsl",
-    "further.wgsl"
-);
-const COLUMNS: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
-    "shared/places.wgsl",
-    "columns.wgsl"
-);
+const FURTHER: &str = shader!("shared/view_along.wgsl", "further.wgsl");
+const COLUMNS: &str = shader!("shared/places.wgsl", "shared/view_of.wgsl", "columns.wgsl");
 const MARK: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
+    "shared/given_normal.wgsl",
     "shared/modelled.wgsl",
     "shared/pixels.wgsl",
     "mark.wgsl"
 );
-const ALLOC: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
-    "shared/pixels.wgsl",
-    "alloc.wgsl"
-);
-const SPLAT: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
-    "shared/pixels.wgsl",
-    "splat.wgsl"
-);
-const SWEEP: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
-    "shared/pixels.wgsl",
-    "shared/view_of_pixel.wgsl",
-    "sweep.wgsl"
-);
-const COMPARE: &str = shader!(
-    "shared/types.wgsl",
-    "shared/math.wgsl",
-    "shared/pixels.wgsl",
-    "shared/view_of_pixel.wgsl",
-    "compare.wgsl"
-);
+const ALLOC: &str = shader!("shared/pixels.wgsl", "alloc.wgsl");
+const SPLAT: &str = shader!("shared/pixels.wgsl", "splat.wgsl");
+const SWEEP: &str = shader!("shared/pixels.wgsl", "shared/view_of.wgsl", "sweep.wgsl");
+const COMPARE: &str = shader!("shared/pixels.wgsl", "shared/view_of.wgsl", "compare.wgsl");
 
 const fn stage(name: &'static str, source: &'static str, bindings: &'static [u32]) -> Stage {
     Stage {
@@ -114,7 +79,11 @@ const fn stage(name: &'static str, source: &'static str, bindings: &'static [u32
 }
 
 /// Points from a depth image, before a batch. Bindings: camera, depths, points.
-pub const UNPROJECT: Stage = stage("unproject", include_str!("unproject.wgsl"), &[0, 1, 2]);
+pub const UNPROJECT: Stage = stage(
+    "unproject",
+    concat!(numbers_wgsl!(), include_str!("unproject.wgsl")),
+    &[0, 1, 2],
+);
 
 /// The stages of a batch, in their order. [`FURTHER_FROM`] and what follows run again where a pair needs further views.
 ///

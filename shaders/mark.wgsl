@@ -18,17 +18,10 @@ fn is_bare(side: u32) -> bool {
 
 fn normal_of(i: u32) -> vec3f {
     let side = survivors[i].side;
-    let facts = &pairs[side / 2u].sides[side % 2u];
     if is_bare(side) {
         return planes[i].normal;
     }
-    let at = 3u * ((*facts).first_normal + survivors[i].index);
-    return turned(
-        (*facts).frame_from_cloud_x,
-        (*facts).frame_from_cloud_y,
-        (*facts).frame_from_cloud_z,
-        vec3f(normals[at], normals[at + 1u], normals[at + 2u]),
-    );
+    return given_normal(side, survivors[i].index);
 }
 
 fn splat_of(view: u32, i: u32, normal_in_frame: vec3f) -> Splat {

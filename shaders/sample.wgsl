@@ -23,13 +23,7 @@ fn sample(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     }
     var normal = vec3f();
     if ((*facts).flags & HAS_NORMALS) != 0u {
-        let at = 3u * ((*facts).first_normal + survivors[i].index);
-        normal = turned(
-            (*facts).frame_from_cloud_x,
-            (*facts).frame_from_cloud_y,
-            (*facts).frame_from_cloud_z,
-            vec3f(normals[at], normals[at + 1u], normals[at + 2u]),
-        );
+        normal = given_normal(side, survivors[i].index);
     } else {
         let plane = bare_plane(side, survivors[i].position, true);
         if plane.stands_out > 0u {

@@ -218,7 +218,7 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
     var view = 0u;
     var count = 0u;
     if exists {
-        view = view_of_pixel(pixel);
+        view = view_of(pixel, false);
         begin = atomicLoad(&work[begin_at(s, pixel)]);
         end = atomicLoad(&work[end_at(s, pixel)]);
         if end - begin > MOST_FRAGMENTS {

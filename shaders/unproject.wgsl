@@ -27,7 +27,7 @@ const NOWHERE: f32 = 1.0e30;
 
 @compute @workgroup_size(256)
 fn unproject(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let k = (group.y * 65535u + group.x) * 256u + lane;
+    let k = (group.y * MAX_GROUPS + group.x) * GROUP + lane;
     if k >= camera.size.x * camera.size.y {
         return;
     }

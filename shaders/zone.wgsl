@@ -11,13 +11,10 @@ var<workgroup> main_side: u32;
 // Whether the cell or one of its neighbours is marked by the other side.
 fn is_near(pair: u32, other: u32, position: vec3f) -> bool {
     let dims = pairs[pair].zone_dims;
-    let at = (position - pairs[pair].overlap_min) * pairs[pair].zone_inv_cell;
-    let cx = truncated(at.x, f32(dims.x - 1u));
-    let cy = truncated(at.y, f32(dims.y - 1u));
-    let cz = truncated(at.z, f32(dims.z - 1u));
+    let own = grid_cell(position, pairs[pair].overlap_min, pairs[pair].zone_inv_cell, dims);
     let first = batch.zone_at + pairs[pair].zone_first + other * pairs[pair].zone_words;
-    let low = max(vec3u(cx, cy, cz), vec3u(1u)) - 1u;
-    let high = min(vec3u(cx, cy, cz) + 1u, dims - 1u);
+    let low = max(own, vec3u(1u)) - 1u;
+    let high = min(own + 1u, dims - 1u);
     for (var z = low.z; z <= high.z; z++) {
         for (var y = low.y; y <= high.y; y++) {
             let row = first + (z * dims.y + y) * pairs[pair].zone_row_words;
@@ -45,11 +42,8 @@ fn zone(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) la
         if ((*facts).flags & HAS_NORMALS) == 0u {
             let dims = (*facts).cell_dims;
             let low = pairs[side_index / 2u].overlap_min;
-            let at = (survivors[i].position - low) * (*facts).cell_inv;
-            let cx = truncated(at.x, f32(dims.x - 1u));
-            let cy = truncated(at.y, f32(dims.y - 1u));
-            let cz = truncated(at.z, f32(dims.z - 1u));
-            let cell = (*facts).cell_first + (cz * dims.y + cy) * dims.x + cx;
+            let at = grid_cell(survivors[i].position, low, (*facts).cell_inv, dims);
+            let cell = (*facts).cell_first + (at.z * dims.y + at.y) * dims.x + at.x;
             survivors[i].cell = cell;
             atomicAdd(&work[batch.cells_at + batch.cells + cell], 1u);
         }

@@ -28,13 +28,7 @@ fn on_plane(side: u32, radius: f32) -> f32 {
 
 fn cell_of(side: u32, position: vec3f) -> vec3u {
     let facts = &pairs[side / 2u].sides[side % 2u];
-    let dims = (*facts).cell_dims;
-    let at = (position - pairs[side / 2u].overlap_min) * (*facts).cell_inv;
-    return vec3u(
-        truncated(at.x, f32(dims.x - 1u)),
-        truncated(at.y, f32(dims.y - 1u)),
-        truncated(at.z, f32(dims.z - 1u)),
-    );
+    return grid_cell(position, pairs[side / 2u].overlap_min, (*facts).cell_inv, (*facts).cell_dims);
 }
 
 // Of how many points in these cells one is taken: of a crowd, a selection represents it. Hashes select half of what

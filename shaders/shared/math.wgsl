@@ -16,6 +16,16 @@ fn truncated(value: f32, most: f32) -> u32 {
     return u32(select(most, positive, positive < most));
 }
 
+// The cell, of a grid with its first corner at `low`, that holds a place; beside the grid, the nearest one.
+fn grid_cell(place: vec3f, low: vec3f, inv_cell: f32, dims: vec3u) -> vec3u {
+    let at = (place - low) * inv_cell;
+    return vec3u(
+        truncated(at.x, f32(dims.x - 1u)),
+        truncated(at.y, f32(dims.y - 1u)),
+        truncated(at.z, f32(dims.z - 1u)),
+    );
+}
+
 fn moved(x: vec4f, y: vec4f, z: vec4f, p: vec3f) -> vec3f {
     return vec3f(
         x.x * p.x + x.y * p.y + x.z * p.z + x.w,
@@ -46,6 +56,11 @@ fn unit_or(v: vec3f, other: vec3f) -> vec3f {
         return v * inverseSqrt(length_squared);
     }
     return other;
+}
+
+// Sizes in `groups` of an indirect dispatch of so many workgroups.
+fn split_groups(count: u32) -> vec3u {
+    return vec3u(min(count, MAX_GROUPS), (count + MAX_GROUPS - 1u) / MAX_GROUPS, 1u);
 }
 
 fn splat_radius(radius: f32, pixel_size: f32) -> f32 {

@@ -1,6 +1,6 @@
 // Places of views in what all of them share, one after the other.
 
-var<workgroup> counts: array<u32, 256>;
+var<workgroup> counts: array<u32, GROUP>;
 var<workgroup> cursor: u32;
 
 // Gives every view of `counts` its place; the last one's end is in `cursor`. Places begin at
@@ -22,10 +22,10 @@ fn place(lane: u32) -> u32 {
 }
 
 fn set_groups(at: u32, count: u32) {
-    let whole = count / GROUP;
-    groups[at] = min(whole, MAX_GROUPS);
-    groups[at + 1u] = (whole + MAX_GROUPS - 1u) / MAX_GROUPS;
-    groups[at + 2u] = 1u;
+    let sizes = split_groups(count / GROUP);
+    groups[at] = sizes.x;
+    groups[at + 1u] = sizes.y;
+    groups[at + 2u] = sizes.z;
 }
 
 // The image of every view: the pixels of its touching tiles. All threads of one workgroup call it.

@@ -1,7 +1,8 @@
 // What all stages share: the batch, its pairs and sides, their views, and the arena of counters.
-// Layouts are those of `tldi::Params` and of `tldi-wgpu`'s `layout` module.
+// Layouts are those of `tldi::Params` and of `tldi-wgpu`'s `layout` module. Numbers that the host shares are in
+// `numbers.rs`.
 
-// Numbers of the stages, filled from `tldi-wgpu`'s `layout::stage_constants`.
+// Numbers of the CPU's stages, filled from `tldi::plan::stage_constants`.
 override BLOCK: u32;
 override AIM_SAMPLES: u32;
 override SUPPORT: f32;
@@ -21,8 +22,6 @@ override MOST_ASIDE: f32;
 override BEND_SHIFT: u32;
 override SAME_FACE: f32;
 override MAX_WEIGHT: f32;
-// Bits of a fragment's weight; the number of its splat takes the others.
-override WEIGHT_BITS: u32;
 override DEPTH_BITS: u32;
 override MAX_DEPTH: f32;
 override DEPTH_STEPS: u32;
@@ -33,6 +32,7 @@ override BESIDE: f32;
 override SWAPPED: u32;
 override PIERCED: u32;
 override CROSSED: u32;
+override MAX_VIEWS: u32;
 override WELL_SEEN: f32;
 override SUPPORTED: f32;
 override LEAST_SHARE: f32;
@@ -46,13 +46,6 @@ override AXIS_HYSTERESIS: f32;
 override PLAINLY: f32;
 override CROSSING: f32;
 
-const GROUP: u32 = 256u;
-// Workgroups along x; the rest goes along y.
-const MAX_GROUPS: u32 = 65535u;
-const MAX_VIEWS: u32 = 3u;
-// Normals that one side can hold for `aim`: selected at random, they are a few more than
-// AIM_SAMPLES at times.
-const SAMPLE_SLOTS: u32 = 1024u;
 // A culled point in the order of the cells in which neighbours are looked for.
 struct Entry {
     position: vec3f,
@@ -185,21 +178,6 @@ struct Pair {
     sides: array<Side, 2>,
 }
 
-// Values of `Pair.policy`.
-const CONTACT_ZONE: u32 = 0u;
-const ALL_DIRECTIONS: u32 = 1u;
-const MOTION: u32 = 2u;
-const COVARIANCE: u32 = 3u;
-const SMALLEST_EXTENT: u32 = 4u;
-const LAST_NORMAL: u32 = 5u;
-const FIXED_VIEW: u32 = 6u;
-
-// Bits of `Side.flags`.
-const HAS_NORMALS: u32 = 1u;
-const ORIENTED: u32 = 2u;
-const RADII_DIFFER: u32 = 4u;
-const IS_BODY: u32 = 8u;
-
 // A point that passed the cull.
 struct Survivor {
     // In the frame of the query, metres.
@@ -288,46 +266,17 @@ const ENTRY: i32 = -1;
 const UNKNOWN: i32 = 0;
 const EXIT: i32 = 1;
 
-// Counters at the start of the arena. They go on counting beyond the capacities: what was needed.
-const SURVIVORS: u32 = 0u;
-const TILES: u32 = 1u;
-const PIXELS: u32 = 2u;
-const SPLATS: u32 = 3u;
-const FRAGMENTS: u32 = 4u;
-const LAYERS: u32 = 5u;
-const CONTACTS: u32 = 6u;
-const ENTRIES: u32 = 7u;
-// 1 where there are more fragments than a word counts.
-const FRAGMENTS_WRAPPED: u32 = 8u;
-
-// Words of a side in the arena.
-const SIDE_WORDS: u32 = 8u;
+// Words of a side in the arena, SIDE_WORDS in all.
 const KEPT_COUNT: u32 = 0u;
 const NEAR_COUNT: u32 = 1u;
 const RADIUS_LOW: u32 = 2u;
 const RADIUS_HIGH: u32 = 3u;
 const SAMPLE_COUNT: u32 = 4u;
 
-// Words of a view in the arena: greatest and least coordinates of what is seen of each side, as
-// ordered numbers (the least ones negated), and the touching tiles' bounds likewise.
-const VIEW_WORDS: u32 = 16u;
+// Words of a view in the arena from which on the bounds of its touching tiles are.
 const TOUCHED: u32 = 12u;
 
 // Steps of the sum of radii, in shares of the largest: 2^20.
 const RADIUS_STEPS: f32 = 1048576.0;
-
-// Words of a pair in what is read back, and of a contact.
-const PAIR_WORDS: u32 = 16u;
-const CONTACT_WORDS: u32 = 12u;
-const CROSSINGS: u32 = 0u;
-const GAP: u32 = 1u;
-const CROWDED: u32 = 2u;
-const VIEWS: u32 = 3u;
-const AXES: u32 = 4u;
-
-// Indirect dispatches.
-const TILE_GROUPS: u32 = 0u;
-const PIXEL_GROUPS: u32 = 3u;
-const IMAGE_GROUPS: u32 = 6u;
 
 @group(0) @binding(0) var<uniform> batch: Batch;

@@ -116,9 +116,9 @@ impl Backend for AutoBackend {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::stage_constants;
     use crate::pipelines::pipelines;
     use crate::testing;
+    use tldi::plan::stage_constants;
 
     /// A device that agrees with the CPU is used; one whose stages compute something else is refused,
     /// with an error that says what differs.

@@ -1,11 +1,11 @@
 //! The device: chosen once, shared with whoever brings their own.
 
 use crate::GpuError;
-use crate::layout::stage_constants;
 use crate::pipelines::{Pipeline, pipelines};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
+use tldi::plan::stage_constants;
 
 /// How long the device may take for what it was given. Batches take milliseconds; a driver that
 /// imitates a GPU takes seconds for large ones.

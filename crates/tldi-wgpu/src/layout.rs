@@ -6,6 +6,12 @@ use bytemuck::{Pod, Zeroable};
 use tldi::glamx::{Mat3, Pose3, Quat, Vec3};
 use tldi::plan::{DepthScale, PairPlan, SidePlan, ZoneGrid};
 use tldi::{Aabb, CameraPolicy, PairQuery, Params, Radii, Surface, View, plan};
+use tldi_shaders::numbers::{
+    self, FIXED_VIEW, HAS_NORMALS, IS_BODY, ORIENTED, RADII_DIFFER, WEIGHT_BITS,
+};
+pub(crate) use tldi_shaders::numbers::{
+    CONTACT_WORDS, COUNTERS, FRAGMENTS_WRAPPED, GROUP, PAIR_WORDS, SIDE_WORDS, VIEW_WORDS,
+};
 
 /// Words of 32 bits, and bytes, of what only lives on the device.
 pub(crate) const SURVIVOR_BYTES: u64 = 32;
@@ -18,38 +24,14 @@ pub(crate) const FRAGMENT_BYTES: u64 = 8;
 pub(crate) const TILE_BYTES: u64 = 3 * 4;
 /// The begins and ends of both sides.
 pub(crate) const PIXEL_BYTES: u64 = 4 * 4;
-pub(crate) const SAMPLE_SLOTS: u64 = 1024;
+pub(crate) const SAMPLE_SLOTS: u64 = numbers::SAMPLE_SLOTS as u64;
 pub(crate) const SAMPLE_BYTES: u64 = 32;
-pub(crate) const SIDE_WORDS: u32 = 8;
-pub(crate) const VIEW_WORDS: u32 = 16;
-pub(crate) const PAIR_WORDS: u32 = 16;
-pub(crate) const CONTACT_WORDS: u32 = 12;
-pub(crate) const COUNTERS: u32 = 16;
-/// Counter that is not 0 where there are more fragments than a word counts.
-pub(crate) const FRAGMENTS_WRAPPED: u32 = 8;
 pub(crate) const MAX_VIEWS: u32 = plan::MAX_VIEWS as u32;
-/// Threads of a workgroup.
-pub(crate) const GROUP: u32 = 256;
 
-/// Bits of a fragment's weight. Its other bits are the number of its splat: one word holds both.
-pub(crate) const WEIGHT_BITS: u32 = 8;
 /// Splats that a fragment can number.
 pub(crate) const MOST_SPLATS: u32 = 1 << (u32::BITS - WEIGHT_BITS);
 /// Culled points of a batch. Each is a splat in three views at most, and those are counted in a word.
 pub(crate) const MOST_SURVIVORS: u32 = 1 << 30;
-
-/// The numbers that the stages share with the host: the CPU's, and how words are packed here.
-pub(crate) fn stage_constants() -> Vec<(&'static str, f64)> {
-    let mut all = plan::stage_constants();
-    all.push(("WEIGHT_BITS", f64::from(WEIGHT_BITS)));
-    all
-}
-
-const FIXED_VIEW: u32 = 6;
-const HAS_NORMALS: u32 = 1;
-const ORIENTED: u32 = 2;
-const RADII_DIFFER: u32 = 4;
-const IS_BODY: u32 = 8;
 
 /// See `Batch` in WGSL.
 #[repr(C)]
@@ -256,10 +238,10 @@ impl SideData {
         set(IS_BODY, side.body.is_some());
         let halves = |body: Aabb| (body.center(), 0.5 * body.extents());
         let (middle, half_extents) = side.body.map_or_else(Default::default, halves);
-        let cell = plan::SUPPORT * radius_scale * cloud.mean_radius;
-        let (cell, cell_dims) = match cloud.has_normals {
-            true => (cell, [0; 3]),
-            false => cells(side.region.overlap.extents(), cell, cloud.len),
+        let support = plan::SUPPORT * radius_scale * cloud.mean_radius;
+        let cells = match cloud.has_normals {
+            true => ZoneGrid::default(),
+            false => ZoneGrid::of_neighbors(&side.region.overlap, support, cloud.len),
         };
         Ok(Self {
             frame_from_cloud: pose_rows(&side.frame_from_surface),
@@ -276,9 +258,9 @@ impl SideData {
             first_normal: place.first_normal,
             radius_scale,
             max_radius: cloud.max_radius,
-            cell_dims,
+            cell_dims: cells.dims.map(|n| n as u32),
             cell_first: numbered("work", cell_first)?,
-            cell_inv: 1.0 / cell,
+            cell_inv: cells.inv_cell,
             mean_radius: cloud.mean_radius,
             merge_steps: DepthScale::new(0.0, params).merge_steps(params, cloud.noise),
             point_step: place.point_step,
@@ -291,28 +273,14 @@ impl SideData {
     }
 }
 
-/// Most cells per point in which neighbours are looked for: see the CPU's stage `normals`.
-const CELLS_PER_POINT: usize = 16;
-
-/// Edge and numbers of cells over `extents`, of at least `cell` metres.
-fn cells(extents: Vec3, cell: f32, points: usize) -> (f32, [u32; 3]) {
-    let limit = (CELLS_PER_POINT * points + 4096) as f32;
-    let dims = |cell: f32| (extents / cell).floor() + Vec3::ONE;
-    let mut cell = cell;
-    while dims(cell).element_product() > limit {
-        cell *= 1.26; // a third of an octave: twice fewer cells
-    }
-    (cell, dims(cell).to_array().map(|n| n as u32))
-}
-
 fn policy_number(policy: CameraPolicy) -> u32 {
     match policy {
-        CameraPolicy::ContactZone => 0,
-        CameraPolicy::AllDirections => 1,
-        CameraPolicy::Motion => 2,
-        CameraPolicy::Covariance => 3,
-        CameraPolicy::SmallestExtent => 4,
-        CameraPolicy::LastNormal => 5,
+        CameraPolicy::ContactZone => numbers::CONTACT_ZONE,
+        CameraPolicy::AllDirections => numbers::ALL_DIRECTIONS,
+        CameraPolicy::Motion => numbers::MOTION,
+        CameraPolicy::Covariance => numbers::COVARIANCE,
+        CameraPolicy::SmallestExtent => numbers::SMALLEST_EXTENT,
+        CameraPolicy::LastNormal => numbers::LAST_NORMAL,
     }
 }
 
@@ -330,12 +298,16 @@ fn pose_rows(pose: &Pose3) -> [[f32; 4]; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sources::CameraData;
     use std::mem::{offset_of, size_of};
 
     /// Offset of each member of a WGSL struct, and its size.
     fn wgsl_layout(name: &str) -> (Vec<(String, u32)>, u32) {
-        let compare = tldi_shaders::STAGES.last().expect("there are stages");
-        let module = naga::front::wgsl::parse_str(compare.source).expect("it is valid");
+        let stage = match name {
+            "DepthCamera" => &tldi_shaders::UNPROJECT,
+            _ => tldi_shaders::STAGES.last().expect("there are stages"),
+        };
+        let module = naga::front::wgsl::parse_str(stage.source).expect("it is valid");
         let (_, found) = (module.types.iter())
             .find(|(_, ty)| ty.name.as_deref() == Some(name))
             .unwrap_or_else(|| panic!("no struct {name}"));
@@ -396,6 +368,10 @@ mod tests {
             cell_first cell_first, cell_inv cell_inv, mean_radius mean_radius,
             merge_steps merge_steps, point_step point_step,
         ]);
+        assert_same_layout!("DepthCamera", CameraData, [
+            size size, focal_px focal_px, principal_px principal_px, metres_per_unit metres_per_unit, near near,
+            far far, radius_px radius_px, first_point first_point,
+        ]);
     }
 
     /// What only lives on the device takes as many bytes as are set aside for it.
@@ -418,7 +394,7 @@ mod tests {
     /// as the stages take it apart.
     #[test]
     fn a_fragment_holds_every_splat_and_weight() {
-        let constants = stage_constants();
+        let constants = plan::stage_constants();
         let (_, most_weight) = (constants.iter().find(|(name, _)| *name == "MAX_WEIGHT"))
             .expect("the CPU has a greatest weight");
         let weight = *most_weight as u32;
@@ -427,29 +403,5 @@ mod tests {
         assert_eq!(word >> WEIGHT_BITS, MOST_SPLATS - 1);
         assert_eq!(word & ((1 << WEIGHT_BITS) - 1), weight);
         assert_eq!(u64::from(MOST_SPLATS) << WEIGHT_BITS, 1 << 32);
-    }
-
-    /// Numbers that are written on both sides.
-    #[test]
-    fn numbers_are_those_of_wgsl() {
-        let compare = tldi_shaders::STAGES.last().expect("there are stages");
-        for (name, value) in [
-            ("GROUP", GROUP),
-            ("FRAGMENTS_WRAPPED", FRAGMENTS_WRAPPED),
-            ("MAX_VIEWS", MAX_VIEWS),
-            ("SAMPLE_SLOTS", SAMPLE_SLOTS as u32),
-            ("SIDE_WORDS", SIDE_WORDS),
-            ("VIEW_WORDS", VIEW_WORDS),
-            ("PAIR_WORDS", PAIR_WORDS),
-            ("CONTACT_WORDS", CONTACT_WORDS),
-            ("FIXED_VIEW", FIXED_VIEW),
-            ("HAS_NORMALS", HAS_NORMALS),
-            ("ORIENTED", ORIENTED),
-            ("RADII_DIFFER", RADII_DIFFER),
-            ("IS_BODY", IS_BODY),
-        ] {
-            let line = format!("const {name}: u32 = {value}u;");
-            assert!(compare.source.contains(&line), "{line}");
-        }
     }
 }

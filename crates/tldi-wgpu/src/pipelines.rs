@@ -1,6 +1,7 @@
 //! The stages as pipelines, made once.
 
 use crate::Gpu;
+use tldi_shaders::numbers::MAX_GROUPS;
 use tldi_shaders::{STAGES, Stage};
 
 /// A stage that can be dispatched.
@@ -50,6 +51,11 @@ pub(crate) fn pipelines(gpu: &Gpu, constants: &[(&'static str, f64)]) -> Vec<Pip
             }
         })
         .collect()
+}
+
+/// Sizes of a dispatch of so many workgroups.
+pub(crate) fn direct(groups: u32) -> [u32; 3] {
+    [groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1]
 }
 
 /// Whether a batch needs a stage. Without bare clouds there is nothing to sort; with them, `normals` places the images.

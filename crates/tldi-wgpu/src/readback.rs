@@ -4,6 +4,7 @@ use crate::counters::Counters;
 use crate::layout::{CONTACT_WORDS, COUNTERS, FRAGMENTS_WRAPPED, MAX_VIEWS, PAIR_WORDS};
 use tldi::glamx::Vec3;
 use tldi::{CameraPolicy, ContactPixel, PairQuery, PairResult, View, VirtualCamera, plan};
+use tldi_shaders::numbers;
 
 /// The words that were read back: counters, pairs, contacts. The device wrote them, so nothing is
 /// taken from them unchecked.
@@ -14,11 +15,11 @@ pub(crate) struct Readback<'a> {
     contacts: &'a [[u32; CONTACT_WORDS as usize]],
 }
 
-const CROSSINGS: usize = 0;
-const GAP: usize = 1;
-const CROWDED: usize = 2;
-const VIEWS: usize = 3;
-const AXES: usize = 4;
+const CROSSINGS: usize = numbers::CROSSINGS as usize;
+const GAP: usize = numbers::GAP as usize;
+const CROWDED: usize = numbers::CROWDED as usize;
+const VIEWS: usize = numbers::VIEWS as usize;
+const AXES: usize = numbers::AXES as usize;
 
 impl<'a> Readback<'a> {
     /// The words of a batch with so many pairs.

@@ -2,7 +2,8 @@
 
 use crate::buffers::Growable;
 use crate::error::numbered;
-use crate::pipelines::module;
+use crate::layout::GROUP;
+use crate::pipelines::{direct, module};
 use crate::resident::{Place, Resident};
 use crate::{Gpu, GpuError};
 use bytemuck::{Pod, Zeroable};
@@ -56,14 +57,15 @@ impl DepthCamera {
 /// See `DepthCamera` in WGSL.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-struct CameraData {
-    size: [u32; 2],
-    focal_px: [f32; 2],
-    principal_px: [f32; 2],
-    metres_per_unit: f32,
-    range: [f32; 2],
-    radius_px: f32,
-    first_point: u32,
+pub(crate) struct CameraData {
+    pub(crate) size: [u32; 2],
+    pub(crate) focal_px: [f32; 2],
+    pub(crate) principal_px: [f32; 2],
+    pub(crate) metres_per_unit: f32,
+    pub(crate) near: f32,
+    pub(crate) far: f32,
+    pub(crate) radius_px: f32,
+    pub(crate) first_point: u32,
     padding: u32,
 }
 
@@ -277,12 +279,14 @@ impl Sources {
                     uniform,
                     ..
                 }) => {
+                    let [near, far] = camera.range;
                     let data = CameraData {
                         size: camera.size,
                         focal_px: camera.focal_px,
                         principal_px: camera.principal_px,
                         metres_per_unit: camera.metres_per_unit,
-                        range: camera.range,
+                        near,
+                        far,
                         radius_px: camera.radius_px,
                         first_point: first,
                         padding: 0,
@@ -292,29 +296,22 @@ impl Sources {
                     let (Some(depths), Some(uniform)) = (depths.get(), uniform.get()) else {
                         continue;
                     };
+                    let entries = [(0, uniform), (1, depths), (2, points)].map(
+                        |(binding, buffer): (u32, &wgpu::Buffer)| wgpu::BindGroupEntry {
+                            binding,
+                            resource: buffer.as_entire_binding(),
+                        },
+                    );
                     let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                         label: Some("unproject"),
                         layout: &pipeline.get_bind_group_layout(0),
-                        entries: &[
-                            wgpu::BindGroupEntry {
-                                binding: 0,
-                                resource: uniform.as_entire_binding(),
-                            },
-                            wgpu::BindGroupEntry {
-                                binding: 1,
-                                resource: depths.as_entire_binding(),
-                            },
-                            wgpu::BindGroupEntry {
-                                binding: 2,
-                                resource: points.as_entire_binding(),
-                            },
-                        ],
+                        entries: &entries,
                     });
-                    let groups = len.div_ceil(256);
+                    let [x, y, z] = direct(len.div_ceil(GROUP));
                     let mut pass = encoder.begin_compute_pass(&Default::default());
                     pass.set_pipeline(pipeline);
                     pass.set_bind_group(0, &bind_group, &[]);
-                    pass.dispatch_workgroups(groups.min(65_535), groups.div_ceil(65_535), 1);
+                    pass.dispatch_workgroups(x, y, z);
                 }
                 None => {}
             }

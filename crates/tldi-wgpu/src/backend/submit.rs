@@ -5,12 +5,10 @@ use crate::GpuError;
 use crate::answer::Answer;
 use crate::layout::{BatchData, CONTACT_WORDS, COUNTERS, GROUP, PAIR_WORDS};
 use crate::measure::timer::Timer;
-use crate::pipelines::{Pipeline, is_needed};
+use crate::pipelines::{Pipeline, direct, is_needed};
 use std::ops::Range;
 use tldi_shaders::FURTHER_FROM;
-
-/// Workgroups along x of a dispatch.
-const MAX_GROUPS: u32 = 65_535;
+use tldi_shaders::numbers::{IMAGE_GROUPS, PIXEL_GROUPS, TILE_GROUPS};
 
 /// What was submitted and has not come back.
 #[derive(Debug)]
@@ -84,7 +82,6 @@ impl WgpuBackend {
             ..
         } = self;
         let pipelines = gpu.pipelines();
-        let direct = |count: u32| [count.min(MAX_GROUPS), count.div_ceil(MAX_GROUPS), 1];
         let by_survivor = direct(data.items.min(data.survivors.div_ceil(GROUP)));
         let dispatch = |pass: &mut wgpu::ComputePass, k: usize| {
             let Pipeline {
@@ -93,9 +90,9 @@ impl WgpuBackend {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &bind_groups[k], &[]);
             let (groups, words) = match stage.name {
-                "columns_touch" => (&buffers.groups, 0),
-                "alloc" | "sweep" => (&buffers.groups, 3),
-                "compare" => (&buffers.groups, 6),
+                "columns_touch" => (&buffers.groups, TILE_GROUPS),
+                "alloc" | "sweep" => (&buffers.groups, PIXEL_GROUPS),
+                "compare" => (&buffers.groups, IMAGE_GROUPS),
                 "splat" => (&buffers.splat_groups, 0),
                 name => {
                     let [x, y, z] = match name {
@@ -110,7 +107,7 @@ impl WgpuBackend {
                 }
             };
             if let Some(groups) = groups.get() {
-                pass.dispatch_workgroups_indirect(groups, 4 * words);
+                pass.dispatch_workgroups_indirect(groups, 4 * u64::from(words));
             }
         };
         let is_of_round = |k: &usize| match round {

@@ -64,7 +64,8 @@ const HINT_WEIGHT: f32 = 0.5;
 const MEMORY_WEIGHT: f32 = 0.5;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 5] = [
+pub(crate) const CONSTANTS: [(&str, f64); 6] = [
+    ("MAX_VIEWS", MAX_VIEWS as f64),
     ("WELL_SEEN", WELL_SEEN as f64),
     ("CONCLUSIVE", CONCLUSIVE as f64),
     ("HINT_WEIGHT", HINT_WEIGHT as f64),

@@ -10,6 +10,11 @@ use std::ops::Range;
 /// larger cells, which only makes for more candidates.
 const CELLS_PER_POINT: usize = 16;
 
+/// Most cells of a grid of so many points.
+pub(crate) fn most_cells(points: usize) -> f32 {
+    (CELLS_PER_POINT * points + 4096) as f32
+}
+
 /// Empty cells along each axis, one on either side.
 const RIM: f32 = 2.0;
 
@@ -57,8 +62,7 @@ pub(crate) struct Grid {
 
 impl Grid {
     fn new(min: Vec3, max: Vec3, support: f32, points: usize) -> Self {
-        let limit = (CELLS_PER_POINT * points + 4096) as f32;
-        let (cell, dims) = cells_over(max - min, support, RIM, limit);
+        let (cell, dims) = cells_over(max - min, support, RIM, most_cells(points));
         Self {
             min,
             inv_cell: 1.0 / cell,

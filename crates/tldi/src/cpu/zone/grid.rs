@@ -3,6 +3,7 @@
 use crate::Aabb;
 use crate::cpu::cull::Survivors;
 use crate::cpu::lanes::{multiversioned, truncated};
+use crate::cpu::normals::sorted::most_cells;
 use glamx::Vec3;
 
 /// Most cells of the grid. 4 Mi bits are 512 KiB, which stays in a core's cache; twice as many do not. Larger overlaps
@@ -45,6 +46,12 @@ impl ZoneGrid {
             inv_cell: 1.0 / cell,
             dims,
         }
+    }
+
+    /// The grid over `bounds`, in cells of at least `radius` metres, in which the neighbours within `radius` of so many
+    /// points are looked for.
+    pub fn of_neighbors(bounds: &Aabb, radius: f32, points: usize) -> Self {
+        Self::with_cells(bounds, radius, most_cells(points))
     }
 
     /// Bits from a cell to the next one along x, y and z. An empty cell after each row and an empty row after each plane
