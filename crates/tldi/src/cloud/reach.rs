@@ -137,16 +137,23 @@ impl Ring {
     }
 }
 
-/// What two surfaces look like where they are near each other.
+/// How coarse two surfaces are where they are near each other.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
-    /// How many times as large as the parameters say pixels are there, and with them gaps and thickness.
+pub(crate) struct LocalScale {
+    /// How many times as large as the parameters say pixels are there, and with them the thickness.
     pub(crate) coarser: f32,
     /// How many times as large the merge gap of each surface is.
-    pub(crate) merging: [f32; 2],
+    merging: [f32; 2],
 }
 
-impl Place {
+impl Default for LocalScale {
+    fn default() -> Self {
+        Self::AS_TOLD
+    }
+}
+
+impl LocalScale {
+    /// That of the parameters.
     pub(crate) const AS_TOLD: Self = Self {
         coarser: 1.0,
         merging: [1.0; 2],
@@ -171,13 +178,21 @@ impl Place {
         }
     }
 
-    /// The parameters there. The merge gap is that of each surface, see [`Self::merging`].
+    /// The parameters there, but for the merge gap.
     pub(crate) fn params(&self, params: &Params) -> Params {
         Params {
             pixel_size: self.coarser * params.pixel_size,
             thickness: self.coarser * params.thickness,
             ..*params
         }
+    }
+
+    /// These parameters with the merge gap of each surface.
+    pub(crate) fn of_sides(&self, params: &Params) -> [Params; 2] {
+        self.merging.map(|factor| Params {
+            merge_gap: factor * params.merge_gap,
+            ..*params
+        })
     }
 }
 

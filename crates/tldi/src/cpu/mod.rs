@@ -198,9 +198,9 @@ impl CpuBackend {
 
     fn with_room<R>(&self, room: &mut Room, run: impl FnOnce(&mut Scratch) -> R) -> R {
         self.with_scratch(|scratch| {
-            std::mem::swap(&mut scratch.room, room);
+            std::mem::swap(&mut scratch.shared.room, room);
             let result = run(scratch);
-            std::mem::swap(&mut scratch.room, room);
+            std::mem::swap(&mut scratch.shared.room, room);
             result
         })
     }
@@ -323,7 +323,6 @@ pub fn build(
             frame_from_cloud,
             camera: &camera,
             params,
-            merge_gap: params.merge_gap,
             sharpens: true,
         };
         if let Some(seen) = side.project(&view) {

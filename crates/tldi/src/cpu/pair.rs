@@ -2,10 +2,9 @@
 
 use super::compare::{self, Seen};
 use super::crossings::Crossings;
-use super::exact::placed::Placed;
 use super::first_look::settle::FirstLook;
-use super::scratch::Scratch;
-use super::side::{CloudView, ExactView, Scope, Side};
+use super::scratch::{Look, Scratch};
+use super::side::{Scope, Side};
 use crate::contact::lone_points::SAME_POINT;
 use crate::pair::plan::{PairPlan, column_reach};
 use crate::pair::sampling::stride;
@@ -37,13 +36,13 @@ impl Scratch {
         };
         let pixel = query.params.pixel_size;
         let strides = [query.a, query.b].map(|surface| stride(surface.mean_radius(), pixel));
-        let left = self.room.left();
+        let left = self.shared.room.left();
         let first_look = match has_first_look {
             true => self.settle(query, &plan, result),
             false => FirstLook::Nothing,
         };
         // There may be room for the pixels of the fine look, which thins nothing out.
-        self.room.take_wanted();
+        self.shared.room.take_wanted();
         let is_found = match first_look {
             FirstLook::Settled => return,
             // Thinned ones may be those of a first look that reached farther.
@@ -75,12 +74,12 @@ impl Scratch {
         left: f32,
         result: &mut PairResult,
     ) -> bool {
-        self.room.put_back(left);
-        let place = self.place(query);
-        result.coarser = (place.coarser > 1.0).then_some(place.coarser);
-        self.merge_gaps = place.merging.map(|factor| factor * query.params.merge_gap);
+        self.shared.room.put_back(left);
+        self.scale = self.local_scale(query);
+        let scale = self.scale;
+        result.coarser = (scale.coarser > 1.0).then_some(scale.coarser);
         let query = &PairQuery {
-            params: place.params(&query.params),
+            params: scale.params(&query.params),
             ..*query
         };
         plan.column_reach = column_reach(&query.params);
@@ -105,11 +104,11 @@ impl Scratch {
                 }
             }
         }
-        if let Some(coarser) = self.room.take_wanted() {
-            self.room.put_back(left);
+        if let Some(coarser) = self.shared.room.take_wanted() {
+            self.shared.room.put_back(left);
             self.compare_coarser(query, coarser, result);
             // Than those of `query`, which are as large as the place asks for.
-            result.coarser = result.coarser.map(|coarser| place.coarser * coarser);
+            result.coarser = result.coarser.map(|coarser| scale.coarser * coarser);
             return false;
         }
         result.collides = self.crossings.are_enough();
@@ -148,7 +147,7 @@ impl Scratch {
         };
         self.compare(&larger, false, result);
         let coarser = coarser * result.coarser.unwrap_or(1.0);
-        self.room.tell(coarser);
+        self.shared.room.tell(coarser);
         result.coarser = Some(coarser);
     }
 
@@ -204,7 +203,7 @@ impl Scratch {
         result: &mut PairResult,
     ) {
         for view in first..axes.len() {
-            if self.room.has_refused() {
+            if self.shared.room.has_refused() {
                 return;
             }
             let camera = VirtualCamera::along(axes[view], query.params.pixel_size);
@@ -222,48 +221,16 @@ impl Scratch {
         view: usize,
         result: &mut PairResult,
     ) {
-        let params = &query.params;
-        let [merge_a, merge_b] = self.merge_gaps;
-        let view_of = |cloud, frame_from_cloud, merge_gap| CloudView {
-            cloud,
-            frame_from_cloud,
+        let [params_a, params_b] = self.scale.of_sides(&query.params);
+        let look = Look {
+            surfaces: [query.a, query.b],
+            a_from_b: &query.a_from_b,
             camera,
-            params,
-            merge_gap,
+            params: [&params_a, &params_b],
             sharpens: true,
         };
-        // Of an unbounded surface, the part that the cloud is deep in, doubled for places without
-        // samples.
-        let exact_view = |surface, frame_from_surface, deepest: f32| ExactView {
-            exact: Placed {
-                surface,
-                frame_from_surface,
-            },
-            reach: 2.0 * deepest,
-            scope: Scope::Near(plan.column_reach),
-        };
-        let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
-        let (hits, touching) = (&mut self.hits, &mut self.touching);
-        let (fold, room) = (&mut self.fold, &mut self.room);
-        let looked = match (query.a, query.b) {
-            (Surface::Cloud(a), Surface::Cloud(b)) => {
-                let (a, b) = (view_of(a, a_from_a, merge_a), view_of(b, a_from_b, merge_b));
-                self.look_at_clouds(&a, &b, plan.column_reach)
-            }
-            (Surface::Cloud(cloud), Surface::Exact(surface)) => {
-                let exact = exact_view(surface, a_from_b, self.a.deepest);
-                let (cloud, image) = (view_of(cloud, a_from_a, merge_a), &mut self.b.image);
-                self.a
-                    .look_with(&cloud, &exact, touching, fold, room, hits, image)
-            }
-            (Surface::Exact(surface), Surface::Cloud(cloud)) => {
-                let exact = exact_view(surface, a_from_a, self.b.deepest);
-                let (cloud, image) = (view_of(cloud, a_from_b, merge_b), &mut self.a.image);
-                self.b
-                    .look_with(&cloud, &exact, touching, fold, room, hits, image)
-            }
-            _ => None, // refused
-        };
+        let reach = plan.column_reach;
+        let looked = self.look_at(&look, reach, Scope::Near(reach));
         if looked.is_none() {
             return;
         }
@@ -272,7 +239,7 @@ impl Scratch {
             &self.a.image,
             &self.b.image,
             &Seen {
-                fold: Some(&self.fold),
+                fold: Some(&self.shared.fold),
                 ..self.seen(query, plan, camera, axes, view)
             },
             &query.params,

@@ -10,25 +10,67 @@ use super::motion::core::CoreScratch;
 use super::motion::meeting::Meeting;
 use super::rect::Rect;
 use super::room::{Cost, Room};
-use super::side::{CloudView, Side};
+use super::side::{CloudView, ExactView, Scope, Side};
 use super::splat::{DepthScale, Imaging};
 use super::zone::{self, ZoneScratch, ZoneSide};
-use crate::cloud::reach::Place;
+use crate::cloud::reach::LocalScale;
 use crate::contact::patches::PatchScratch;
 use crate::pair::plan::{PairPlan, SidePlan};
 use crate::stage::stage;
 use crate::view::camera_policy::{self, seen_from_behind};
 use crate::view::zone_normals::ZoneNormals;
 use crate::{
-    CameraPolicy, Looked, PairQuery, PointCloud, RayHit, Surface, View, VirtualCamera, Work, paper,
+    CameraPolicy, Looked, PairQuery, Params, PointCloud, RayHit, Surface, View, VirtualCamera,
+    Work, paper,
 };
 use glamx::{Pose3, Vec3};
+
 /// Where two clouds meet in a view.
-pub(super) struct CommonPixels {
+pub(super) struct MeetingRegion {
     pub(super) rect: Rect,
     tiles: Tiles,
     /// Least depth of both, metres.
     pub(super) near: f32,
+}
+
+/// What both sides of a view share, kept from call to call.
+#[derive(Default)]
+pub(super) struct Shared {
+    pub(super) touching: Touching,
+    pub(super) fold: ViewFold,
+    /// Of all images of a comparison, or of a motion.
+    pub(super) room: Room,
+    pub(super) hits: Vec<RayHit>,
+}
+
+/// Two surfaces, as a camera looks at them.
+#[derive(Clone, Copy)]
+pub(super) struct Look<'a> {
+    pub(super) surfaces: [Surface<'a>; 2],
+    /// From the frame of the second surface into that of the first.
+    pub(super) a_from_b: &'a Pose3,
+    pub(super) camera: &'a VirtualCamera,
+    /// Those of each surface: their merge gaps may differ.
+    pub(super) params: [&'a Params; 2],
+    /// See [`CloudView::sharpens`].
+    pub(super) sharpens: bool,
+}
+
+impl<'a> Look<'a> {
+    fn frame_from_surface(&self, side: usize) -> &'a Pose3 {
+        [&Pose3::IDENTITY, self.a_from_b][side]
+    }
+
+    /// The first or the second surface, which is this cloud.
+    pub(super) fn at_cloud(&self, side: usize, cloud: &'a PointCloud<'a>) -> CloudView<'a> {
+        CloudView {
+            cloud,
+            frame_from_cloud: self.frame_from_surface(side),
+            camera: self.camera,
+            params: self.params[side],
+            sharpens: self.sharpens,
+        }
+    }
 }
 
 /// Everything one pair needs while it is compared.
@@ -36,17 +78,11 @@ pub(super) struct CommonPixels {
 pub(super) struct Scratch {
     pub(super) a: Side,
     pub(super) b: Side,
-    pub(super) hits: Vec<RayHit>,
     pub(super) core: CoreScratch,
     pub(super) meetings: Vec<Meeting>,
     zone: ZoneScratch,
-    /// Of both sides, metres.
-    pub(super) merge_gaps: [f32; 2],
-    pub(super) touching: Touching,
-    /// Of the current view.
-    pub(super) fold: ViewFold,
-    /// Of the images of the current motion.
-    pub(super) room: Room,
+    pub(super) shared: Shared,
+    pub(super) scale: LocalScale,
     pub(super) crossings: Crossings,
     pub(super) paper: [paper::Scratch; 2],
     pub(super) patches: PatchScratch,
@@ -147,15 +183,15 @@ impl Scratch {
         }
     }
 
-    /// What the surfaces look like where they are near each other; as the parameters say, where the camera is given.
-    pub(super) fn place(&self, query: &PairQuery) -> Place {
+    /// How coarse the surfaces are where they are near each other; as the parameters say, where the camera is given.
+    pub(super) fn local_scale(&self, query: &PairQuery) -> LocalScale {
         let near = [(&self.a, query.a), (&self.b, query.b)].map(|(side, surface)| match surface {
             Surface::Cloud(cloud) => side.near_radius(cloud),
             Surface::Exact(_) | Surface::Device(_) => 0.0,
         });
         match query.view {
-            View::Fixed(_) => Place::AS_TOLD,
-            View::Aim { .. } => Place::new(&query.params, [&query.a, &query.b], near),
+            View::Fixed(_) => LocalScale::AS_TOLD,
+            View::Aim { .. } => LocalScale::new(&query.params, [&query.a, &query.b], near),
         }
     }
 
@@ -220,18 +256,42 @@ impl Scratch {
         looked
     }
 
-    /// Builds the images of two clouds in the tiles where their depth ranges come within `reach` metres. `None` if there are
-    /// none.
-    pub(super) fn look_at_clouds(
-        &mut self,
-        a: &CloudView,
-        b: &CloudView,
-        reach: f32,
-    ) -> Option<()> {
+    /// Builds both images: of two clouds in the tiles where their depth ranges come within `reach` metres, of an exact
+    /// surface in the `scope`. `None` if there is nothing to see, or no room for it.
+    pub(super) fn look_at(&mut self, look: &Look, reach: f32, scope: Scope) -> Option<()> {
+        let exact = |side: usize, surface| ExactView {
+            exact: Placed {
+                surface,
+                frame_from_surface: look.frame_from_surface(side),
+            },
+            scope,
+        };
+        let Self { a, b, shared, .. } = self;
+        match look.surfaces {
+            [Surface::Cloud(a), Surface::Cloud(b)] => {
+                self.look_at_clouds(&look.at_cloud(0, a), &look.at_cloud(1, b), reach)
+            }
+            [Surface::Cloud(cloud), Surface::Exact(surface)] => a.look_with(
+                &look.at_cloud(0, cloud),
+                &exact(1, surface),
+                shared,
+                &mut b.image,
+            ),
+            [Surface::Exact(surface), Surface::Cloud(cloud)] => b.look_with(
+                &look.at_cloud(1, cloud),
+                &exact(0, surface),
+                shared,
+                &mut a.image,
+            ),
+            _ => None, // refused
+        }
+    }
+
+    fn look_at_clouds(&mut self, a: &CloudView, b: &CloudView, reach: f32) -> Option<()> {
         let support = (self.a.support_radius(a.cloud)).max(self.b.support_radius(b.cloud));
-        let CommonPixels { rect, tiles, near } = self.meet(a, b, reach, support)?;
+        let MeetingRegion { rect, tiles, near } = self.meet(a, b, reach, support)?;
         let (side_a, side_b) = (&mut self.a, &mut self.b);
-        let touching = &self.touching;
+        let touching = &self.shared.touching;
         let imaging = Imaging {
             camera: a.camera,
             params: a.params,
@@ -244,7 +304,8 @@ impl Scratch {
             || side_b.image(b, &imaging, Some(touching)),
         );
         let [drawn_a, drawn_b] = [&self.a, &self.b].map(|side| side.kept.len());
-        (self.room).take(self.cost([a, b], &rect, near, [drawn_a, drawn_b]));
+        let cost = self.cost([a, b], &rect, near, [drawn_a, drawn_b]);
+        self.shared.room.take(cost);
         Some(())
     }
 
@@ -263,7 +324,7 @@ impl Scratch {
         b: &CloudView,
         reach: f32,
         support: f32,
-    ) -> Option<CommonPixels> {
+    ) -> Option<MeetingRegion> {
         let _stage = stage!("columns");
         let (camera, params) = (a.camera, a.params);
         let (side_a, side_b) = (&mut self.a, &mut self.b);
@@ -271,20 +332,21 @@ impl Scratch {
         let (mut seen_a, mut seen_b) = (seen_a?, seen_b?);
         let mut rect = seen_a.rect.intersection(&seen_b.rect)?;
         let count = side_a.points.len() + side_b.points.len();
-        self.fold.clear();
+        let fold = &mut self.shared.fold;
+        fold.clear();
         if camera.size.is_none() && ViewFold::is_wanted(&rect, count) {
             let support = (side_a.support_radius(a.cloud)).max(side_b.support_radius(b.cloud))
                 / seen_a.pixel_size;
             let reach = seen_a.reach.max(seen_b.reach).max(support);
             let points = side_a.columns.across().chain(side_b.columns.across());
-            self.fold.find(reach, seen_a.pixel_size, points);
-            side_a.columns.fold(&self.fold, camera, &mut seen_a);
-            side_b.columns.fold(&self.fold, camera, &mut seen_b);
+            fold.find(reach, seen_a.pixel_size, points);
+            side_a.columns.fold(fold, camera, &mut seen_a);
+            side_b.columns.fold(fold, camera, &mut seen_b);
             rect = seen_a.rect.intersection(&seen_b.rect)?;
         }
         let all = [side_a.points.len(), side_b.points.len()];
         let cost = self.cost([a, b], &rect, seen_a.near.min(seen_b.near), all);
-        if camera.size.is_none() && self.room.refuses(cost) {
+        if camera.size.is_none() && self.shared.room.refuses(cost) {
             return None;
         }
         let (side_a, side_b) = (&mut self.a, &mut self.b);
@@ -300,8 +362,8 @@ impl Scratch {
         let support_px = support / seen_a.pixel_size.min(seen_b.pixel_size);
         let (columns_a, columns_b) = (&side_a.columns, &side_b.columns);
         let meet = |tile: usize| columns_a.meet(columns_b, tile, reach);
-        let rect = self.touching.mark(&tiles, &rect, support_px, meet)?;
+        let rect = (self.shared.touching).mark(&tiles, &rect, support_px, meet)?;
         let near = seen_a.near.min(seen_b.near);
-        Some(CommonPixels { rect, tiles, near })
+        Some(MeetingRegion { rect, tiles, near })
     }
 }

@@ -11,14 +11,15 @@ use super::motion::core::BORDER;
 use super::normals::sharpen::{SharpenScratch, sharpen};
 use super::normals::{self, Neighborhood, NormalScratch};
 use super::rect::{Footprint, Rect};
-use super::room::{Cost, Room};
+use super::room::Cost;
+use super::scratch::Shared;
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
 use super::sweep;
 use crate::contact::lone_points::Culled;
 use crate::pair::plan::SidePlan;
 use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
 use crate::stage::stage;
-use crate::{Params, PointCloud, RayHit, Tldi, VirtualCamera};
+use crate::{Params, PointCloud, Tldi, VirtualCamera};
 use glamx::{Mat3, Pose3, Vec3};
 
 /// An even selection of the near points of a surface, in the frame of the query.
@@ -75,8 +76,6 @@ pub(super) struct CloudView<'a> {
     pub(super) frame_from_cloud: &'a Pose3,
     pub(super) camera: &'a VirtualCamera,
     pub(super) params: &'a Params,
-    /// That of the cloud where it is looked at, metres; see [`Params::merge_gap`].
-    pub(super) merge_gap: f32,
     /// Whether estimated normals are sharpened: not for casts, which take the pixel that is met first. Planes that are
     /// sharpened in part, at corners, stand out there.
     pub(super) sharpens: bool,
@@ -86,8 +85,6 @@ pub(super) struct CloudView<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct ExactView<'a> {
     pub(super) exact: Placed<'a>,
-    /// Distance beyond the cloud up to which the surface is drawn, metres.
-    pub(super) reach: f32,
     pub(super) scope: Scope,
 }
 
@@ -96,10 +93,10 @@ pub(super) struct ExactView<'a> {
 pub(super) enum Scope {
     /// In the cloud's columns, if the surface is within this many metres of it there.
     Near(f32),
-    /// Where the cloud is.
-    Cloud,
-    /// Where the cloud is not, too, and around.
-    Everywhere,
+    /// Where the cloud is, up to this many metres before and behind it.
+    Cloud(f32),
+    /// Where the cloud is not, too, and around; up to this many metres before and behind it.
+    Everywhere(f32),
 }
 
 impl CloudView<'_> {
@@ -237,7 +234,6 @@ impl Side {
 
     /// What an image is of in the columns in which the projected points are within `reach` metres of an
     /// exact surface and the surface covers them; `None` where they are nowhere.
-    #[expect(clippy::too_many_arguments, reason = "a stage's parts of one look")]
     fn meet_exact<'a>(
         &mut self,
         view: &CloudView<'a>,
@@ -245,8 +241,7 @@ impl Side {
         covered: Option<Rect>,
         exact: &Placed,
         reach: f32,
-        touching: &mut Touching,
-        fold: &ViewFold,
+        shared: &mut Shared,
     ) -> Option<Imaging<'a>> {
         let _stage = stage!("columns");
         let seen = &self.around(view, seen, covered);
@@ -256,6 +251,7 @@ impl Side {
         let support_px = self.support_radius(view.cloud) / seen.pixel_size;
         let reach = reach + tiles.half_diagonal() * seen.pixel_size;
         let (columns, cells) = (&self.columns, &mut self.cell_distances);
+        let Shared { touching, fold, .. } = shared;
         let meets = |tile: usize| {
             let depths = columns.depths(tile);
             let middle = fold.place(tiles.middle(tile));
@@ -293,17 +289,13 @@ impl Side {
         let color = color.as_ref().map(|c| c as &dyn Fn(u32) -> [u8; 4]);
         self.image
             .begin(imaging.camera, imaging.rect.origin, imaging.rect.size);
-        let merging = Params {
-            merge_gap: view.merge_gap,
-            ..*view.params
-        };
         for band in 0..self.fragments.begin(&points, imaging) {
             self.fragments.splat_band(band, &points, imaging);
             sweep::sweep(
                 &mut self.fragments,
                 points.oriented,
                 view.knows_faces(),
-                imaging.scale.merge_steps(&merging, view.cloud.noise()),
+                imaging.scale.merge_steps(view.params, view.cloud.noise()),
                 color,
                 imaging,
                 &mut self.image,
@@ -387,8 +379,8 @@ impl Side {
         let fragments = self.fragments_in(view, rect, 0.0, drawn);
         let pixels = rect.pixels() as f32;
         let rays = match look.scope {
-            Scope::Everywhere => pixels,
-            Scope::Near(_) | Scope::Cloud => pixels.min(fragments),
+            Scope::Everywhere(_) => pixels,
+            Scope::Near(_) | Scope::Cloud(_) => pixels.min(fragments),
         };
         Cost::new(rect, self.points.len(), fragments).with_rays(rays)
     }
@@ -400,14 +392,14 @@ impl Side {
         &mut self,
         view: &CloudView,
         look: &ExactView,
-        fold: &mut ViewFold,
-        room: &mut Room,
+        shared: &mut Shared,
     ) -> Option<(Footprint, Rect, Option<Rect>)> {
         let _stage = stage!("columns");
+        let Shared { fold, room, .. } = shared;
         let mut seen = self.project(view)?;
         let border = match look.scope {
-            Scope::Everywhere => BORDER,
-            Scope::Near(_) | Scope::Cloud => 0,
+            Scope::Everywhere(_) => BORDER,
+            Scope::Near(_) | Scope::Cloud(_) => 0,
         };
         seen.rect = seen.rect.grown(border);
         // Where the surface is not, nothing meets it.
@@ -438,28 +430,25 @@ impl Side {
 
     /// Image of this cloud, and of an exact surface into `image` over the same pixels; `None`
     /// where nothing is in view, or there is no room for it.
-    #[expect(clippy::too_many_arguments, reason = "a stage's parts of one look")]
     pub(super) fn look_with(
         &mut self,
         view: &CloudView,
         look: &ExactView,
-        touching: &mut Touching,
-        fold: &mut ViewFold,
-        room: &mut Room,
-        hits: &mut Vec<RayHit>,
+        shared: &mut Shared,
         image: &mut Tldi,
     ) -> Option<()> {
-        let (mut seen, rect, covered) = self.project_with(view, look, fold, room)?;
-        seen.rect = match look.scope {
+        let (mut seen, rect, covered) = self.project_with(view, look, shared)?;
+        let reach;
+        (seen.rect, reach) = match look.scope {
             Scope::Near(reach) => {
-                let imaging =
-                    self.meet_exact(view, &seen, covered, &look.exact, reach, touching, fold)?;
-                self.image(view, &imaging, Some(touching));
-                imaging.rect
+                let imaging = self.meet_exact(view, &seen, covered, &look.exact, reach, shared)?;
+                self.image(view, &imaging, Some(&shared.touching));
+                // The part that the cloud is deep in, doubled for places without samples.
+                (imaging.rect, 2.0 * self.deepest)
             }
-            Scope::Cloud | Scope::Everywhere => {
+            Scope::Cloud(reach) | Scope::Everywhere(reach) => {
                 self.whole_image(view, &seen, rect);
-                rect
+                (rect, reach)
             }
         };
         let Placed {
@@ -469,7 +458,7 @@ impl Side {
         // Rays must pass through all of the surface, or they would miss the deepest part.
         let extent = surface.bounds().extents().length();
         let through = if extent.is_finite() { extent } else { 0.0 };
-        let margin = view.params.prediction + (seen.far - seen.near) + through + look.reach;
+        let margin = view.params.prediction + (seen.far - seen.near) + through + reach;
         let mut along = Footprint {
             near: seen.near - margin,
             far: seen.far + margin,
@@ -482,13 +471,14 @@ impl Side {
         let rays = Rays {
             camera: view.camera,
             rect: seen.rect,
-            fold,
+            fold: &shared.fold,
             near: along.near,
             far: along.far,
-            cover: (!matches!(look.scope, Scope::Everywhere)).then_some(&self.image),
+            cover: (!matches!(look.scope, Scope::Everywhere(_))).then_some(&self.image),
         };
-        cast::cast(surface, frame_from_surface, &rays, hits, image);
-        room.take(self.cost_with(view, look, &rays.rect, self.kept.len()));
+        cast::cast(surface, frame_from_surface, &rays, &mut shared.hits, image);
+        let cost = self.cost_with(view, look, &rays.rect, self.kept.len());
+        shared.room.take(cost);
         Some(())
     }
 }

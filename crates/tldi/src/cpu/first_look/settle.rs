@@ -9,16 +9,19 @@ use crate::cpu::compare::{self, Seen};
 use crate::cpu::crossings::{Crossings, swap_depth};
 use crate::cpu::first_look::cells::CellImaging;
 use crate::cpu::first_look::window::Window;
-use crate::cpu::scratch::{CommonPixels, Scratch};
-use crate::cpu::side::{CloudView, Side};
+use crate::cpu::scratch::{Look, MeetingRegion, Scratch};
+use crate::cpu::side::{Scope, Side};
 use crate::pair::pixels::largest_pixel;
 use crate::pair::plan::PairPlan;
 use crate::pair::sampling::{stride, stride_for};
 use crate::stage::stage;
 use crate::view::camera_policy::MAX_VIEWS;
-use crate::{PairQuery, PairResult, Params, Surface, Tldi, Variant, View, VirtualCamera};
+use crate::{
+    CameraPolicy, PairQuery, PairResult, Params, PointCloud, Surface, Tldi, Variant, View,
+    VirtualCamera,
+};
 use arrayvec::ArrayVec;
-use glamx::{Pose3, Vec3};
+use glamx::Vec3;
 
 /// Edges of a large pixel, in pixels or in mean radii, whichever is larger. Smaller ones cost as
 /// much as the look with small pixels. Larger ones merge limbs.
@@ -51,19 +54,44 @@ pub(crate) enum FirstLook {
     Settled,
 }
 
-/// The overlap of the bounds, metres, if a first look is possible.
-fn overlap(query: &PairQuery) -> Option<f32> {
-    let (Surface::Cloud(a), Surface::Cloud(b)) = (query.a, query.b) else {
-        return None;
-    };
-    let is_aimed = matches!(query.view, View::Aim { .. });
-    let is_even = !a.is_uneven() && !b.is_uneven();
-    if !is_aimed || !is_even || query.params.variant() == Variant::Paper {
-        return None;
+/// Two clouds at which a first look is possible.
+struct CloudPair<'a> {
+    query: PairQuery<'a>,
+    clouds: [&'a PointCloud<'a>; 2],
+    policy: CameraPolicy,
+}
+
+impl<'a> CloudPair<'a> {
+    fn of(query: &PairQuery<'a>) -> Option<Self> {
+        let (Surface::Cloud(a), Surface::Cloud(b), View::Aim { policy, .. }) =
+            (query.a, query.b, query.view)
+        else {
+            return None;
+        };
+        let are_even = !a.is_uneven() && !b.is_uneven();
+        (are_even && query.params.variant() != Variant::Paper).then_some(Self {
+            query: *query,
+            clouds: [a, b],
+            policy,
+        })
     }
-    let bounds_b = b.bounds().transformed(&query.a_from_b);
-    let overlap = a.bounds().intersection(bounds_b);
-    (!overlap.is_empty()).then(|| overlap.extents().min_element())
+
+    /// The overlap of the bounds, metres.
+    fn overlap(&self) -> Option<f32> {
+        let [a, b] = self.clouds.map(PointCloud::bounds);
+        let overlap = a.intersection(b.transformed(&self.query.a_from_b));
+        (!overlap.is_empty()).then(|| overlap.extents().min_element())
+    }
+
+    fn look<'l>(&'l self, camera: &'l VirtualCamera) -> Look<'l> {
+        Look {
+            surfaces: [self.query.a, self.query.b],
+            a_from_b: &self.query.a_from_b,
+            camera,
+            params: [&self.query.params; 2],
+            sharpens: true,
+        }
+    }
 }
 
 /// Edge of the largest large pixel, metres, that resolves the smaller body and fits `deep` times into `depth`. `None` if even
@@ -77,22 +105,6 @@ fn large_pixel(query: &PairQuery, depth: f32, deep: f32) -> Option<f32> {
     pixels.into_iter().find(|pixel| *pixel <= largest)
 }
 
-/// The two clouds of a pair as `camera` looks at them.
-fn cloud_views<'a>(query: &'a PairQuery, camera: &'a VirtualCamera) -> Option<[CloudView<'a>; 2]> {
-    let (Surface::Cloud(a), Surface::Cloud(b)) = (query.a, query.b) else {
-        return None;
-    };
-    let view_of = |cloud, frame_from_cloud| CloudView {
-        cloud,
-        frame_from_cloud,
-        camera,
-        params: &query.params,
-        merge_gap: query.params.merge_gap,
-        sharpens: true,
-    };
-    Some([view_of(a, &Pose3::IDENTITY), view_of(b, &query.a_from_b)])
-}
-
 impl Scratch {
     /// Looks at the pair with large pixels. Where that settles it, `result` is filled, and else empty.
     pub(crate) fn settle(
@@ -103,7 +115,10 @@ impl Scratch {
     ) -> FirstLook {
         let mut came_to = FirstLook::Nothing;
         self.window_edge = Window::edge(query);
-        let Some(through) = overlap(query) else {
+        let Some(pair) = CloudPair::of(query) else {
+            return came_to;
+        };
+        let Some(through) = pair.overlap() else {
             return came_to;
         };
         let large = large_pixel(query, through, THROUGH);
@@ -115,14 +130,17 @@ impl Scratch {
                 thickness: 2.0 * pixel,
                 ..query.params
             };
-            let coarse = PairQuery { params, ..*query };
+            let coarse = CloudPair {
+                query: PairQuery { params, ..*query },
+                ..pair
+            };
             let mut depth = self.look_coarsely(&coarse, plan, result, &mut came_to);
             if depth >= DEEP * pixel {
-                self.patches.reduce_coarse(result, &coarse);
+                self.patches.reduce_coarse(result, &coarse.query);
                 depth = result.gap.map_or(0.0, |gap| -gap);
             }
             if depth >= DEEP * pixel {
-                if self.is_proven(query, plan, &result.axes) {
+                if self.is_proven(&pair, plan, &result.axes) {
                     result.coarser = Some(pixel / query.params.pixel_size);
                     return FirstLook::Settled;
                 }
@@ -138,15 +156,13 @@ impl Scratch {
     /// Returns how deep the surfaces are, metres, or at the most.
     fn look_coarsely(
         &mut self,
-        query: &PairQuery,
+        pair: &CloudPair,
         plan: &PairPlan,
         result: &mut PairResult,
         came_to: &mut FirstLook,
     ) -> f32 {
         self.windows.clear();
-        let View::Aim { policy, .. } = query.view else {
-            return 0.0;
-        };
+        let query = &pair.query;
         let pixel = query.params.pixel_size;
         let strides = [query.a, query.b]
             .map(|surface| stride_for(POINTS_PER_PIXEL, surface.mean_radius(), pixel));
@@ -159,19 +175,20 @@ impl Scratch {
             return 0.0;
         }
         *came_to = FirstLook::Culled(strides);
-        self.aim(query, plan, policy, &mut result.axes);
+        self.aim(query, plan, pair.policy, &mut result.axes);
         let axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
         let mut deepest = 0.0f32;
         for view in 0..axes.len() {
             let camera = VirtualCamera::along(axes[view], pixel);
-            deepest = deepest.max(self.look_at_cells(query, plan, &camera, &axes, view, result));
+            deepest = deepest.max(self.look_at_cells(pair, plan, &camera, &axes, view, result));
         }
         deepest
     }
 
     /// Whether small pixels show in a few windows that the surfaces cross.
-    fn is_proven(&mut self, query: &PairQuery, plan: &PairPlan, axes: &[Vec3]) -> bool {
+    fn is_proven(&mut self, pair: &CloudPair, plan: &PairPlan, axes: &[Vec3]) -> bool {
         let _stage = stage!("windows");
+        let query = &pair.query;
         rank(&mut self.windows);
         let pixel = query.params.pixel_size;
         let strides = [query.a, query.b].map(|s| stride(s.mean_radius(), pixel));
@@ -187,7 +204,7 @@ impl Scratch {
                     view: window.view,
                     ..Seen::default()
                 };
-                self.look_through(query, &plan, &camera, &seen, &mut crossings);
+                self.look_through(pair, &plan, &camera, &seen, &mut crossings);
             }
             if crossings.are_enough() {
                 break;
@@ -208,17 +225,16 @@ impl Scratch {
     /// the most.
     fn look_at_cells(
         &mut self,
-        query: &PairQuery,
+        pair: &CloudPair,
         plan: &PairPlan,
         camera: &VirtualCamera,
         axes: &[Vec3],
         view: usize,
         result: &mut PairResult,
     ) -> f32 {
-        let Some([a, b]) = cloud_views(query, camera) else {
-            return 0.0;
-        };
-        let Some(CommonPixels { rect, near, .. }) = self.meet(&a, &b, plan.column_reach, 0.0)
+        let (query, look) = (&pair.query, pair.look(camera));
+        let [a, b] = [0, 1].map(|side| look.at_cloud(side, pair.clouds[side]));
+        let Some(MeetingRegion { rect, near, .. }) = self.meet(&a, &b, plan.column_reach, 0.0)
         else {
             return 0.0;
         };
@@ -234,14 +250,14 @@ impl Scratch {
             rect,
             near,
         };
-        let (side_a, side_b, touching) = (&mut self.a, &mut self.b, &self.touching);
+        let (side_a, side_b, touching) = (&mut self.a, &mut self.b, &self.shared.touching);
         rayon::join(
             || side_a.image_of_cells(&a, &imaging, touching),
             || side_b.image_of_cells(&b, &imaging, touching),
         );
         self.work.large += self.looked(query);
         let seen = Seen {
-            fold: Some(&self.fold),
+            fold: Some(&self.shared.fold),
             // Planes of large pixels at walls that are seen edge-on tell nothing.
             tells_facing: false,
             ..self.seen(query, plan, camera, axes, view)
@@ -264,16 +280,15 @@ impl Scratch {
     /// Adds what small pixels show of crossings in a window, whose points both sides hold.
     fn look_through(
         &mut self,
-        query: &PairQuery,
+        pair: &CloudPair,
         plan: &PairPlan,
         camera: &VirtualCamera,
         seen: &Seen,
         crossings: &mut Crossings,
     ) {
-        let Some([a, b]) = cloud_views(query, camera) else {
-            return;
-        };
-        if self.look_at_clouds(&a, &b, plan.column_reach).is_none() {
+        let (query, reach) = (&pair.query, plan.column_reach);
+        let looked = self.look_at(&pair.look(camera), reach, Scope::Near(reach));
+        if looked.is_none() {
             return;
         }
         self.work.windows += self.looked(query);

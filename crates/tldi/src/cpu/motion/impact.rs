@@ -5,11 +5,10 @@
 //! motion passes, so no surface is too thin, and none too fast.
 
 use crate::cpu::cull::{self, PointRadii, Region};
-use crate::cpu::exact::placed::Placed;
 use crate::cpu::motion::core::{BORDER, CORE, OUTSIDE, RIM};
 use crate::cpu::motion::meeting::Meeting;
-use crate::cpu::scratch::Scratch;
-use crate::cpu::side::{CloudView, ExactView, Scope};
+use crate::cpu::scratch::{Look, Scratch};
+use crate::cpu::side::Scope;
 use crate::cpu::sweep::is_edge_on;
 use crate::pair::plan::ring;
 use crate::pair::sampling::stride;
@@ -40,10 +39,22 @@ impl Scratch {
         }
         let camera = VirtualCamera::along(query.motion, query.params.pixel_size);
         self.cull_swept(query, &camera)?;
-        let seen = self.images_of_motion(query, &camera, length);
-        if let Some(by) = self.room.take_wanted() {
+        let look = Look {
+            surfaces: [query.a, query.b],
+            a_from_b: &query.a_from_b,
+            camera: &camera,
+            params: [&query.params; 2],
+            sharpens: false,
+        };
+        // The rim of an exact surface that moves is not that of the cloud.
+        let scope = match query.b {
+            Surface::Exact(_) => Scope::Everywhere(length),
+            _ => Scope::Cloud(length),
+        };
+        let seen = self.look_at(&look, length + query.params.thickness, scope);
+        if let Some(by) = self.shared.room.take_wanted() {
             let coarser = by * coarser;
-            self.room.tell(coarser);
+            self.shared.room.tell(coarser);
             let pixel_size = by * query.params.pixel_size;
             let larger = ImpactQuery {
                 params: query.params.with_pixel_size(pixel_size),
@@ -98,7 +109,7 @@ impl Scratch {
             .extend((0..b.pixel_count()).filter_map(|pixel| nearest(pixel, f32::NEG_INFINITY)));
         self.meetings.sort_unstable_by(order);
         let image_width = b.size[0] as usize;
-        let fold = &self.fold;
+        let fold = &self.shared.fold;
         let place = |pixel: usize, depth: f32| {
             let at = [pixel % image_width, pixel / image_width];
             let [u, v] = fold
@@ -211,74 +222,6 @@ impl Scratch {
             }
         }
         Some(())
-    }
-
-    /// Builds both images.
-    fn images_of_motion(
-        &mut self,
-        query: &ImpactQuery,
-        camera: &VirtualCamera,
-        length: f32,
-    ) -> Option<()> {
-        let params = &query.params;
-        let view_of = |cloud, frame_from_cloud| CloudView {
-            cloud,
-            frame_from_cloud,
-            camera,
-            params,
-            merge_gap: params.merge_gap,
-            sharpens: false,
-        };
-        let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
-        let (hits, touching) = (&mut self.hits, &mut self.touching);
-        let (fold, room) = (&mut self.fold, &mut self.room);
-        match (query.a, query.b) {
-            (Surface::Cloud(a), Surface::Cloud(b)) => {
-                let reach = length + query.params.thickness;
-                self.look_at_clouds(&view_of(a, a_from_a), &view_of(b, a_from_b), reach)
-            }
-            (Surface::Exact(surface), Surface::Cloud(cloud)) => {
-                let exact = ExactView {
-                    exact: Placed {
-                        surface,
-                        frame_from_surface: a_from_a,
-                    },
-                    reach: length,
-                    scope: Scope::Cloud,
-                };
-                let image = &mut self.a.image;
-                self.b.look_with(
-                    &view_of(cloud, a_from_b),
-                    &exact,
-                    touching,
-                    fold,
-                    room,
-                    hits,
-                    image,
-                )
-            }
-            (Surface::Cloud(cloud), Surface::Exact(surface)) => {
-                let exact = ExactView {
-                    exact: Placed {
-                        surface,
-                        frame_from_surface: a_from_b,
-                    },
-                    reach: length,
-                    scope: Scope::Everywhere, // its rim is not that of the cloud
-                };
-                let image = &mut self.b.image;
-                self.a.look_with(
-                    &view_of(cloud, a_from_a),
-                    &exact,
-                    touching,
-                    fold,
-                    room,
-                    hits,
-                    image,
-                )
-            }
-            _ => None, // refused
-        }
     }
 }
 
