@@ -12,6 +12,7 @@ mod cloud;
 mod contact;
 mod counting_sort;
 mod cpu;
+mod ordered_bits;
 mod pair;
 pub mod paper;
 mod stage;

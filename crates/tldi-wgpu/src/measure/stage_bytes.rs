@@ -2,8 +2,8 @@
 
 use crate::counters::Counters;
 use crate::layout::{
-    CONTACT_WORDS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, PLANE_BYTES, SAMPLE_BYTES,
-    SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES,
+    CONTACT_WORDS, ENTRY_BYTES, FRAGMENT_BYTES, LAYER_BYTES, PIXEL_BYTES, PLANE_BYTES,
+    SAMPLE_BYTES, SAMPLE_SLOTS, SPLAT_BYTES, SURVIVOR_BYTES,
 };
 use crate::pipelines::is_needed;
 use crate::upload::Upload;
@@ -13,8 +13,7 @@ pub(crate) fn stage_bytes(upload: &Upload, counted: &Counters) -> Vec<(&'static 
     let times = |count: u32, bytes: u64| u64::from(count) * bytes;
     let survivors = times(counted.survivors, SURVIVOR_BYTES);
     let tiles = times(counted.tiles, 4);
-    // Both sides' begins and ends.
-    let pixels = times(counted.pixels, 2 * 8);
+    let pixels = times(counted.pixels, PIXEL_BYTES);
     let fragments = times(counted.fragments, FRAGMENT_BYTES);
     let splats = times(counted.splats, SPLAT_BYTES);
     let layers = times(counted.layers, LAYER_BYTES);

@@ -364,16 +364,10 @@ impl<'a> PointCloud<'a> {
         swap(&mut self.points, &mut gathered.points);
         std::mem::swap(&mut self.blocks, &mut gathered.blocks);
         let estimated = normals.is_none() && self.recipe.pca_neighbors.is_some();
-        match &mut self.normals {
-            Some(current) if normals.is_some() || estimated => swap(current, new_normals),
-            current @ None if normals.is_some() || estimated => {
-                *current = Some(Cow::Owned(std::mem::take(new_normals)));
-            }
-            current => {
-                if let Some(Cow::Owned(unused)) = current.take() {
-                    *new_normals = unused;
-                }
-            }
+        if normals.is_some() || estimated {
+            swap(self.normals.get_or_insert_default(), new_normals);
+        } else if let Some(Cow::Owned(unused)) = self.normals.take() {
+            *new_normals = unused;
         }
         self.normals_given = normals.is_some();
         self.normals_oriented =

@@ -1,6 +1,7 @@
 //! Builds the k-d tree over the distinct positions of a cloud.
 
 use crate::cloud::knn::{Split, leaf_start};
+use crate::ordered_bits::ordered_bits;
 use crate::{KdTree, PointCloud};
 use glamx::Vec3;
 use rayon::prelude::*;
@@ -29,7 +30,8 @@ impl KdTree {
             .par_iter()
             .enumerate()
             .map(|(i, point)| {
-                let [x, y, z] = point.to_array().map(sort_key);
+                // −0 and 0 are the same: their sum with 0 is 0.
+                let [x, y, z] = point.to_array().map(|c| ordered_bits(c + 0.0));
                 [x, y, z, i as u32]
                     .into_iter()
                     .fold(0, |key, part| key << 32 | u128::from(part))
@@ -119,14 +121,4 @@ fn widest_axis(entries: &[Entry]) -> usize {
         max = max.max(position);
     }
     (max.as_dvec3() - min.as_dvec3()).max_position()
-}
-
-/// Integers in the order of the floats; −0 and 0 are the same.
-fn sort_key(value: f32) -> u32 {
-    let bits = (value + 0.0).to_bits();
-    if bits >> 31 == 0 {
-        bits | 1 << 31
-    } else {
-        !bits
-    }
 }

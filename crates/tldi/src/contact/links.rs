@@ -1,5 +1,6 @@
 //! Which contact pixels continue each other, and which penetrations their neighbours confirm.
 
+use crate::contact::retain_by_index;
 use crate::counting_sort::ends_of;
 use crate::{ContactPixel, PairResult, Params};
 use std::ops::Range;
@@ -74,14 +75,7 @@ impl Links {
     /// Fills `roots`, for each of `contacts` contact pixels, with the lowest index among those that
     /// links join it with.
     pub(crate) fn components(&self, contacts: usize, roots: &mut Vec<u32>) {
-        roots.clear();
-        roots.extend(0..contacts as u32);
-        for &(k, l) in &self.pairs {
-            join(roots, k, l);
-        }
-        for k in 0..contacts as u32 {
-            roots[k as usize] = root(roots, k);
-        }
+        find_roots(contacts, self.pairs.iter().copied(), roots);
     }
 
     /// Leaves the penetrations of `result` that are proven; from these, `collides` and `gap` follow. `roots` is
@@ -164,8 +158,7 @@ impl Links {
             *count = index;
         }
         let new_index = &self.counts;
-        let mut index = new_index.iter();
-        contacts.retain(|_| index.next().is_some_and(|&k| k != NONE));
+        retain_by_index(contacts, |k, _| new_index[k] != NONE);
         self.pairs.retain_mut(|(k, l)| {
             (*k, *l) = (new_index[*k as usize], new_index[*l as usize]);
             *k != NONE && *l != NONE
@@ -250,15 +243,25 @@ impl Groups {
     }
 }
 
-/// Joins the sets of `k` and `l`; the lower root becomes that of both, so that the order of the links
-/// does not matter.
-pub(crate) fn join(parents: &mut [u32], k: u32, l: u32) {
-    let (root_k, root_l) = (root(parents, k), root(parents, l));
-    parents[root_k.max(root_l) as usize] = root_k.min(root_l);
+/// Fills `roots`, for each of so many items, with the lowest index among those that `pairs` join it with (union-find).
+pub(crate) fn find_roots(
+    items: usize,
+    pairs: impl Iterator<Item = (u32, u32)>,
+    roots: &mut Vec<u32>,
+) {
+    roots.clear();
+    roots.extend(0..items as u32);
+    for (k, l) in pairs {
+        let (root_k, root_l) = (root(roots, k), root(roots, l));
+        roots[root_k.max(root_l) as usize] = root_k.min(root_l);
+    }
+    for k in 0..items as u32 {
+        roots[k as usize] = root(roots, k);
+    }
 }
 
 /// The root of the set of `k`, shortening the way to it.
-pub(crate) fn root(parents: &mut [u32], mut k: u32) -> u32 {
+fn root(parents: &mut [u32], mut k: u32) -> u32 {
     while parents[k as usize] != k {
         parents[k as usize] = parents[parents[k as usize] as usize];
         k = parents[k as usize];

@@ -7,6 +7,7 @@
 
 use crate::cloud::reach::Ring;
 use crate::contact::links::{Groups, Links};
+use crate::contact::retain_by_index;
 use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
 use crate::cpu::normals::sorted::{Grid, Sorted};
 use crate::cpu::zone::AroundPlaces;
@@ -253,13 +254,11 @@ impl LonePoints {
             found.sort_unstable_by(|p, q| p.x.total_cmp(&q.x));
             found.dedup();
         }
-        let mut is_dropped = self.is_dropped.iter();
-        if !self.is_dropped.is_empty() {
-            result
-                .contacts
-                .retain(|_| is_dropped.next().is_some_and(|dropped| !dropped));
+        if self.is_dropped.is_empty() {
+            return false;
         }
-        !self.is_dropped.is_empty()
+        retain_by_index(&mut result.contacts, |k, _| !self.is_dropped[k]);
+        true
     }
 }
 

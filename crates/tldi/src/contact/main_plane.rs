@@ -2,8 +2,9 @@
 
 use glamx::{Mat3, Vec2, Vec3};
 
-/// Fewest heights that determine a plane. Half or twice: no change in any suite.
-const LEAST_HEIGHTS: usize = 12;
+/// Fewest contact pixels that tell a plane. Of fewer no main plane is looked for, they are not split, and their support
+/// points are not moved inwards. Half or twice, each use alone: no change in any suite.
+pub(crate) const LEAST_PLANE: usize = 12;
 
 /// Of more heights every second, third and so on is enough: they tell a plane to a twentieth of their
 /// deviation. Half or twice: no change in any suite.
@@ -21,9 +22,9 @@ const LEAST_KNOWN: f32 = 1e-3;
 
 /// A plane over places: its height at the origin, and its slopes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Plane(Vec3);
+pub(crate) struct GapPlane(Vec3);
 
-impl Plane {
+impl GapPlane {
     pub(crate) fn new(height: f32, slopes: Vec2) -> Self {
         Self(slopes.extend(height))
     }
@@ -56,7 +57,7 @@ impl Plane {
         spread: f32,
         near: f32,
     ) -> (Self, f32) {
-        if heights.len() < LEAST_HEIGHTS {
+        if heights.len() < LEAST_PLANE {
             return (self, 0.0);
         }
         let stride = heights.len().div_ceil(MOST_HEIGHTS);
@@ -82,7 +83,7 @@ impl Plane {
         let on_plane = heights.filter(|&height| plane.residual(height).abs() < 2.0 * near);
         (
             plane,
-            on_plane.count() as f32 / (count + LEAST_HEIGHTS) as f32,
+            on_plane.count() as f32 / (count + LEAST_PLANE) as f32,
         )
     }
 }
@@ -116,7 +117,7 @@ mod tests {
         let mut rng = Rng::with_seed(1);
         for scatter in [0.0, 0.05, 0.1] {
             let heights = heights(scatter, 3, &mut rng);
-            let best = Plane::new(2.67, Vec2::new(0.3, -0.2));
+            let best = GapPlane::new(2.67, Vec2::new(0.3, -0.2));
             let (plane, share) = best.of_most(heights.iter().copied(), 1.0, 0.05);
             for corner in [Vec2::ONE, -Vec2::ONE, Vec2::new(1.0, -1.0)] {
                 let truth = 2.0 + 0.3 * corner.x - 0.2 * corner.y;
@@ -132,7 +133,7 @@ mod tests {
     fn what_is_flat_stays() {
         let mut rng = Rng::with_seed(2);
         let heights = heights(0.0, usize::MAX, &mut rng);
-        let start = Plane::new(2.0, Vec2::new(0.3, -0.2));
+        let start = GapPlane::new(2.0, Vec2::new(0.3, -0.2));
         let (plane, share) = start.of_most(heights[1..].iter().copied(), 0.0, 0.05);
         assert!((plane.0 - start.0).length() < 1e-4, "{plane:?}");
         assert_eq!(share, 199.0 / 211.0);
@@ -141,7 +142,7 @@ mod tests {
     /// Few heights, or heights in a row, leave the plane as it was.
     #[test]
     fn few_places_tell_nothing() {
-        let start = Plane::new(1.0, Vec2::ONE);
+        let start = GapPlane::new(1.0, Vec2::ONE);
         let row = (0..40).map(|k| (Vec2::X * (k as f32 - 20.0) / 11.5, 0.0));
         assert_eq!(start.of_most(row, 1.0, 0.05).0, start);
         let few = (0..11).map(|k| (Vec2::new(k as f32, (k * k) as f32), 0.0));

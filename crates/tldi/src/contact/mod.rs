@@ -14,3 +14,17 @@ pub(crate) mod ramp;
 pub(crate) mod smooth;
 pub(crate) mod supports;
 pub(crate) mod way_out;
+
+use crate::ContactPixel;
+
+/// Keeps the contact pixels that `is_kept` says, by their indices.
+fn retain_by_index(
+    contacts: &mut Vec<ContactPixel>,
+    mut is_kept: impl FnMut(usize, &ContactPixel) -> bool,
+) {
+    let mut count = 0;
+    contacts.retain(|contact| {
+        count += 1;
+        is_kept(count - 1, contact)
+    });
+}

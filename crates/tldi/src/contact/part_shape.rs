@@ -3,6 +3,7 @@
 use crate::contact::bowl::{Floor, GAP_PER_SLOPE, Lowest, relative_radius, slope_error};
 use crate::contact::crease::{Face, Frame, lower_by};
 use crate::contact::links::Links;
+use crate::contact::main_plane::LEAST_PLANE;
 use crate::contact::smooth::{Smooth, common_normal};
 use crate::contact::supports::{longest_axis, supports};
 use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, Params};
@@ -52,11 +53,6 @@ const STEADY: f32 = 0.9;
 /// each frame fails with each of 6 seeds instead of none; twice: no change in any suite.
 const OFF_PLANE: f32 = 0.4;
 
-/// A pixel at the rim of a face stands out beyond the points of the face, by half a pixel on average. Support points
-/// of faces of at least so many pixels go to the mean of themselves and their linked neighbours, which is as far
-/// inwards at a rim or a corner, and nowhere within. Half or twice: no change in any suite.
-const LEAST_INWARDS: usize = 12;
-
 /// Normal and main direction of a part.
 pub(crate) struct Shape {
     pub(crate) normal: Vec3,
@@ -93,7 +89,8 @@ impl Shape {
         smooth: &[Smooth],
         params: &Params,
     ) -> Self {
-        let least_gap = least_gap(members, smooth);
+        let gaps = members.iter().map(|&m| smooth[m as usize].gap);
+        let least_gap = gaps.fold(f32::INFINITY, f32::min);
         let (mut mean_a, mut mean_b, mut mean) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
         let mut total = 0.0;
         let normal_band = NORMAL_BAND * params.pixel_size;
@@ -219,7 +216,9 @@ impl Shape {
         let scatter = if rises { 0.0 } else { roughness };
         let off_plane = OFF_PLANE * params.pixel_size;
         let scatter = scatter + supports.flatness * (off_plane - scatter).max(0.0);
-        let inwards = if points.len() < LEAST_INWARDS {
+        // A pixel at the rim of a face stands out beyond the points of the face, by half a pixel on average. The mean of it
+        // and its linked neighbours is as far inwards, at a corner, too, and does not move pixels within.
+        let inwards = if points.len() < LEAST_PLANE {
             0.0
         } else if rises {
             supports.flatness
@@ -284,12 +283,6 @@ impl Shape {
 fn falloff(above: f32, band: f32) -> f32 {
     let rest = (1.0 - above / band).max(0.0);
     rest * rest
-}
-
-fn least_gap(members: &[u32], smooth: &[Smooth]) -> f32 {
-    members
-        .iter()
-        .fold(f32::INFINITY, |g, &m| g.min(smooth[m as usize].gap))
 }
 
 /// Length of the mean of the unit normals of the members that are at no crease: 1 where they agree, or where

@@ -4,8 +4,9 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
-use crate::contact::links::{Groups, Links, join, root};
+use crate::contact::links::{Groups, Links, find_roots};
 use crate::contact::lone_points::{Culled, LonePoints};
+use crate::contact::main_plane::LEAST_PLANE;
 use crate::contact::noise::allow_for_noise;
 use crate::contact::part_shape::{Pixels, Shape, ShapeScratch};
 use crate::contact::smooth::{Smooth, smooth};
@@ -30,9 +31,6 @@ const SAME_GROUP: f32 = 0.866;
 /// Half or twice the rest to 1: no change in any suite.
 const FLAT: f32 = 0.97;
 
-/// Patches of fewer pixels are not split. Half or twice: no change in any suite.
-const LEAST_SPLIT: usize = 12;
-
 /// Splits in a row: at most eight parts a group. Half or twice: no change in any suite.
 const MAX_SPLITS: u32 = 3;
 
@@ -46,7 +44,7 @@ pub const SAME_PLANE: f32 = 0.985;
 /// Memory of [`PatchScratch::reduce`], kept from call to call.
 #[derive(Debug, Default)]
 pub struct PatchScratch {
-    /// Union-find parents; after grouping, the group of each contact pixel.
+    /// The group of each contact pixel: the first pixel in it.
     group: Vec<u32>,
     links: Links,
     way_out: WayOut,
@@ -156,7 +154,7 @@ impl PatchScratch {
         while let Some((start, end, splits)) = self.stack.pop() {
             let members = &mut self.groups.members[start..end];
             let shape = Shape::of(members, contacts, &self.smooth, params);
-            if splits < MAX_SPLITS && members.len() >= LEAST_SPLIT && shape.normal_length < FLAT {
+            if splits < MAX_SPLITS && members.len() >= LEAST_PLANE && shape.normal_length < FLAT {
                 let middle = shape.split(members, contacts);
                 if middle > 0 && middle < members.len() {
                     self.stack.push((start, start + middle, splits + 1));
@@ -252,20 +250,12 @@ impl PatchScratch {
         shape.patch(members, &pixels, &mut self.shape, params)
     }
 
-    /// Union-find over linked pixels of like normal.
+    /// Groups linked pixels of like normal.
     fn group(&mut self) {
-        self.group.clear();
-        self.group.extend(0..self.smooth.len() as u32);
-        for &(k, l) in &self.links.pairs {
-            let normal = |k: u32| self.smooth[k as usize].normal;
-            if normal(k).dot(normal(l)) < SAME_GROUP {
-                continue;
-            }
-            join(&mut self.group, k, l);
-        }
-        for k in 0..self.group.len() as u32 {
-            self.group[k as usize] = root(&mut self.group, k);
-        }
+        let normal = |k: u32| self.smooth[k as usize].normal;
+        let alike = |&(k, l): &(u32, u32)| normal(k).dot(normal(l)) >= SAME_GROUP;
+        let pairs = self.links.pairs.iter().copied().filter(alike);
+        find_roots(self.smooth.len(), pairs, &mut self.group);
     }
 }
 

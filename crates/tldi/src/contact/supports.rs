@@ -1,7 +1,7 @@
 //! Which of many contact points the solver gets.
 
 use crate::contact::bowl::{Bowl, Floor, Lowest, Valley};
-use crate::contact::main_plane::Plane;
+use crate::contact::main_plane::GapPlane;
 use crate::contact::ramp::ramp;
 use crate::{ContactPoint, PATCH_POINTS};
 use arrayvec::ArrayVec;
@@ -86,59 +86,129 @@ const NEAR_FLOOR: f32 = 0.4;
 /// assert_eq!(corners[..], [0, 2, 6, 8]);
 /// ```
 pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> Supports {
-    let middles = || points.iter().map(ContactPoint::middle);
+    let axes = MainAxes::of(points, normal);
     let count = points.len() as f32;
-    let centre = middles().sum::<Vec3>() / count;
-    let longest = longest_axis(middles(), centre, normal);
-    let across = normal.cross(longest);
-    let along_axes = |p: Vec3| Vec2::new((p - centre).dot(longest), (p - centre).dot(across));
-    let variance = middles().map(along_axes).map(|d| d * d).sum::<Vec2>() / count;
-    let sigma = Vec2::new(variance.x.sqrt(), variance.y.sqrt());
-    // Points in a row, or a single one, have no extent across.
-    let sigma = sigma.max(Vec2::splat(f32::MIN_POSITIVE.max(LEAST_WIDTH * sigma.x)));
-    let place = |p: &ContactPoint| along_axes(p.middle()) / sigma;
+    let heights = || points.iter().map(|p| (axes.place(p), p.gap));
     // Along the main axes the slopes of the gaps are separate.
     let mean_gap = points.iter().map(|p| p.gap).sum::<f32>() / count;
-    let slope = points
-        .iter()
-        .map(|p| (p.gap - mean_gap) * place(p))
-        .sum::<Vec2>()
-        / count;
-    let plane = Plane::new(mean_gap, slope);
-    let residual = |p: &ContactPoint| plane.residual((place(p), p.gap));
-    let squares = points.iter().map(|p| residual(p).powi(2)).sum::<f32>();
+    let slope = heights().map(|(place, gap)| (gap - mean_gap) * place);
+    let slope = slope.sum::<Vec2>() / count;
+    let plane = GapPlane::new(mean_gap, slope);
+    let residuals = || heights().map(|(place, gap)| (place, plane.residual((place, gap))));
+    let squares = residuals().map(|(_, off)| off.powi(2)).sum::<f32>();
     // A perfectly flat patch has none, by which nothing can be divided.
     let least = least_roughness.max(f32::MIN_POSITIVE);
     let roughness = (squares / count).sqrt();
-    let residuals = || points.iter().map(|p| (place(p), residual(p)));
     let bowl = Bowl::fit(residuals(), count);
-    let axes = [longest, across];
-    let contact_at = |place: Vec2, gap: f32| {
-        let aside = place * sigma;
-        let middle = centre + aside.x * longest + aside.y * across;
-        // The surfaces bend away from the plane: as high as what is nearest.
-        let off = |p: &ContactPoint| (p.middle() - middle).reject_from_normalized(normal);
+    let unbent = ramp(bowl.left / roughness.max(least), UNBENT);
+    let unbent = unbent.max(1.0 - ramp(roughness / least, SMOOTH));
+    let (main_plane, flatness) = if unbent > 0.0 {
+        let (main_plane, share) = plane.of_most(heights(), roughness, least);
+        let flatness = unbent * ramp(share, FLAT);
+        (plane.lerp(main_plane, flatness), flatness)
+    } else {
+        (plane, 0.0)
+    };
+    let above_plane = |height| main_plane.residual(height);
+    let lows = heights().map(|height| {
+        let low = -above_plane(height) / roughness.max(least);
+        (height.0, low.min((1.0 - flatness) * LOWEST))
+    });
+    let indices = farthest_out(lows);
+    let [longest, across] = axes.axes;
+    let slopes = main_plane.slopes() / axes.sigma;
+    let known_across = if axes.sigma.y > LEAST_KNOWN_WIDTH * axes.sigma.x {
+        across
+    } else {
+        Vec3::ZERO
+    };
+    Supports {
+        slope: slopes.x * longest + slopes.y * known_across,
+        above_plane: (indices.iter())
+            .map(|&k| above_plane((axes.place(&points[k]), points[k].gap)))
+            .collect(),
+        flatness,
+        indices,
+        roughness,
+        roughness_about_bowl: bowl.left.min(roughness),
+        lowest_of_bowl: bowl.lowest(slope, roughness).map(|(place, above)| {
+            let aside = bowl.place_per_slope() * axes.sigma;
+            Lowest {
+                point: axes.contact_at(place, mean_gap + above, points),
+                aside: [aside.x * longest, aside.y * across],
+                radii: [
+                    aside.x * axes.sigma.x * longest,
+                    aside.y * axes.sigma.y * across,
+                ],
+            }
+        }),
+        floor_of_valley: (bowl.valley(slope)).and_then(|valley| axes.floor(valley, slope, points)),
+    }
+}
+
+/// The main axes of points on one plane.
+struct MainAxes {
+    centre: Vec3,
+    normal: Vec3,
+    /// Unit vectors; the points extend the most along the first.
+    axes: [Vec3; 2],
+    /// Standard deviations along them, metres.
+    sigma: Vec2,
+}
+
+impl MainAxes {
+    fn of(points: &[ContactPoint], normal: Vec3) -> Self {
+        let middles = || points.iter().map(ContactPoint::middle);
+        let count = points.len() as f32;
+        let centre = middles().sum::<Vec3>() / count;
+        let longest = longest_axis(middles(), centre, normal);
+        let mut own = Self {
+            centre,
+            normal,
+            axes: [longest, normal.cross(longest)],
+            sigma: Vec2::ONE,
+        };
+        let squares = middles().map(|middle| own.along(middle)).map(|d| d * d);
+        let variance = squares.sum::<Vec2>() / count;
+        let sigma = Vec2::new(variance.x.sqrt(), variance.y.sqrt());
+        // Points in a row, or a single one, have no extent across.
+        own.sigma = sigma.max(Vec2::splat(f32::MIN_POSITIVE.max(LEAST_WIDTH * sigma.x)));
+        own
+    }
+
+    /// Coordinates from the centre along the axes, metres.
+    fn along(&self, point: Vec3) -> Vec2 {
+        let off = point - self.centre;
+        Vec2::new(off.dot(self.axes[0]), off.dot(self.axes[1]))
+    }
+
+    /// The same in standard deviations.
+    fn place(&self, point: &ContactPoint) -> Vec2 {
+        self.along(point.middle()) / self.sigma
+    }
+
+    /// The contact at a place, with this gap. The surfaces bend away from the plane: it is as high as the nearest of
+    /// `points`.
+    fn contact_at(&self, place: Vec2, gap: f32, points: &[ContactPoint]) -> ContactPoint {
+        let aside = place * self.sigma;
+        let middle = self.centre + aside.x * self.axes[0] + aside.y * self.axes[1];
+        let off = |p: &ContactPoint| (p.middle() - middle).reject_from_normalized(self.normal);
         let nearest = (points.iter())
             .min_by(|p, q| off(p).length_squared().total_cmp(&off(q).length_squared()));
-        let above = nearest.map_or(0.0, |p| (p.middle() - middle).dot(normal));
-        ContactPoint::about(middle + above * normal, gap, normal)
-    };
-    let lowest_of_bowl = bowl.lowest(slope, roughness).map(|(place, above)| {
-        let aside = bowl.place_per_slope() * sigma;
-        Lowest {
-            point: contact_at(place, mean_gap + above),
-            aside: [aside.x * longest, aside.y * across],
-            radii: [aside.x * sigma.x * longest, aside.y * sigma.y * across],
-        }
-    });
-    let floor_of_valley = bowl.valley(slope).and_then(|valley| {
+        let above = nearest.map_or(0.0, |p| (p.middle() - middle).dot(self.normal));
+        ContactPoint::about(middle + above * self.normal, gap, self.normal)
+    }
+
+    /// The floor of a valley whose gaps rise by `slope` in a standard deviation of each place; `None` if no two points
+    /// are near it.
+    fn floor(&self, valley: Valley, slope: Vec2, points: &[ContactPoint]) -> Option<Floor> {
         let Valley {
             across,
             place: lowest,
             bend,
         } = valley;
         let along = 1 - across;
-        let near = (points.iter().map(|p| (place(p), p.gap)))
+        let near = (points.iter().map(|p| (self.place(p), p.gap)))
             .filter(|(place, _)| (place[across] - lowest).abs() <= NEAR_FLOOR);
         let (mut ends, mut sum, mut count) = ([f32::INFINITY, f32::NEG_INFINITY], 0.0, 0.0);
         for (place, gap) in near {
@@ -150,30 +220,24 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         let end = |at: f32| {
             let mut place = Vec2::splat(at);
             place[across] = lowest;
-            contact_at(place, sum / count + slope[along] * at)
+            self.contact_at(place, sum / count + slope[along] * at, points)
         };
         (ends[0] < ends[1]).then(|| Floor {
             ends: ends.map(end),
-            radius: 0.5 / bend * sigma[across].powi(2) * axes[across],
+            radius: 0.5 / bend * self.sigma[across].powi(2) * self.axes[across],
         })
-    });
-    let unbent = ramp(bowl.left / roughness.max(least), UNBENT);
-    let unbent = unbent.max(1.0 - ramp(roughness / least, SMOOTH));
-    let (main_plane, flatness) = if unbent > 0.0 {
-        let heights = points.iter().map(|p| (place(p), p.gap));
-        let (main_plane, share) = plane.of_most(heights, roughness, least);
-        let flatness = unbent * ramp(share, FLAT);
-        (plane.lerp(main_plane, flatness), flatness)
-    } else {
-        (plane, 0.0)
-    };
-    let corner = SQRT_2 * Vec2::from_angle(corner_angle(points.iter().map(place)));
+    }
+}
+
+/// Indices of the places that are farthest out in one of four directions at right angles. How low a place is counts, too.
+fn farthest_out(
+    lows: impl ExactSizeIterator<Item = (Vec2, f32)> + Clone,
+) -> ArrayVec<usize, PATCH_POINTS> {
+    let corner = SQRT_2 * Vec2::from_angle(corner_angle(lows.clone().map(|(place, _)| place)));
     let corners = [corner, corner.perp(), -corner, -corner.perp()];
+    let count = lows.len();
     let mut best = [(f32::NEG_INFINITY, 0); PATCH_POINTS];
-    for (k, point) in points.iter().enumerate() {
-        let place = place(point);
-        let low = -main_plane.residual((place, point.gap)) / roughness.max(least);
-        let low = low.min((1.0 - flatness) * LOWEST);
+    for (k, (place, low)) in lows.enumerate() {
         for (best, corner) in best.iter_mut().zip(corners) {
             let score = corner.dot(place) + low;
             if score > best.0 {
@@ -183,29 +247,11 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     }
     let mut indices = ArrayVec::new();
     for (_, k) in best {
-        if k < points.len() && !indices.contains(&k) {
+        if k < count && !indices.contains(&k) {
             indices.push(k);
         }
     }
-    let slopes = main_plane.slopes() / sigma;
-    let known_across = if sigma.y > LEAST_KNOWN_WIDTH * sigma.x {
-        across
-    } else {
-        Vec3::ZERO
-    };
-    Supports {
-        slope: slopes.x * longest + slopes.y * known_across,
-        above_plane: indices
-            .iter()
-            .map(|&k: &usize| main_plane.residual((place(&points[k]), points[k].gap)))
-            .collect(),
-        flatness,
-        indices,
-        roughness,
-        roughness_about_bowl: bowl.left.min(roughness),
-        lowest_of_bowl,
-        floor_of_valley,
-    }
+    indices
 }
 
 /// Angle of the first of four directions, at right angles to each other, in which `places` reach out

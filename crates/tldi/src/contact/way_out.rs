@@ -4,6 +4,7 @@
 //! contact pixel would push the bodies apart, another view sees them overlap by much less.
 
 use crate::contact::links::Links;
+use crate::contact::retain_by_index;
 use crate::view::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, PairResult, Params, VirtualCamera};
 use arrayvec::ArrayVec;
@@ -71,10 +72,8 @@ impl WayOut {
                 self.is_wide[k] |= self.wide_balance[self.roots[k] as usize] >= 0;
             }
         }
-        let mut is_wide = self.is_wide.iter();
-        contacts.retain(|contact| {
-            let is_wide = is_wide.next().is_some_and(|is_wide| *is_wide);
-            !is_wide && contact.gap <= params.prediction
+        retain_by_index(contacts, |k, contact| {
+            !self.is_wide[k] && contact.gap <= params.prediction
         });
     }
 }

@@ -99,23 +99,23 @@ pub(crate) fn compare(
             let [behind_a, behind_b] = seen.from_behind;
             let front = Column::new(lb, Facing::Exit, behind_b, seen.bodies[1]);
             let back = Column::new(la, Facing::Entry, behind_a, seen.bodies[0]);
-            contact_pixels([front, back], Side::Main, &at, params, result);
+            contact_pixels([front, back], Order::BThenA, &at, params, result);
             if seen.tells_facing {
                 let front = Column::new(la, Facing::Exit, false, seen.bodies[0]);
                 let back = Column::new(lb, Facing::Entry, false, seen.bodies[1]);
-                contact_pixels([front, back], Side::Other, &at, params, result);
+                contact_pixels([front, back], Order::AThenB, &at, params, result);
             }
         }
     }
 }
 
-/// On which side of `a` a view looks for `b`.
+/// In which order rays pass two surfaces that touch.
 #[derive(Clone, Copy, PartialEq)]
-enum Side {
-    /// Where the axis says. Rays leave `b` and enter `a`.
-    Main,
-    /// On the opposite one, as in a slot. Rays leave `a` and enter `b`.
-    Other,
+enum Order {
+    /// Rays leave `b` and enter `a`: `b` is where the axis says.
+    BThenA,
+    /// Rays leave `a` and enter `b`: `b` is on the other side of `a`, as in a slot.
+    AThenB,
 }
 
 /// Where a pixel is.
@@ -175,7 +175,7 @@ impl<'a> Column<'a> {
 /// [`WayOut::keep_least`](crate::contact::way_out::WayOut::keep_least).
 fn contact_pixels(
     [front, back]: [Column; 2],
-    side: Side,
+    order: Order,
     at: &PixelView,
     params: &Params,
     result: &mut PairResult,
@@ -192,8 +192,8 @@ fn contact_pixels(
             .filter(|(_, left)| entered <= *left)
             .find(|(layer, left)| {
                 let depth = exit.depth - layer.depth;
-                match side {
-                    Side::Main => {
+                match order {
+                    Order::BThenA => {
                         let is_sure = front.facing(exit) == Facing::Exit
                             && back.facing(layer) == Facing::Entry;
                         let way_back = (left - entered).max(params.thickness);
@@ -201,7 +201,7 @@ fn contact_pixels(
                             || opposed(layer, exit) && !(is_sure && depth > FARTHEST * way_back)
                     }
                     // The least way out counts.
-                    Side::Other => depth <= params.thickness && entered + depth <= *left,
+                    Order::AThenB => depth <= params.thickness && entered + depth <= *left,
                 }
             });
         let Some((entry, _)) = entry else { continue };
@@ -217,7 +217,7 @@ fn contact_pixels(
         if gap > params.prediction {
             result.gap = Some(result.gap.map_or(gap, |g| g.min(gap)));
             // It is no contact, but tells other views how deep theirs can be.
-            if side == Side::Other || at.others.is_empty() {
+            if order == Order::AThenB || at.others.is_empty() {
                 continue;
             }
         }
@@ -226,9 +226,9 @@ fn contact_pixels(
         let point = |layer: &Layer| *at.frame_from_view * at.camera.view_at(u, v, layer.depth);
         let of_back = (point(entry), share_of(entry, -1.0) * in_frame(normal_back));
         let of_front = (point(exit), share_of(exit, 1.0) * in_frame(normal_front));
-        let ((point_a, normal_a), (point_b, normal_b)) = match side {
-            Side::Main => (of_back, of_front),
-            Side::Other => (of_front, of_back),
+        let ((point_a, normal_a), (point_b, normal_b)) = match order {
+            Order::BThenA => (of_back, of_front),
+            Order::AThenB => (of_front, of_back),
         };
         result.contacts.push(ContactPixel {
             pixel: at.pixel,

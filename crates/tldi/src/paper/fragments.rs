@@ -6,6 +6,7 @@
 
 use crate::counting_sort::starts_of;
 use crate::cpu::rect::Rect;
+use crate::ordered_bits::ordered_bits;
 use crate::{PointCloud, Projection, VirtualCamera};
 use glamx::{Pose3, Vec3};
 use rayon::prelude::*;
@@ -169,16 +170,6 @@ pub(super) fn project(
         })
         .collect_into_vec(cylinders);
     cylinders.retain(|cylinder| cylinder.rows[0] < cylinder.rows[1]);
-}
-
-/// Bits that sort as unsigned integers like the numbers sort.
-fn ordered_bits(number: f32) -> u32 {
-    let bits = number.to_bits();
-    if bits >> 31 == 0 {
-        bits | 1 << 31
-    } else {
-        !bits
-    }
 }
 
 /// The rectangle of all rows and columns with pixel centres within the bounds of a cylinder.

@@ -26,7 +26,7 @@ pub(crate) struct ZoneNormals<'a> {
 }
 
 /// Where points are along an axis, metres.
-struct Place {
+struct Spread {
     mean: f32,
     /// Standard deviation.
     scatter: f32,
@@ -61,7 +61,7 @@ impl ZoneNormals<'_> {
     }
 
     /// Of the points with the n·axis that `keep` keeps, if these are enough.
-    fn place(&self, axis: Vec3, keep: impl Fn(f32) -> bool) -> Option<Place> {
+    fn place(&self, axis: Vec3, keep: impl Fn(f32) -> bool) -> Option<Spread> {
         let kept = self.normals.iter().zip(self.points);
         let kept = kept.filter(|(normal, _)| keep(normal.dot(axis)));
         let mut kept = kept.map(|(_, point)| point.dot(axis)).peekable();
@@ -74,14 +74,14 @@ impl ZoneNormals<'_> {
             squares += off * off;
         }
         let mean = sum / count;
-        (count >= LEAST_SHARE * self.normals.len() as f32).then(|| Place {
+        (count >= LEAST_SHARE * self.normals.len() as f32).then(|| Spread {
             mean: first + mean,
             scatter: (squares / count - mean * mean).max(0.0).sqrt(),
         })
     }
 
     /// Of the points that face `axis` (`sign` 1) or its opposite (-1); of all, if the outside is not known.
-    fn facing(&self, axis: Vec3, sign: f32) -> Option<Place> {
+    fn facing(&self, axis: Vec3, sign: f32) -> Option<Spread> {
         self.place(axis, |along| !self.oriented || sign * along >= SUPPORTED)
     }
 }

@@ -31,7 +31,7 @@ pub(super) fn moved(sums: &Sums, [x, y, z]: [f32; 3]) -> Sums {
 
 /// A plane through a cell, in steps of coordinates.
 #[derive(Clone, Copy)]
-pub(super) struct Plane {
+pub(super) struct CellPlane {
     /// Rise of the depth along columns and rows.
     pub(super) slope: [f32; 2],
     /// Depth at the middle of the pixel, from the cell's mean depth.
@@ -41,7 +41,7 @@ pub(super) struct Plane {
     pub(super) variance: f32,
 }
 
-impl Plane {
+impl CellPlane {
     /// The plane of a cell with sums `own`. Its slope fits `all` best: the sums of the cell and its neighbours.
     pub(super) fn of(own: &Sums, all: &Sums) -> Self {
         let [n, x, y, z, xx, xy, xz, yy, yz, zz] = *all;

@@ -8,7 +8,7 @@
 
 use crate::counting_sort::ends_of;
 use crate::cpu::columns::Columns;
-use crate::cpu::first_look::cell_plane::{Plane, Sums, moved};
+use crate::cpu::first_look::cell_plane::{CellPlane, Sums, moved};
 use crate::cpu::lanes::multiversioned;
 use crate::cpu::rect::Rect;
 use crate::{Facing, Layer, Tldi, VirtualCamera};
@@ -43,7 +43,7 @@ pub(crate) struct Cells {
     /// First cell of each pixel; one entry more than pixels.
     firsts: Vec<u32>,
     cells: Vec<Cell>,
-    planes: Vec<Plane>,
+    planes: Vec<CellPlane>,
 }
 
 /// Where a point is in its pixel, in [`STEPS`].
@@ -169,7 +169,7 @@ impl Cells {
                     let moved = moved(&next.sums, [x, y, (next.middle - own.middle) as f32]);
                     all.iter_mut().zip(moved).for_each(|(all, sum)| *all += sum);
                 });
-                let plane = Plane::of(&own.sums, &all);
+                let plane = CellPlane::of(&own.sums, &all);
                 self.planes.push(plane);
             }
         }
@@ -177,7 +177,7 @@ impl Cells {
 
     /// The plane of a cell. If the cell and its neighbours lie on no common plane, it is the flattest plane of a neighbour
     /// that passes through the cell: beside an edge, the plane of one face.
-    fn sharpened(&self, cell: usize, pixel: [usize; 2], rect: &Rect) -> Plane {
+    fn sharpened(&self, cell: usize, pixel: [usize; 2], rect: &Rect) -> CellPlane {
         let plane = self.planes[cell];
         let square = |pixels: f32| (pixels * STEPS).powi(2);
         if plane.variance <= square(ON_PLANE) || plane.variance == f32::INFINITY {
@@ -188,16 +188,16 @@ impl Cells {
         let reached = least - ON_PLANE * STEPS..=most + ON_PLANE * STEPS;
         let mut flattest = None;
         self.neighbors(cell, pixel, rect, |next, [x, y]| {
-            let Plane {
+            let CellPlane {
                 slope,
                 above,
                 variance,
             } = self.planes[next];
             let there = (self.cells[next].middle - own.middle) as f32 + above;
             let above = there - STEPS * (slope[0] * x + slope[1] * y);
-            let is_flatter = flattest.is_none_or(|best: Plane| variance < best.variance);
+            let is_flatter = flattest.is_none_or(|best: CellPlane| variance < best.variance);
             if is_flatter && variance <= square(FLAT) && reached.contains(&above) {
-                flattest = Some(Plane {
+                flattest = Some(CellPlane {
                     slope,
                     above,
                     variance,
@@ -277,7 +277,13 @@ impl Cells {
     }
 
     /// The layer of a cell on a plane.
-    fn layer(&self, cell: usize, plane: &Plane, oriented: bool, imaging: &CellImaging) -> Layer {
+    fn layer(
+        &self,
+        cell: usize,
+        plane: &CellPlane,
+        oriented: bool,
+        imaging: &CellImaging,
+    ) -> Layer {
         let own = &self.cells[cell];
         let step = imaging.pixel_size / STEPS;
         let metres = |steps: i32| imaging.near + steps as f32 * step;

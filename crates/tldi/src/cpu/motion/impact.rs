@@ -4,8 +4,10 @@
 //! ray enters the other one. The least of these distances is the distance to the impact. The images hold all that the
 //! motion passes, so no surface is too thin, and none too fast.
 
+use crate::contact::lone_points::LonePoints;
 use crate::cpu::cull::{self, PointRadii, Region};
-use crate::cpu::motion::core::{BORDER, CORE, OUTSIDE, RIM};
+use crate::cpu::fold::ViewFold;
+use crate::cpu::motion::core::{BORDER, CORE, CoreScratch, OUTSIDE, RIM};
 use crate::cpu::motion::meeting::Meeting;
 use crate::cpu::scratch::{Look, Scratch};
 use crate::cpu::side::Scope;
@@ -13,7 +15,7 @@ use crate::cpu::sweep::is_edge_on;
 use crate::pair::plan::ring;
 use crate::pair::sampling::stride;
 use crate::stage::stage;
-use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Penetration, Surface, VirtualCamera};
+use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Penetration, Surface, Tldi, VirtualCamera};
 use glamx::{Pose3, Vec3};
 
 /// Normals are averaged over the pixels whose distance is within this many pixels of the least. Half or twice: no row
@@ -74,72 +76,19 @@ impl Scratch {
             }
             self.core.find(b.size[0]);
         }
-        let nearest = |pixel: usize, beyond: f32| {
-            let place = match query.core_only {
-                true => self.core.place(pixel, b.size[0]),
-                false => CORE,
-            };
-            if place == OUTSIDE {
-                return None;
-            }
-            let layers = a.layers_of(pixel);
-            let met = (0..layers.len()).filter(|&k| !leaves_solid(&layers[..=k]));
-            let leading = |k: usize| {
-                let moving = b.layers_of(pixel);
-                (0..moving.len())
-                    .filter(|&l| is_leading(moving, l))
-                    .map(move |l| Meeting::new(pixel, &layers[k], &moving[l], &query.params))
-            };
-            let in_way = |meeting: &Meeting| {
-                let approach = meeting.facing * (length - meeting.distance);
-                !query.leaves_at(meeting, &camera)
-                    && (place == CORE || approach > RIM as f32 * query.params.pixel_size)
-                    && (0.0..=length).contains(&meeting.distance)
-                    && (meeting.distance >= query.touching || approach > query.params.pixel_size)
-            };
-            met.flat_map(leading)
-                .filter(|meeting| meeting.distance > beyond && in_way(meeting))
-                .min_by(|m, n| m.distance.total_cmp(&n.distance))
+        let motion = Motion {
+            query,
+            length,
+            camera: &camera,
+            images: [a, b],
+            core: &self.core,
+            fold: &self.shared.fold,
         };
-        let order = |m: &Meeting, n: &Meeting| {
-            (m.distance.total_cmp(&n.distance)).then(m.pixel.cmp(&n.pixel))
-        };
+        let pixels = 0..b.pixel_count();
         self.meetings.clear();
-        (self.meetings)
-            .extend((0..b.pixel_count()).filter_map(|pixel| nearest(pixel, f32::NEG_INFINITY)));
-        self.meetings.sort_unstable_by(order);
-        let image_width = b.size[0] as usize;
-        let fold = &self.shared.fold;
-        let place = |pixel: usize, depth: f32| {
-            let at = [pixel % image_width, pixel / image_width];
-            let [u, v] = fold
-                .unfolded([0, 1].map(|k| b.origin[k] + at[k] as i32))
-                .map(|c| c as f32 + 0.5);
-            camera.point_at(u, v, depth)
-        };
-        let b_from_a = query.a_from_b.inverse();
-        let lone_points = &mut self.patches.lone_points;
-        let mut is_lone = |meeting: &Meeting| {
-            let before = place(meeting.pixel, meeting.depth - meeting.distance);
-            let mut of = |surface: &Surface, place: Vec3| match surface {
-                Surface::Cloud(cloud) => lone_points.is_alone(cloud, place),
-                Surface::Exact(_) | Surface::Device(_) => false,
-            };
-            of(&query.a, place(meeting.pixel, meeting.depth)) || of(&query.b, b_from_a * before)
-        };
-        // A lone point is passed over: the pixel meets what lies behind it.
-        let mut lone = 0;
-        while let Some(meeting) = self.meetings.get(lone).filter(|meeting| is_lone(meeting)) {
-            let Some(behind) = nearest(meeting.pixel, meeting.distance) else {
-                lone += 1;
-                continue;
-            };
-            let is_before = |m: &Meeting| order(m, &behind).is_lt();
-            let passed = self.meetings[lone + 1..].partition_point(is_before);
-            self.meetings[lone] = behind;
-            self.meetings[lone..=lone + passed].rotate_left(1);
-        }
-        self.meetings.drain(..lone);
+        (self.meetings).extend(pixels.filter_map(|pixel| motion.nearest(pixel, f32::NEG_INFINITY)));
+        self.meetings.sort_unstable_by(Meeting::order);
+        motion.pass_lone_points(&mut self.meetings, &mut self.patches.lone_points);
         let first = self.meetings.first()?;
         // A single pixel's normal may be that of a rim.
         let near = first.distance + NORMAL_BAND * query.params.pixel_size;
@@ -148,7 +97,7 @@ impl Scratch {
         let frame_from_view = camera.view_from_frame.rotation.inverse();
         Some(Impact {
             distance: first.distance,
-            point: place(first.pixel, first.depth),
+            point: motion.point(first.pixel, first.depth),
             normal: (frame_from_view * normal).normalize_or(-camera.axis()),
             coarser: (coarser > 1.0).then_some(coarser),
         })
@@ -222,6 +171,88 @@ impl Scratch {
             }
         }
         Some(())
+    }
+}
+
+/// The images along a motion.
+struct Motion<'a> {
+    query: &'a ImpactQuery<'a>,
+    /// Of the motion, metres.
+    length: f32,
+    camera: &'a VirtualCamera,
+    /// Of the surface at rest, and of the one that moves.
+    images: [&'a Tldi; 2],
+    core: &'a CoreScratch,
+    fold: &'a ViewFold,
+}
+
+impl Motion<'_> {
+    /// The nearest meeting in a pixel that is farther than `beyond` metres along the motion.
+    fn nearest(&self, pixel: usize, beyond: f32) -> Option<Meeting> {
+        let (query, length) = (self.query, self.length);
+        let [a, b] = self.images;
+        let place = match query.core_only {
+            true => self.core.place(pixel, b.size[0]),
+            false => CORE,
+        };
+        if place == OUTSIDE {
+            return None;
+        }
+        let layers = a.layers_of(pixel);
+        let met = (0..layers.len()).filter(|&k| !leaves_solid(&layers[..=k]));
+        let leading = |k: usize| {
+            let moving = b.layers_of(pixel);
+            (0..moving.len())
+                .filter(|&l| is_leading(moving, l))
+                .map(move |l| Meeting::new(pixel, &layers[k], &moving[l], &query.params))
+        };
+        let in_way = |meeting: &Meeting| {
+            let approach = meeting.facing * (length - meeting.distance);
+            !query.leaves_at(meeting, self.camera)
+                && (place == CORE || approach > RIM as f32 * query.params.pixel_size)
+                && (0.0..=length).contains(&meeting.distance)
+                && (meeting.distance >= query.touching || approach > query.params.pixel_size)
+        };
+        met.flat_map(leading)
+            .filter(|meeting| meeting.distance > beyond && in_way(meeting))
+            .min_by(|m, n| m.distance.total_cmp(&n.distance))
+    }
+
+    /// The place in a pixel at `depth` metres, in the frame of the query.
+    fn point(&self, pixel: usize, depth: f32) -> Vec3 {
+        let image = self.images[1];
+        let width = image.size[0] as usize;
+        let at = [pixel % width, pixel / width];
+        let at = [0, 1].map(|k| image.origin[k] + at[k] as i32);
+        let [u, v] = self.fold.unfolded(at).map(|c| c as f32 + 0.5);
+        self.camera.point_at(u, v, depth)
+    }
+
+    /// Removes the first of the ordered `meetings` as long as it is with a point that stands alone. Its pixel then meets
+    /// what lies behind.
+    fn pass_lone_points(&self, meetings: &mut Vec<Meeting>, lone_points: &mut LonePoints) {
+        let b_from_a = self.query.a_from_b.inverse();
+        let mut is_lone = |meeting: &Meeting| {
+            let before = self.point(meeting.pixel, meeting.depth - meeting.distance);
+            let mut of = |surface: &Surface, place: Vec3| match surface {
+                Surface::Cloud(cloud) => lone_points.is_alone(cloud, place),
+                Surface::Exact(_) | Surface::Device(_) => false,
+            };
+            of(&self.query.a, self.point(meeting.pixel, meeting.depth))
+                || of(&self.query.b, b_from_a * before)
+        };
+        let mut lone = 0;
+        while let Some(meeting) = meetings.get(lone).filter(|meeting| is_lone(meeting)) {
+            let Some(behind) = self.nearest(meeting.pixel, meeting.distance) else {
+                lone += 1;
+                continue;
+            };
+            let is_before = |m: &Meeting| m.order(&behind).is_lt();
+            let passed = meetings[lone + 1..].partition_point(is_before);
+            meetings[lone] = behind;
+            meetings[lone..=lone + passed].rotate_left(1);
+        }
+        meetings.drain(..lone);
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::cpu::sweep::is_edge_on;
 use crate::{Layer, Params};
 use glamx::Vec3;
+use std::cmp::Ordering;
 
 /// Where the ray of a pixel sees the surfaces meet.
 pub(crate) struct Meeting {
@@ -28,6 +29,11 @@ impl Meeting {
             depth,
             normal: (against(met.normal) + against(leading.normal)).normalize_or(-Vec3::Z),
         }
+    }
+
+    /// By distance, then by pixel.
+    pub(crate) fn order(&self, other: &Self) -> Ordering {
+        (self.distance.total_cmp(&other.distance)).then(self.pixel.cmp(&other.pixel))
     }
 }
 
