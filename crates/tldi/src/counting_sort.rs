@@ -2,8 +2,8 @@
 
 use std::ops::AddAssign;
 
-/// Turns the number of items in each bin into where the bin ends, and returns the end of all. Who then counts an end down
-/// for each item of its bin, the last item first, is left with where each bin starts.
+/// Turns the number of items in each bin into where the bin ends, and returns the end of all. To place the items, last
+/// one first, count the end of their bin down: it ends up where the bin starts.
 pub(crate) fn ends_of(counts: &mut [u32]) -> u32 {
     let mut end = 0;
     for count in counts {

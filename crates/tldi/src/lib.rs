@@ -43,6 +43,6 @@ pub use view::camera::{Projection, VirtualCamera};
 pub use view::camera_policy::CameraPolicy;
 pub use view::tldi::{Facing, Layer, Tldi};
 
-/// A view axis is kept from frame to frame while the normals of the contact zone agree with it
-/// within this angle, in radians (10°). Half or twice: no change in any suite.
+/// A view axis is kept from frame to frame while the normals of the contact zone agree with it within this angle, in
+/// radians (10°). Half or twice: no change.
 pub const AXIS_HYSTERESIS: f32 = 0.1745;

@@ -22,7 +22,7 @@ const RADIUS_RANGE: RangeInclusive<f32> = 1e-12..=1e12;
 /// coordinate, at most) is a sixteenth of the radius.
 pub(crate) const COORDINATE_PER_RADIUS: f32 = 524_288.0;
 
-/// Largest radius from nearest neighbours, in units of the median one. Half or twice: no change in any suite.
+/// Largest radius from nearest neighbours, in units of the median one. Half or twice: no change.
 const CAP_PER_MEDIAN: f32 = 10.0;
 
 /// Whether a cloud accepts the radius.

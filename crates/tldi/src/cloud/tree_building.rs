@@ -6,7 +6,7 @@ use crate::{KdTree, PointCloud};
 use glamx::Vec3;
 use rayon::prelude::*;
 
-/// Most positions in a leaf. Half or twice: no row of any suite changes.
+/// Most positions in a leaf. Half or twice: no row changes.
 const LEAF: usize = 16;
 /// Subtrees with at least this many positions are built in parallel.
 const PARALLEL: usize = 4096;

@@ -5,9 +5,9 @@ use crate::contact::ramp::ramp;
 use crate::{ContactPixel, ContactPoint};
 use glamx::{Vec2, Vec3};
 
-/// Largest share of the roughness that a bowl may leave. A small flat face whose rim is bent by
-/// estimated normals is no bowl. Neither is a crease. Half: a ball of restitution 1 fails with each of 6 seeds
-/// instead of none; twice: no change in any suite.
+/// Largest share of the roughness that a bowl may leave. A small flat face whose rim is bent by estimated normals is no
+/// bowl. Neither is a crease. Half: a ball of restitution 1 fails with each of 6 seeds instead of none; twice: no
+/// change.
 const UNEXPLAINED: f32 = 0.1;
 
 /// The same of at least [`MANY`] points: noise of a quarter of a radius leaves a third of a ball's. Half: a ball on
@@ -15,46 +15,43 @@ const UNEXPLAINED: f32 = 0.1;
 /// 0.02 mean radii off.
 const UNEXPLAINED_OF_MANY: f32 = 0.5;
 
-/// Number of points from which noise can be told from a rim or a crease. Half: no change in any suite; twice: a ball
-/// on new samples each frame fails with each of 6 seeds instead of none.
+/// Number of points from which noise can be told from a rim or a crease. Half: no change; twice: a ball on new samples
+/// each frame fails with each of 6 seeds instead of none.
 const MANY: f32 = 30.0;
 
-/// Largest distance of a bowl's lowest point from the middle of the points, in standard deviations
-/// along each main axis. The rim of a disc is at 2. Half or twice: no change in any suite.
+/// Largest distance of a bowl's lowest point from the middle of the points, in standard deviations along each main
+/// axis. The rim of a disc is at 2. Half or twice: no change.
 const LOWEST: f32 = 1.5;
 
-/// Least ratio between the widening of a bowl along its two main axes, in standard deviations of
-/// its points. In these units, a whole bowl widens equally, however oblong it is. Along an edge,
-/// only noise widens. Half: no row of any suite changes; twice: a ball on new samples each frame fails with 2 of 6
-/// seeds instead of none.
+/// Least ratio between the widening of a bowl along its two main axes, in standard deviations of its points. In these
+/// units, a whole bowl widens equally, however oblong it is. Along an edge, only noise widens. Half: no row changes;
+/// twice: a ball on new samples each frame fails with 2 of 6 seeds instead of none.
 const LEAST_ALIKE: f32 = 0.3;
 
-/// Fewest points of a bowl. It has five unknowns, so a bowl fits any five points, with its lowest
-/// point anywhere. Half or twice: no change in any suite.
+/// Fewest points of a bowl. It has five unknowns, so a bowl fits any five points, with its lowest point anywhere. Half
+/// or twice: no change.
 const LEAST_POINTS: f32 = 6.0;
 
-/// Least spread of the squares of places, as a share of that in a disc, and least part of it that
-/// the axes do not have in common. If places differ less, rounding decides the bend. Half or twice: no change in any
-/// suite.
+/// Least spread of the squares of places, as a share of that in a disc, and least part of it that the axes do not have
+/// in common. If places differ less, rounding decides the bend. Half or twice: no change.
 const LEAST_SPREAD: f32 = 0.02;
 
-/// Pixels that share their errors because they see the same points. Measured: the lowest points of
-/// a ball on a noisy plane vary 1.5 times as much as with independent pixels. Half: a ball on new samples each frame
-/// fails with 4 of 6 seeds instead of none; twice: no change in any suite.
+/// Pixels that share their errors because they see the same points. Measured: the lowest points of a ball on a noisy
+/// plane vary 1.5 times as much as with independent pixels. Half: a ball on new samples each frame fails with 4 of 6
+/// seeds instead of none; twice: no change.
 const ALIKE: f32 = 2.4;
 
-/// Standard errors within which the lowest point of a bowl is taken to be. Half: a ball on new samples each frame
-/// fails with each of 6 seeds instead of none; twice: no change in any suite.
+/// Standard errors within which the lowest point of a bowl is taken to be. Half: a ball on new samples each frame fails
+/// with each of 6 seeds instead of none; twice: no change.
 const DOUBT: f32 = 2.0;
 
-/// The error of a bowl's lowest gap, in those of its slope: in a disc, the root of 1 for the mean and 3 for
-/// the bend. Half: a ball on new samples each frame fails with 3 of 6 seeds instead of none; twice: no change in any
-/// suite.
+/// Error of a bowl's lowest gap, for each metre of error in its slope: in a disc the root of 4, 1 for the mean and 3
+/// for the bend. Half: a ball on new samples each frame fails with 3 of 6 seeds instead of none; twice: no change.
 pub(crate) const GAP_PER_SLOPE: f32 = 2.0;
 
-/// What gaps are off the fits through their neighbours, in standard deviations of their errors, of which a fit
-/// over 5 × 5 pixels keeps 0.39. Half: no change in any suite; twice: a ball on new samples each frame fails with
-/// each of 6 seeds instead of none.
+/// Scatter of gaps about the fits through their neighbours, in standard deviations of the errors of gaps, of which a
+/// fit over 5 × 5 pixels keeps 0.39. Half: no change; twice: a ball on new samples each frame fails with each of 6
+/// seeds instead of none.
 const OFF_FIT: f32 = 0.92;
 
 /// Errors of gaps, in pixels, at which they begin to count as noise, and at which they fully do.
@@ -62,8 +59,8 @@ const OFF_FIT: f32 = 0.92;
 /// 0.12 to 0.2. Both halved or doubled: no change in any suite.
 const NOISE: [f32; 2] = [0.04, 0.06];
 
-/// Most by which normals and gaps tell different radii of a surface: beyond, the normals are not those of the
-/// surface. Half or twice: no change in any suite.
+/// Largest ratio between the radii that normals and gaps tell. Beyond it, the normals are not those of the surface.
+/// Half or twice: no change.
 const ALIKE_RADII: f32 = 2.0;
 
 /// The lowest point of a bowl.
@@ -142,8 +139,8 @@ impl Bowl {
         }
     }
 
-    /// The place of its lowest point above a plane that rises by `slope` in a standard deviation of each place,
-    /// and how high that point is above the plane's middle, if it is a bowl in both directions, lowest among its
+    /// The place of the lowest point, above a plane that rises by `slope` in a standard deviation of each place, and
+    /// its height above the middle of the plane. `None` unless it is a bowl in both directions, lowest among its
     /// points, and most of the `roughness` about the plane.
     pub(crate) fn lowest(&self, slope: Vec2, roughness: f32) -> Option<(Vec2, f32)> {
         let place = -0.5 * slope / self.widening;
@@ -159,8 +156,7 @@ impl Bowl {
         is_bowl.then_some((place, above))
     }
 
-    /// The floor of a valley, which widens along one main axis only, if the gaps above a plane that rises by `slope`
-    /// are one.
+    /// The floor of a valley, above a plane that rises by `slope`. `None` unless it widens along one main axis only.
     pub(crate) fn valley(&self, slope: Vec2) -> Option<Valley> {
         let across = usize::from(self.widening.y > self.widening.x);
         let bend = self.widening[across];
@@ -175,15 +171,14 @@ impl Bowl {
         })
     }
 
-    /// How far that place moves for an error of one metre of the slope.
+    /// How far the lowest place moves, for each metre of error in the slope.
     pub(crate) fn place_per_slope(&self) -> Vec2 {
         0.5 / self.widening
     }
 }
 
-/// How far the slope of the gaps over a standard deviation of the places may be off, in metres, if they are `off`
-/// the fits through their neighbours by so much, in pixels of `pixel_size` metres. 0 where that is no noise, or is not
-/// known.
+/// Error of the slope of the gaps, metres over a standard deviation of the places. `off` says how far each gap is off
+/// the fit through its neighbours, metres. 0 where that is no noise, or too few gaps tell.
 pub(crate) fn slope_error(off: impl Iterator<Item = f32>, pixel_size: f32) -> f32 {
     let (squares, count) = off.fold((0.0, 0.0), |(sum, n), off| (sum + off * off, n + 1.0));
     if count < MANY {

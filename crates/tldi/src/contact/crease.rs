@@ -36,8 +36,7 @@ const OF_FACES: [f32; 2] = [0.25, 0.45];
 /// in any suite.
 const ROUND: [f32; 2] = [0.1, 0.25];
 
-/// Largest distance at which faces may meet below the lowest pixel, in pixels. Half or twice: no change in any
-/// suite.
+/// Largest distance at which faces may meet below the lowest pixel, in pixels. Half or twice: no change.
 const LOWEST: f32 = 1.0;
 
 /// The gap over a face, in metres, at a place on the plane of a contact: `at_origin + slope · place`.

@@ -12,9 +12,8 @@ use glamx::{Mat4, Vec4};
 /// Neighbours of a pixel in 5 × 5 pixels, and room for some with two layers.
 const MOST_NEIGHBORS: usize = 48;
 
-/// What neighbours must tell of the slope and of the curvature before they are believed, in squares
-/// of pixels: a row or a corner of them leaves the rest of the paraboloid open. Half or twice of either:
-/// no change in any suite.
+/// Weights that keep slope and curvature small where neighbours tell little of them, as a row or a corner does; in
+/// squares of pixels. Half or twice of either: no change.
 const LEAST_SLOPE_WEIGHT: f32 = 0.5;
 const LEAST_BEND_WEIGHT: f32 = 2.0;
 
@@ -34,8 +33,7 @@ const BASIS: [Vec4; PLACES] = {
     basis
 };
 
-/// Fits gaps; keeps what depends only on which of the neighbours are there, since that is alike for most
-/// pixels.
+/// Fits gaps. It keeps the inverse matrix, which depends only on which neighbours are there: most pixels have the same.
 #[derive(Debug, Default)]
 pub(crate) struct GapFit {
     /// A bit for each place that has a neighbour.

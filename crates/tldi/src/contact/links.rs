@@ -5,8 +5,8 @@ use crate::counting_sort::ends_of;
 use crate::{ContactPixel, PairResult, Params};
 use std::ops::Range;
 
-/// Neighbouring pixels are linked if their points on either surface are within this many pixels. Half: 13
-/// of 636 stability rows fail instead of 3, and normals are 29 % worse; twice: no change in any suite.
+/// Neighbouring pixels are linked if their points on either surface are within this many pixels. Half: 13 of 636
+/// stability rows fail instead of 3, and normals are 29 % worse; twice: no change.
 const SAME_SURFACE_PX: f32 = 3.0;
 
 /// Linked neighbours, of eight, that confirm a penetration of a layer's thickness.

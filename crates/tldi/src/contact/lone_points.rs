@@ -17,19 +17,18 @@ use glamx::{Mat3, Pose3, Vec3};
 /// Neighbours that tell how dense points are. Clouds of fewer have no lone points.
 const NEIGHBORS: usize = 4;
 
-/// A point stands alone if its fourth neighbour is at least this many times as far away as the fourth neighbour of one of
-/// its neighbours. At the corner of a grid it is twice as far. Half or twice: no change in any suite.
+/// A point stands alone if its fourth neighbour is at least this many times as far away as the fourth neighbour of one
+/// of its neighbours. At the corner of a grid it is twice as far. Half or twice: no change.
 const ALONE: f32 = 2.5;
 
-/// Points closer to each other than this share of the mean radius are the same point. Half or twice: no row of any
-/// suite changes.
+/// Points closer to each other than this share of the mean radius are the same point. Half or twice: no row changes.
 pub(crate) const SAME_POINT: f32 = 1e-3;
 
-/// Contact pixels of one component that are looked at. Half or twice: no row of any suite changes.
+/// Contact pixels of one component that are looked at. Half or twice: no row changes.
 const SAMPLES: usize = 9;
 
-/// How far neighbours are looked for, in mean radii of the cloud. What has none within that is not
-/// known to stand alone. Half or twice: no row of any suite changes.
+/// How far neighbours are looked for, in mean radii of the cloud. What has none within that is not known to stand
+/// alone. Half or twice: no row changes.
 const REACH: f32 = 32.0;
 
 /// How far neighbours are looked for first, in a grid of the points around, in mean radii. With the paper's radii (0.65 of

@@ -3,21 +3,20 @@
 use glamx::{Mat3, Vec2, Vec3};
 
 /// Fewest contact pixels that tell a plane. Of fewer no main plane is looked for, they are not split, and their support
-/// points are not moved inwards. Half or twice, each use alone: no change in any suite.
+/// points are not moved inwards. Half or twice, each use alone: no change.
 pub(crate) const LEAST_PLANE: usize = 12;
 
-/// Of more heights every second, third and so on is enough: they tell a plane to a twentieth of their
-/// deviation. Half or twice: no change in any suite.
+/// Most heights that are used, every n-th of them: so many tell a plane to a twentieth of their deviation. Half or
+/// twice: no change.
 const MOST_HEIGHTS: usize = 384;
 
-/// Rounds of the fit, and the factor by which the deviation that counts shrinks in each: 20 in all,
-/// from all heights to `near`. Half or twice the rounds, or the root or the square of the factor: no
-/// change in any suite.
+/// Rounds of the fit, and the factor by which the deviation that counts shrinks in each: 20 in all, from all heights to
+/// `near`. Half or twice the rounds, or the root or the square of the factor: no change.
 const ROUNDS: i32 = 6;
 const NARROWER: f32 = 0.6;
 
-/// Least information about a plane in the heights that count, as a share of that in as many heights
-/// of unit variance. Heights in a row leave a slope undetermined. Half or twice: no change in any suite.
+/// Least information about a plane in the heights that count, as a share of that in as many heights of unit variance.
+/// Heights in a row leave a slope undetermined. Half or twice: no change.
 const LEAST_KNOWN: f32 = 1e-3;
 
 /// A plane over places: its height at the origin, and its slopes.
@@ -44,9 +43,8 @@ impl GapPlane {
         Self(self.0.lerp(other.0, share))
     }
 
-    /// The plane on which most of `heights` lie, and the share of them that lies within twice `near` of
-    /// it, counted as if there were some more elsewhere; `self`, which should be the plane that fits
-    /// them best, with a standard deviation of `spread`, is where to begin.
+    /// The plane on which most of `heights` lie, and the share of them within twice `near` of it, as if [`LEAST_PLANE`]
+    /// more lay elsewhere. Begins with `self`: the plane that fits all best, with a standard deviation of `spread`.
     ///
     /// Least squares, weighted anew in each round with ever narrower Geman–McClure weights (Blake and
     /// Zisserman's graduated non-convexity, doi 10.7551/mitpress/7132.001.0001). Places should have about

@@ -9,48 +9,47 @@ use crate::contact::supports::{longest_axis, supports};
 use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, Params};
 use glamx::Vec3;
 
-/// A surface's normal averaged over linked neighbours that is shorter than this (a spread of 26°) is a mean
-/// over a crease, which says nothing of a bend. Half or twice the rest to 1: no change in any suite. Without it, a ball
-/// in a groove fails with 3 of 24 seeds instead of none.
+/// A surface's normal averaged over linked neighbours that is shorter than this (a spread of 26°) is a mean over a
+/// crease, which says nothing of a bend. Half or twice the rest to 1: no change. Without it, a ball in a groove fails
+/// with 3 of 24 seeds instead of none.
 const CREASED: f32 = 0.9;
 
 /// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal. Half: normals 9 % worse; twice:
 /// normals 14 % better, no more stability rows fail, but depths of deep edges are twice as wrong.
 const NORMAL_BAND: f32 = 2.0;
 
-/// Band whose pixels can be support points and decide where a part is split. What penetrates can up to
-/// [`NORMAL_BAND`]: a body that lies deeper on one side must not sink in on the other. Half: 27 of 636 stability
-/// rows fail instead of 3, most of balls; twice: depths 20 % worse.
+/// Band above the smallest gap whose pixels can be support points and decide where a part is split. Pixels that
+/// penetrate can be up to [`NORMAL_BAND`] above it: a body that lies deeper on one side must not sink in on the other.
+/// Half: 27 of 636 stability rows fail instead of 3, most of balls; twice: depths 20 % worse.
 const SUPPORT_BAND: f32 = 1.0;
 
-/// The gaps of a patch are taken to be at least this rough, in pixels: below, extent alone chooses
-/// the support points. Half: no change in any suite; twice: depths 14 % worse, and a bunny on new samples each frame
-/// fails with each of 6 seeds instead of one.
+/// The gaps of a patch are taken to be at least this rough, in pixels: below, extent alone chooses the support points.
+/// Half: no change; twice: depths 14 % worse, and a bunny on new samples each frame fails with each of 6 seeds instead
+/// of one.
 const LEAST_ROUGHNESS: f32 = 0.05;
 
-/// Band above the smallest gap, in pixels, over which the deepest point is a mean. Half or twice: no change in any
-/// suite. With the lowest pixel instead, a bunny on new samples each frame fails with 3 of 24 seeds more.
+/// Band above the smallest gap, in pixels, over which the deepest point is a mean. Half or twice: no change. With the
+/// lowest pixel instead, a bunny on new samples each frame fails with 3 of 24 seeds more.
 const DEEPEST_BAND: f32 = 0.1;
 
-/// How much deeper than the support points that point must be to count, in units of the roughness.
-/// On flat faces the difference is noise, and four corners carry more than three. Half: no change in any suite;
-/// twice: a ball in a groove fails with each of 6 seeds instead of none.
+/// How much deeper than the support points that point must be to count, in units of the roughness. On flat faces the
+/// difference is noise, and four corners carry more than three. Half: no change; twice: a ball in a groove fails with
+/// each of 6 seeds instead of none.
 const DEEPER: f32 = 0.4;
 
-/// Roughness, in pixels, above which a bend of the surfaces does not count. Gaps that rise through
-/// all of the support band, as around a ball's contact, deviate from a plane by 0.29; those of a
-/// small face whose rim is blurred by estimated normals by 0.1. Half: no change in any suite; twice: 17 of 159
-/// stability rows fail instead of none, and depths are 47 % worse.
+/// Roughness, in pixels, above which a bend of the surfaces does not count. Gaps that rise through all of the support
+/// band, as around a ball's contact, deviate from a plane by 0.29; those of a small face whose rim is blurred by
+/// estimated normals by 0.1. Half: no change; twice: 17 of 159 stability rows fail instead of none, and depths are 47 %
+/// worse.
 const LEAST_RISE: f32 = 0.15;
 
 /// Share of the variance of normals across a valley that a steady turn explains at least. Measured: 0.98 and more of
-/// cylinders, 0.52 to 0.97 of two faces that meet at an edge. Half or twice the rest to 1: no row of any suite
-/// changes.
+/// cylinders, 0.52 to 0.97 of two faces that meet at an edge. Half or twice the rest to 1: no row changes.
 const STEADY: f32 = 0.9;
 
-/// Most that a point of a flat contact may be off its plane to be moved onto it, in pixels: what estimated
-/// normals make of the rims of two faces. What is lower still is a bump under the face. Half: a box on new samples
-/// each frame fails with each of 6 seeds instead of none; twice: no change in any suite.
+/// Largest distance from its plane, in pixels, at which a point of a flat contact is moved onto it: what estimated
+/// normals make of the rims of two faces. A lower point is a bump under the face. Half: a box on new samples each frame
+/// fails with each of 6 seeds instead of none; twice: no change.
 const OFF_PLANE: f32 = 0.4;
 
 /// Normal and main direction of a part.

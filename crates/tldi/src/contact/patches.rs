@@ -19,26 +19,23 @@ use glamx::Vec3;
 use std::cmp::Ordering;
 use std::ops::Range;
 
-/// Most patches of one pair. The deepest are kept; a solver gains nothing from more. Half or twice: no
-/// row of any suite changes.
+/// Most patches of one pair. The deepest are kept; a solver gains nothing from more. Half or twice: no row changes.
 pub const MAX_PATCHES: usize = 32;
 
-/// Linked pixels belong to one group if their smoothed normals are within 30°. Half or twice the angle:
-/// no change in any suite.
+/// Linked pixels belong to one group if their smoothed normals are within 30°. Half or twice the angle: no change.
 const SAME_GROUP: f32 = 0.866;
 
-/// A part whose pixels' unit normals have a mean shorter than this (a spread of about 14°) is split.
-/// Half or twice the rest to 1: no change in any suite.
+/// A part whose pixels' unit normals have a mean shorter than this (a spread of about 14°) is split. Half or twice the
+/// rest to 1: no change.
 const FLAT: f32 = 0.97;
 
-/// Splits in a row: at most eight parts a group. Half or twice: no change in any suite.
+/// Splits in a row: at most eight parts a group. Half or twice: no change.
 const MAX_SPLITS: u32 = 3;
 
-/// Cosine of the angle (10°) within which normals belong to one plane: such parts share a patch,
-/// wherever they are. A solver needs the supports of one plane together to choose the few that it
-/// takes (rapier merges manifolds within 5.1° and keeps the deepest points, which need not be those
-/// that bear the load). Half the angle: a ball in a groove fails with 2 of 6 seeds instead of none;
-/// twice: no change in any suite.
+/// Cosine of the angle (10°) within which normals belong to one plane: such parts share a patch, wherever they are. A
+/// solver needs the supports of one plane together to choose the few that it takes (rapier merges manifolds within 5.1°
+/// and keeps the deepest points, which need not be those that bear the load). Half the angle: a ball in a groove fails
+/// with 2 of 6 seeds instead of none; twice: no change.
 pub const SAME_PLANE: f32 = 0.985;
 
 /// Memory of [`PatchScratch::reduce`], kept from call to call.

@@ -34,18 +34,18 @@ pub struct Supports {
     pub floor_of_valley: Option<Floor>,
 }
 
-/// Limit of how much depth counts, in units of the roughness. A still lower point is an outlier,
-/// and would otherwise be chosen in all directions. On a flat face it does not count: a low point
-/// in the middle of an edge would take the place of both corners, and the body tip over the third. Half: a
-/// bunny on new samples each frame fails with 5 of 6 seeds instead of one; twice: no change in any suite.
+/// Limit of how much depth counts, in units of the roughness. A still lower point is an outlier, and would otherwise be
+/// chosen in all directions. On a flat face it does not count: a low point in the middle of an edge would take the
+/// place of both corners, and the body tip over the third. Half: a bunny on new samples each frame fails with 5 of 6
+/// seeds instead of one; twice: no change.
 const LOWEST: f32 = 2.5;
 
-/// Least extent across the longest direction, as a share of that along it: less is rounding. Half or twice:
-/// no row of any suite changes.
+/// Least extent across the longest direction, as a share of that along it: less is rounding. Half or twice: no row
+/// changes.
 const LEAST_WIDTH: f32 = 1e-6;
 
-/// The same from which on points tell how steeply their gaps rise across: not those in a row. Half or twice:
-/// no change in any suite.
+/// Least extent across, as a share of that along, of points that tell how steeply their gaps rise across. Half or
+/// twice: no change.
 const LEAST_KNOWN_WIDTH: f32 = 0.1;
 
 /// Share of points on one plane at which gaps begin to count as flat, and at which they fully do.
@@ -62,14 +62,14 @@ const UNBENT: [f32; 2] = [0.3, 0.5];
 /// may be one. Both halved or doubled: no change in any suite.
 const SMOOTH: [f32; 2] = [0.5, 1.0];
 
-/// How far from the floor of a valley points tell how low it is, in standard deviations across it. Half or
-/// twice: no row of any suite changes.
+/// How far from the floor of a valley points tell how low it is, in standard deviations across it. Half or twice: no
+/// row changes.
 const NEAR_FLOOR: f32 = 0.4;
 
-/// Of points on one plane with unit normal `normal`, those on which a body would rest. There are
-/// four directions at right angles to each other, along which the points reach out farthest. Each
-/// gives the point that is farthest out and lowest: one standard deviation of extent counts as much
-/// as √2 of roughness, which is at least `least_roughness` metres.
+/// Which of `points`, on one plane with the unit normal `normal`, a body would rest on. Of four directions at right
+/// angles to each other, along which the points reach out farthest, each gives the point that is farthest out and
+/// lowest: one standard deviation of extent counts as much as √2 of roughness, which is at least `least_roughness`
+/// metres.
 ///
 /// Heights are measured from the plane that fits the gaps. So the choice does not depend on the
 /// tilt of the body, and a lifted edge remains. Cost: linear in points.

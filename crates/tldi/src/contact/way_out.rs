@@ -9,14 +9,13 @@ use crate::view::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, PairResult, Params, VirtualCamera};
 use arrayvec::ArrayVec;
 
-/// The share of a contact's depth by which another view must see the surfaces overlap for the contact to count: along an
-/// axis 60° from the way out an overlap seems twice as deep as it is. Half: 5 of 300 overlaps are falsely deep
-/// instead of 4; twice: no row of any suite changes.
+/// The share of a contact's depth by which another view must see the surfaces overlap for the contact to count: along
+/// an axis 60° from the way out an overlap seems twice as deep as it is. Half: 5 of 300 overlaps are falsely deep
+/// instead of 4; twice: no row changes.
 const LEAST_SHARE: f32 = 0.5;
 
 /// Most places along a contact's ray that are looked up in another view, so that the cost does not grow with the depth.
-/// With 4, twice as many clouds with normals are told to be much too deep. Half or twice: no row of any suite
-/// changes.
+/// With 4, twice as many clouds with normals are told to be much too deep. Half or twice: no row changes.
 const MOST_PLACES: f32 = 16.0;
 
 /// Memory of [`WayOut::keep_least`], kept from call to call.

@@ -7,17 +7,16 @@ use super::sweep::{SAME_FACE, is_edge_on};
 use crate::{Layer, Params, Tldi};
 use glamx::{Vec2, Vec3};
 
-/// Two layers that swap their order between two neighbouring pixels, in [`Crossings`]. Half or twice: no
-/// change in any suite.
+/// Two layers that swap their order between two neighbouring pixels, in [`Crossings`]. Half or twice: no change.
 const SWAPPED: u32 = 2;
 
-/// A pixel in which a layer pierces a wall, in [`Crossings`]: where a wall is, edge-on, is less sure. Half
-/// or twice: no change in any suite.
+/// A pixel in which a layer pierces a wall, in [`Crossings`]: where a wall is, edge-on, is less sure. Half or twice: no
+/// change.
 const PIERCED: u32 = 1;
 
-/// How many signs of a crossing all views must see together before surfaces cross. A swap of layers
-/// between pixels counts two, a pixel in which a wall is pierced counts one. A single swap may be
-/// the overhang of a splat beside an edge. Half or twice: no change in any suite.
+/// How many signs of a crossing all views must see together before surfaces cross. A swap of layers between pixels
+/// counts two, a pixel in which a wall is pierced counts one. A single swap may be the overhang of a splat beside an
+/// edge. Half or twice: no change.
 pub const CROSSED: u32 = 4;
 
 /// How much of a crossing all views of a pair have seen, in the units of [`CROSSED`]. Those that are
@@ -52,8 +51,8 @@ impl Crossings {
     }
 }
 
-/// How far in pixels the middle of a neighbouring pixel is from a wall, at least, that it is beside. Half
-/// or twice: no change in any suite.
+/// How far in pixels the middle of a neighbouring pixel is from a wall, at least, that it is beside. Half or twice: no
+/// change.
 const BESIDE: f32 = 0.5;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).

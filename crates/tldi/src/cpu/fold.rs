@@ -16,12 +16,12 @@ use glamx::Vec3;
 /// between. With fewer, points on both sides could meet.
 const LEFT: i64 = 3;
 
-/// Pixels up to which an image is not folded, whatever the number of points: 256 × 256, which takes less time
-/// than the stages before it. Half or twice: no row of any suite changes.
+/// Pixels up to which an image is not folded, whatever the number of points: 256 × 256, which takes less time than the
+/// stages before it. Half or twice: no row changes.
 const SMALL: usize = 1 << 16;
 
 /// Edges of a cell in reaches beyond which its grid is folded. The cells of surfaces, which fill little of their
-/// bounds, are up to three times as large as the reach. Half or twice: no row of any suite changes.
+/// bounds, are up to three times as large as the reach. Half or twice: no row changes.
 const COARSE: f32 = 4.0;
 
 /// Least edge of a quantum in pixels: what casts look at beside a surface, and two for the rounding of a border.

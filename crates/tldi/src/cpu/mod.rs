@@ -38,7 +38,7 @@ use rayon::prelude::*;
 use room::{Cost, Room};
 use scratch::Scratch;
 use side::{CloudView, Side};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 
 /// Compares pairs on the CPU, in parallel over pairs and over the points of large clouds.
 ///
@@ -197,28 +197,13 @@ impl CpuBackend {
     }
 
     fn with_room<R>(&self, room: &mut Room, run: impl FnOnce(&mut Scratch) -> R) -> R {
-        self.with_scratch(|scratch| {
-            std::mem::swap(&mut scratch.shared.room, room);
-            let result = run(scratch);
-            std::mem::swap(&mut scratch.shared.room, room);
-            result
-        })
-    }
-
-    fn with_scratch<R>(&self, run: impl FnOnce(&mut Scratch) -> R) -> R {
         // A panic while the lock is held leaves a list of scratch buffers, which is always valid.
-        let pop = || {
-            self.pool
-                .lock()
-                .unwrap_or_else(|poisoned| poisoned.into_inner())
-                .pop()
-        };
-        let mut scratch = pop().unwrap_or_default();
+        let pool = || self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut scratch = pool().pop().unwrap_or_default();
+        std::mem::swap(&mut scratch.shared.room, room);
         let result = run(&mut scratch);
-        self.pool
-            .lock()
-            .unwrap_or_else(|poisoned| poisoned.into_inner())
-            .push(scratch);
+        std::mem::swap(&mut scratch.shared.room, room);
+        pool().push(scratch);
         result
     }
 }

@@ -162,27 +162,10 @@ impl Scratch {
         };
         let [scratch_a, scratch_b] = &mut self.paper;
         let (image_a, image_b) = (&mut self.a.image, &mut self.b.image);
+        let (params, a_from_a) = (&query.params, &Pose3::IDENTITY);
         rayon::join(
-            || {
-                paper::build(
-                    a,
-                    &Pose3::IDENTITY,
-                    camera,
-                    &query.params,
-                    scratch_a,
-                    image_a,
-                )
-            },
-            || {
-                paper::build(
-                    b,
-                    &query.a_from_b,
-                    camera,
-                    &query.params,
-                    scratch_b,
-                    image_b,
-                )
-            },
+            || paper::build(a, a_from_a, camera, params, scratch_a, image_a),
+            || paper::build(b, &query.a_from_b, camera, params, scratch_b, image_b),
         );
         self.work.fine += Looked {
             points: a.len() + b.len(),

@@ -12,15 +12,14 @@ use super::rect::Rect;
 /// image; twice as many would double a pair's memory and its longest step, and half as many would coarsen that ring.
 const ROOM: f32 = (1 << 22) as f32;
 
-/// Pixels that each point pays for: several times what the points of a surface cover. Half or twice: no row of any
-/// suite changes.
+/// Pixels that each point pays for: several times what the points of a surface cover. Half or twice: no row changes.
 pub(super) const PER_POINT: usize = 16;
 
-/// Fragments that take the time of a pixel. Pixels much smaller than points show no more of them. Half or twice: no
-/// row of any suite changes.
+/// Fragments that take the time of a pixel. Pixels much smaller than points show no more of them. Half or twice: no row
+/// changes.
 const FRAGMENTS: f32 = 4.0;
 
-/// Fragments that each point pays for: pixels of a sixth of a radius. Half or twice: no row of any suite changes.
+/// Fragments that each point pays for: pixels of a sixth of a radius. Half or twice: no row changes.
 const FRAGMENTS_PER_POINT: f32 = 128.0;
 
 /// Pixels that take the time of a ray through an exact surface. Half or twice: the test of what one image gets

@@ -88,8 +88,6 @@ pub(super) struct Scratch {
     pub(super) patches: PatchScratch,
     /// Of the first look.
     pub(super) windows: Vec<Window>,
-    /// Metres.
-    pub(super) window_edge: f32,
     /// Since it was cleared.
     pub(super) work: Work,
 }
@@ -126,58 +124,44 @@ impl Scratch {
     /// Finds the near points of both sides and their normals; `false` where nothing is near.
     pub(super) fn zone(&mut self, query: &PairQuery, plan: &PairPlan) -> bool {
         let reach = plan.zone_reach;
-        self.a.near.clear();
-        self.b.near.clear();
+        let (a_from_a, a_from_b) = (&Pose3::IDENTITY, &query.a_from_b);
+        let Self { a, b, zone, .. } = self;
+        a.near.clear();
+        b.near.clear();
         let is_empty = |side: &Side, surface: &Surface| {
             matches!(surface, Surface::Cloud(_)) && side.points.is_empty()
         };
-        if is_empty(&self.a, &query.a) || is_empty(&self.b, &query.b) {
+        if is_empty(a, &query.a) || is_empty(b, &query.b) {
             return false;
         }
+        let placed = |surface, frame_from_surface| Placed {
+            surface,
+            frame_from_surface,
+        };
         match (query.a, query.b) {
-            (Surface::Cloud(a), Surface::Cloud(b)) => {
-                let zone_side = |points, mean_radius| ZoneSide {
+            (Surface::Cloud(cloud_a), Surface::Cloud(cloud_b)) => {
+                let zone_side = |points, cloud: &PointCloud| ZoneSide {
                     points,
-                    mean_radius,
+                    mean_radius: cloud.mean_radius(),
                 };
-                zone::zone(
-                    [
-                        zone_side(&self.a.points, a.mean_radius()),
-                        zone_side(&self.b.points, b.mean_radius()),
-                    ],
-                    &plan.overlap,
-                    reach,
-                    &mut self.zone,
-                    &mut self.a.near,
-                    &mut self.b.near,
-                );
-                if self.a.near.is_empty() || self.b.near.is_empty() {
+                let sides = [zone_side(&a.points, cloud_a), zone_side(&b.points, cloud_b)];
+                zone::zone(sides, &plan.overlap, reach, zone, &mut a.near, &mut b.near);
+                if a.near.is_empty() || b.near.is_empty() {
                     return false;
                 }
-                let (side_a, side_b) = (&mut self.a, &mut self.b);
                 rayon::join(
-                    || side_a.sample_normals(a, &Pose3::IDENTITY),
-                    || side_b.sample_normals(b, &query.a_from_b),
+                    || a.sample_normals(cloud_a, a_from_a),
+                    || b.sample_normals(cloud_b, a_from_b),
                 );
                 true
             }
             (Surface::Cloud(cloud), Surface::Exact(surface)) => {
-                let near = &mut self.b.near_samples;
-                let exact = Placed {
-                    surface,
-                    frame_from_surface: &query.a_from_b,
-                };
-                self.a
-                    .near_exact(cloud, &Pose3::IDENTITY, &exact, reach, near)
+                let (of_surface, exact) = (&mut b.near_samples, placed(surface, a_from_b));
+                a.near_exact(cloud, a_from_a, &exact, reach, of_surface)
             }
             (Surface::Exact(surface), Surface::Cloud(cloud)) => {
-                let near = &mut self.a.near_samples;
-                let exact = Placed {
-                    surface,
-                    frame_from_surface: &Pose3::IDENTITY,
-                };
-                self.b
-                    .near_exact(cloud, &query.a_from_b, &exact, reach, near)
+                let (of_surface, exact) = (&mut a.near_samples, placed(surface, a_from_a));
+                b.near_exact(cloud, a_from_b, &exact, reach, of_surface)
             }
             _ => false, // refused
         }

@@ -20,11 +20,11 @@ use glamx::Vec3;
 pub(crate) const EDGE_ON: f32 = 0.2;
 
 /// |n·v| below which a splat is steep (37°). Its depth varies so much within a pixel that fragments within one thickness
-/// of each other count as one layer. Half or twice the angle: no change in any suite.
+/// of each other count as one layer. Half or twice the angle: no change.
 const STEEP: f32 = 0.8;
 
 /// Depth steps in a surface's thickness. Depths are summed as integers, so that the order of the points does not change
-/// a sum. Half or twice: no change in any suite.
+/// a sum. Half or twice: no change.
 pub(super) const DEPTH_STEPS: u32 = 4096;
 
 /// The share of a cloud's noise by which the merge gap grows. With noise of r̄ the gap is then as wide as a surface is
@@ -39,7 +39,7 @@ pub(crate) const NORMAL_STEPS: f32 = 16384.0;
 const MAX_WEIGHT: f32 = 255.0;
 
 /// Rows of a band. With a thousand columns and eight fragments a pixel, a band takes a megabyte, as much as a core's
-/// second cache holds. Half or twice: no row of any suite changes.
+/// second cache holds. Half or twice: no row changes.
 const BAND_ROWS: u32 = 16;
 
 /// Bits of a fragment's key that hold the depth. The bits above them hold the class.

@@ -13,17 +13,17 @@ use crate::stage::stage;
 use crate::{Facing, Layer, Tldi};
 use glamx::Vec3;
 
-/// Mean length of a layer's unit normals below which it has an edge: two faces that meet at 30°. Half or twice the
-/// rest to 1: no change in any suite.
+/// Mean length of a layer's unit normals below which it has an edge: two faces that meet at 30°. Half or twice the rest
+/// to 1: no change.
 const CREASED: f32 = 0.97;
 
 /// Cosine of the largest angle (35°) between normals of one face, or of two that face each other. Half or twice the
-/// angle: no change in any suite.
+/// angle: no change.
 pub(crate) const SAME_FACE: f32 = 0.82;
 
-/// How finely a bend is summed: steps in a pixel, the most pixels aside, and bits of the normals that are dropped. So the
-/// sum over 1,024 fragments fits an `i32`, the widest integer of WGSL. Half or twice as many steps or pixels: no
-/// change in any suite.
+/// How finely a bend is summed: steps in a pixel, the most pixels aside, and bits of the normals that are dropped. So
+/// the sum over 1,024 fragments fits an `i32`, the widest integer of WGSL. Half or twice as many steps or pixels: no
+/// change.
 const BEND_STEPS: f32 = 16.0;
 const MOST_ASIDE: f32 = 4.0;
 const BEND_SHIFT: u32 = 6;

@@ -18,13 +18,13 @@ pub use crate::view::approach::{Approach, Body};
 pub use crate::view::camera_policy::MAX_VIEWS;
 
 /// Tangent of the largest angle (60°) between a normal and the view at which a contact at the prediction distance is
-/// found: beyond it, depths along the view are no distances. There, the surfaces are twice as far apart along the
-/// view. Half or twice: no row of any suite changes.
+/// found: beyond it, depths along the view are no distances. There, the surfaces are twice as far apart along the view.
+/// Half or twice: no row changes.
 const STEEPEST: f32 = 1.732_050_8;
 
-/// Depth in pixels to which a body is searched that has sunk below all of a surface. Points that
-/// are culled in vain cost little, but two large clouds have many deeper points. Half: 13 % fewer culled points;
-/// twice: 22 % more; else no change in any suite.
+/// Depth in pixels to which a body is searched that has sunk below all of a surface. Points that are culled in vain
+/// cost little, but two large clouds have many deeper points. Half: 13 % fewer culled points; twice: 22 % more; else no
+/// change.
 const SUNK: f32 = 16.0;
 
 /// What a pair's stages `cull`, `zone` and `aim` need beside the points.
@@ -92,13 +92,9 @@ impl PairPlan {
         if widest.is_empty() {
             return None;
         }
-        let [body_a, body_b] = bodies(query);
-        let side = |frame_from_surface,
-                    other_from_frame,
-                    other_bounds: Aabb,
-                    [own, other]: [Ring; 2],
-                    body| {
-            let included = own.beside(&other);
+        let bodies = bodies(query);
+        let side = |k: usize, frame_from_surface, other_from_frame, other_bounds: Aabb| {
+            let included = rings[k].beside(&rings[1 - k]);
             let margin = prediction + included;
             SidePlan {
                 frame_from_surface,
@@ -106,31 +102,18 @@ impl PairPlan {
                     overlap: overlap(margin),
                     other_from_frame,
                     other_bounds: other_bounds.loosened(margin),
-                    ring: own,
+                    ring: rings[k],
                     included,
                 },
-                body,
+                body: bodies[k],
             }
         };
-        let [ring_a, ring_b] = rings;
         let b_from_a = query.a_from_b.inverse();
         Some(Self {
             overlap: widest,
             sides: [
-                side(
-                    Pose3::IDENTITY,
-                    b_from_a,
-                    bounds_b,
-                    [ring_a, ring_b],
-                    body_a,
-                ),
-                side(
-                    query.a_from_b,
-                    Pose3::IDENTITY,
-                    bounds_a,
-                    [ring_b, ring_a],
-                    body_b,
-                ),
+                side(0, Pose3::IDENTITY, b_from_a, bounds_b),
+                side(1, query.a_from_b, Pose3::IDENTITY, bounds_a),
             ],
             zone_reach: prediction + a.mean_radius() + b.mean_radius(),
             column_reach: column_reach(&query.params),

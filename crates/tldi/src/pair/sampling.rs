@@ -2,9 +2,8 @@
 
 use crate::BLOCK;
 
-/// Points that are kept per pixel of a surface seen face on: enough for the mean of a layer. With 1,
-/// coarse pixels cost a tenth, but bodies fall asleep later on scans. Half or twice: no change in
-/// any suite.
+/// Points that are kept per pixel of a surface seen face on: enough for the mean of a layer. With 1, coarse pixels cost
+/// a tenth, but bodies fall asleep later on scans. Half or twice: no change.
 const POINTS_PER_PIXEL: f32 = 8.0;
 
 /// About the most near points of a cloud whose normals aim the camera, or that are projected onto an exact

@@ -4,17 +4,17 @@ use crate::Aabb;
 use crate::pair::surface::first_is_smaller;
 use glamx::{Pose3, Quat, Vec3};
 
-/// Least weight of the direction to `b`, see [`Approach::plainness`]. Half: 16 of 636 stability rows fail instead of 3, all
-/// new ones of a ball in a groove; twice: no change in any suite.
+/// Least weight of the direction to `b`, see [`Approach::plainness`]. Half: 16 of 636 stability rows fail instead of 3,
+/// all new ones of a ball in a groove; twice: no change.
 const LEAST_PLAIN: f32 = 0.2;
 
-/// Share of its half extent by which the middle of the smaller surface is plainly on one side of the
-/// other. Half or twice: no row of any suite changes.
+/// Share of its half extent by which the middle of the smaller surface is plainly on one side of the other. Half or
+/// twice: no row changes.
 const PLAINLY: f32 = 0.5;
 
-/// Least cosine between a motion and an axis at which the motion tells from which side `b` came.
-/// A motion that runs along the surface more than across it does not tell: a slope may lean either way.
-/// Half or twice the angle: no row of any suite changes.
+/// Least cosine between a motion and an axis at which the motion tells from which side `b` came. A motion that runs
+/// along the surface more than across it does not tell: a slope may lean either way. Half or twice the angle: no row
+/// changes.
 const CROSSING: f32 = 0.5;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).

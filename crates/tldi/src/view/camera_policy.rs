@@ -44,14 +44,13 @@ pub enum CameraPolicy {
 /// Most views of one pair: three axes span all directions.
 pub const MAX_VIEWS: usize = 3;
 
-/// A normal within this of the axis is well seen: cos 50°. Depth errors of splats grow as the
-/// tangent beyond. Half the angle: no change in any suite; twice: a ball in a groove fails with each of 6
-/// seeds instead of none.
+/// A normal within this of the axis is well seen: cos 50°. Depth errors of splats grow as the tangent beyond. Half the
+/// angle: no change; twice: a ball in a groove fails with each of 6 seeds instead of none.
 const WELL_SEEN: f32 = 0.643;
 
-/// Mean of n·v, over the normals that face an axis, below which their signs say nothing about the
-/// side. (A ring around a deep contact has normals all around the axis.) It is also the least
-/// cosine between an axis and the last one. Half or twice: no change in any suite.
+/// Mean of n·v, over the normals that face an axis, below which their signs say nothing about the side. (A ring around
+/// a deep contact has normals all around the axis.) It is also the least cosine between an axis and the last one. Half
+/// or twice: no change.
 const CONCLUSIVE: f32 = 0.3;
 
 /// Weight of the direction to `b`, if `b` plainly lies or comes from there, beside the normals of a
@@ -60,7 +59,7 @@ const CONCLUSIVE: f32 = 0.3;
 /// rows fail instead of 3, although normals are 23 % better; twice: normals 18 % worse.
 const HINT_WEIGHT: f32 = 0.5;
 
-/// Weight of the last axis beside the normals of a surface. Half or twice: no change in any suite.
+/// Weight of the last axis beside the normals of a surface. Half or twice: no change.
 const MEMORY_WEIGHT: f32 = 0.5;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).

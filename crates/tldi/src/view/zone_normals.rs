@@ -2,11 +2,11 @@
 
 use glamx::Vec3;
 
-/// Least |n·axis| (60°) at which a point faces an axis. Half or twice the angle: no change in any suite.
+/// Least |n·axis| (60°) at which a point faces an axis. Half or twice the angle: no change.
 pub(crate) const SUPPORTED: f32 = 0.5;
 
 /// Least share of a side's near points that must face a further axis. Fewer are noise at the rim of the zone. Half or
-/// twice: no change in any suite.
+/// twice: no change.
 pub(crate) const LEAST_SHARE: f32 = 0.05;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).

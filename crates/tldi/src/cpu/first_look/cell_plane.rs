@@ -1,11 +1,10 @@
 //! The plane of a cell, from sums over its points and those around it.
 
-/// Least points of a cell and its neighbours: three tell a plane. Fewer stand alone. Half or twice: no row of any
-/// suite changes.
+/// Least points of a cell and its neighbours: three tell a plane. Fewer stand alone. Half or twice: no row changes.
 const LEAST_POINTS: f32 = 3.0;
 
 /// Least spread of the points across their main direction, as a share of their squared spread over the pixels. Below it
-/// they lie on a line and tell no plane, only a mean depth. Half or twice: no change in any suite.
+/// they lie on a line and tell no plane, only a mean depth. Half or twice: no change.
 const LEAST_SPREAD: f32 = 1e-2;
 
 /// Sums over points, of 1, x, y, z, xx, xy, xz, yy, yz and zz.

@@ -20,16 +20,16 @@ use std::ops::Range;
 /// of bodies thinner than a pixel.
 const MERGED: f32 = 0.6;
 
-/// Steps of a coordinate in a pixel. The rounding is then far smaller than the error of a cell's plane. Half or
-/// twice: no change in any suite.
+/// Steps of a coordinate in a pixel. The rounding is then far smaller than the error of a cell's plane. Half or twice:
+/// no change.
 const STEPS: f32 = 256.0;
 
-/// Standard deviation, in pixels, up to which a cell and its neighbours are on a plane. A sphere of a
-/// radius of 25 pixels has 0.02. Half: normals of deep spheres a third worse; twice: no change in any suite.
+/// Standard deviation, in pixels, up to which a cell and its neighbours are on a plane. A sphere of a radius of 25
+/// pixels has 0.02. Half: normals of deep spheres a third worse; twice: no change.
 const ON_PLANE: f32 = 0.1;
 
-/// Standard deviation, in pixels, up to which a plane is one that neighbours adopt. Half: no change in any suite;
-/// twice: normals 10 % worse, the worst three times as wrong.
+/// Standard deviation, in pixels, up to which a plane is one that neighbours adopt. Half: no change; twice: normals 10
+/// % worse, the worst three times as wrong.
 const FLAT: f32 = 0.05;
 
 /// The points and cells of an image, kept from call to call.
@@ -188,20 +188,12 @@ impl Cells {
         let reached = least - ON_PLANE * STEPS..=most + ON_PLANE * STEPS;
         let mut flattest = None;
         self.neighbors(cell, pixel, rect, |next, [x, y]| {
-            let CellPlane {
-                slope,
-                above,
-                variance,
-            } = self.planes[next];
-            let there = (self.cells[next].middle - own.middle) as f32 + above;
-            let above = there - STEPS * (slope[0] * x + slope[1] * y);
-            let is_flatter = flattest.is_none_or(|best: CellPlane| variance < best.variance);
-            if is_flatter && variance <= square(FLAT) && reached.contains(&above) {
-                flattest = Some(CellPlane {
-                    slope,
-                    above,
-                    variance,
-                });
+            let plane = self.planes[next];
+            let there = (self.cells[next].middle - own.middle) as f32 + plane.above;
+            let above = there - STEPS * (plane.slope[0] * x + plane.slope[1] * y);
+            let is_flatter = flattest.is_none_or(|best: CellPlane| plane.variance < best.variance);
+            if is_flatter && plane.variance <= square(FLAT) && reached.contains(&above) {
+                flattest = Some(CellPlane { above, ..plane });
             }
         });
         flattest.unwrap_or(plane)

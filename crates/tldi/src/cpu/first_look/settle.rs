@@ -59,6 +59,8 @@ struct CloudPair<'a> {
     query: PairQuery<'a>,
     clouds: [&'a PointCloud<'a>; 2],
     policy: CameraPolicy,
+    /// Metres, whatever pixels are looked with.
+    window_edge: f32,
 }
 
 impl<'a> CloudPair<'a> {
@@ -73,6 +75,7 @@ impl<'a> CloudPair<'a> {
             query: *query,
             clouds: [a, b],
             policy,
+            window_edge: Window::edge(query),
         })
     }
 
@@ -114,7 +117,6 @@ impl Scratch {
         result: &mut PairResult,
     ) -> FirstLook {
         let mut came_to = FirstLook::Nothing;
-        self.window_edge = Window::edge(query);
         let Some(pair) = CloudPair::of(query) else {
             return came_to;
         };
@@ -198,13 +200,26 @@ impl Scratch {
             let window = self.windows[k];
             let camera = window.camera(query, axes);
             let plan = window.plan(query, plan, &camera);
-            if self.cull(query, &plan, strides, Side::cull_window) {
+            let reach = plan.column_reach;
+            if self.cull(query, &plan, strides, Side::cull_window)
+                && (self.look_at(&pair.look(&camera), reach, Scope::Near(reach))).is_some()
+            {
+                self.work.windows += self.looked(query);
                 let seen = Seen {
                     axes,
                     view: window.view,
                     ..Seen::default()
                 };
-                self.look_through(pair, &plan, &camera, &seen, &mut crossings);
+                let [a, b] = [&self.a.image, &self.b.image];
+                let mut nothing = PairResult::default();
+                compare::compare(
+                    a,
+                    b,
+                    &seen,
+                    &query.params,
+                    Some(&mut crossings),
+                    &mut nothing,
+                );
             }
             if crossings.are_enough() {
                 break;
@@ -270,37 +285,11 @@ impl Scratch {
             [a, b],
             &seen,
             &query.params,
-            self.window_edge,
+            pair.window_edge,
             &mut self.windows,
         );
         let depths = result.contacts[first..].iter().map(|contact| -contact.gap);
         depths.fold(0.0, f32::max)
-    }
-
-    /// Adds what small pixels show of crossings in a window, whose points both sides hold.
-    fn look_through(
-        &mut self,
-        pair: &CloudPair,
-        plan: &PairPlan,
-        camera: &VirtualCamera,
-        seen: &Seen,
-        crossings: &mut Crossings,
-    ) {
-        let (query, reach) = (&pair.query, plan.column_reach);
-        let looked = self.look_at(&pair.look(camera), reach, Scope::Near(reach));
-        if looked.is_none() {
-            return;
-        }
-        self.work.windows += self.looked(query);
-        let mut nothing = PairResult::default();
-        compare::compare(
-            &self.a.image,
-            &self.b.image,
-            seen,
-            &query.params,
-            Some(crossings),
-            &mut nothing,
-        );
     }
 }
 

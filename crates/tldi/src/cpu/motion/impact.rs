@@ -19,11 +19,11 @@ use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Penetration, Surface, Tldi
 use glamx::{Pose3, Vec3};
 
 /// Normals are averaged over the pixels whose distance is within this many pixels of the least. Half or twice: no row
-/// of any suite changes.
+/// changes.
 const NORMAL_BAND: f32 = 0.5;
 
 /// Least cosine between the normal of a penetration and the normal of the surface that it leaves from behind. Half or
-/// twice the angle: no change in any suite.
+/// twice the angle: no change.
 const FROM_BEHIND: f32 = 0.5;
 
 impl Scratch {

@@ -2,6 +2,7 @@
 
 use crate::cloud::point_normals::least_variance_axis;
 use crate::cpu::lanes::multiversioned;
+use bytemuck::Zeroable;
 use glamx::{DMat3, DVec3, FloatExt, Mat4, Vec3, Vec4};
 
 /// Neighbours that are summed side by side: an AVX2 register of `f32`. `Batch::add_up` is written for 8. With 16, slight
@@ -11,9 +12,8 @@ pub(crate) const LANES: usize = 8;
 /// Planes that are solved for side by side.
 const BATCH: usize = 64;
 
-/// Share of the squared variance that the two larger axes of a neighbourhood must have for a
-/// normal in single precision: below it the points are on a line or coincide. Half or twice: no row of
-/// any suite changes.
+/// Share of the squared variance that the two larger axes of a neighbourhood must have for a normal in single
+/// precision: below it the points are on a line or coincide. Half or twice: no row changes.
 const LEAST_PLANAR: f32 = 1e-4;
 
 /// Radius of the neighbourhood whose covariance gives the normal, in mean radii of the points.
@@ -21,12 +21,12 @@ const LEAST_PLANAR: f32 = 1e-4;
 /// twice as wrong; twice: depths 29 % worse, and 19 % more points pass a cull.
 pub const SUPPORT: f32 = 3.0;
 
-/// Standard deviation of neighbours from their plane, in mean radii, up to which they are on it: a tenth of
-/// a pixel, which contacts may err by. Half or twice: no change in any suite.
+/// Standard deviation of neighbours from their plane, in mean radii, up to which they are on it: a tenth of a pixel,
+/// which contacts may err by. Half or twice: no change.
 const ON_PLANE: f32 = 0.1;
 
-/// Largest ratio of a measured variance to the noise's own that noise alone explains. Over 20 points, a variance scatters
-/// by a third. Half or twice: no row of any suite changes.
+/// Largest ratio of a measured variance to the noise's own that noise alone explains. Over 20 points, a variance
+/// scatters by a third. Half or twice: no row changes.
 const OF_NOISE: f32 = 2.0;
 
 /// Share of the squared distances from the plane of its neighbourhood that is a point's own if it is none of the surface:
@@ -121,6 +121,7 @@ impl Plane {
 }
 
 /// Neighbourhoods whose planes are solved for together, as structure of arrays.
+#[derive(Zeroable)]
 pub(crate) struct Batch {
     /// Where the plane goes.
     place: [u32; BATCH],
@@ -137,17 +138,7 @@ pub(crate) struct Batch {
 
 impl Default for Batch {
     fn default() -> Self {
-        Self {
-            place: [0; BATCH],
-            partial: [[[0.0; LANES]; 10]; BATCH],
-            moments: [[0.0; BATCH]; 10],
-            normal: [[0.0; BATCH]; 3],
-            variance: [0.0; BATCH],
-            height: [0.0; BATCH],
-            share: [0.0; BATCH],
-            planar: [false; BATCH],
-            count: 0,
-        }
+        Self::zeroed()
     }
 }
 

@@ -11,14 +11,14 @@ use crate::cpu::lanes::multiversioned;
 use crate::cpu::normals::estimate::NormalScratch;
 use crate::cpu::normals::planes::{LANES, Neighborhood, Plane, SUPPORT};
 use crate::cpu::normals::sorted::{MAX_CANDIDATES, Sorted};
+use bytemuck::Zeroable;
 use glamx::Vec3;
 
 /// Variance at which neighbours are plainly not on a plane, in units of that up to which they are. Half or twice: no
-/// change in any suite.
+/// change.
 const OFF_PLANE: f32 = 4.0;
 
-/// Deviation from a plane, in mean radii, at which it is not flat, or a point is not on it. Half or twice: no change
-/// in any suite.
+/// Deviation from a plane, in mean radii, at which it is not flat, or a point is not on it. Half or twice: no change.
 const FLAT: f32 = 0.05;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
@@ -36,6 +36,7 @@ pub(crate) struct SharpenScratch {
 }
 
 /// Flat planes of points around a cell, in whole lanes.
+#[derive(Zeroable)]
 struct FlatPlanes {
     position: [[f32; MAX_CANDIDATES]; 3],
     normal: [[f32; MAX_CANDIDATES]; 3],
@@ -46,13 +47,7 @@ struct FlatPlanes {
 
 impl Default for FlatPlanes {
     fn default() -> Self {
-        Self {
-            position: [[0.0; MAX_CANDIDATES]; 3],
-            normal: [[0.0; MAX_CANDIDATES]; 3],
-            variance: [0.0; MAX_CANDIDATES],
-            height: [0.0; MAX_CANDIDATES],
-            count: 0,
-        }
+        Self::zeroed()
     }
 }
 
