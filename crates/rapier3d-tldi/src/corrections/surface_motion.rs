@@ -14,6 +14,7 @@ use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodyHandle, Rigi
 use rapier3d::geometry::{ColliderHandle, ColliderSet, SolverFlags};
 use rapier3d::math::Vector;
 use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
+use std::collections::HashMap;
 use tldi::PointCloud;
 
 /// The known motion of clouds that got other points since the last step.
@@ -21,6 +22,10 @@ use tldi::PointCloud;
 pub(crate) struct SurfaceMotions {
     motions: Vec<SurfaceMotion>,
     sampled: Vec<SampledMotion>,
+    /// Steps that ended.
+    steps: u64,
+    /// How many steps had ended when a collider got the points that it has.
+    changed_at: HashMap<ColliderHandle, u64>,
     /// Time constant of rapier's correction of penetrations, seconds: of two dynamic bodies, and of one.
     undoing: [f32; 2],
     dt: f32,
@@ -42,6 +47,7 @@ struct SurfaceMotion {
     before: Vec<Vector>,
     /// Of each point, in the collider's frame, m/s; not finite where the point was not there before.
     velocities: Vec<Vector>,
+    pace: Pace,
 }
 
 /// Of a cloud that was sampled anew.
@@ -51,20 +57,26 @@ struct SampledMotion {
     /// before that.
     before: Snapshot,
     earlier: Option<Snapshot>,
-    /// Steps that ended since.
-    age: u32,
-    /// Steps from the sampling before to the last one; 1 where there was none.
-    interval: u32,
+    pace: Pace,
+}
+
+/// When a surface changed.
+#[derive(Clone, Copy)]
+struct Pace {
+    /// Steps that ended since the last change.
+    age: u64,
+    /// Steps from the change before to the last one; at least 1.
+    interval: u64,
 }
 
 /// Most steps from one sampling to the next that say how fast a surface moves: a camera's 15 frames a
 /// second in 120 steps. What comes later is another surface. Half or twice: no row of any suite changes.
-const LONGEST_INTERVAL: u32 = 8;
+const LONGEST_INTERVAL: u64 = 8;
 
-impl SampledMotion {
-    /// Whether the next sampling is not due yet.
+impl Pace {
+    /// Whether the next change is not due yet: the surface goes on as it came.
     fn is_moving(&self) -> bool {
-        self.age < self.interval
+        self.age < self.interval.min(LONGEST_INTERVAL)
     }
 }
 
@@ -93,8 +105,8 @@ impl SurfaceMotions {
         snapshot
     }
 
-    /// Records that the points [`before`](Self::before) moved to those of `shape`, as many, within `dt` seconds. Of several
-    /// times since the last step, all points of the first count.
+    /// Records that the points [`before`](Self::before) moved to those of `shape`, as many, in the steps of `dt` seconds since
+    /// they changed last. Of several times since the last step, the first one's points and steps count.
     pub(crate) fn record(
         &mut self,
         collider: ColliderHandle,
@@ -102,42 +114,59 @@ impl SurfaceMotions {
         shape: &PointCloudShape,
         dt: f32,
     ) {
-        let earlier = self.motions.iter_mut().find(|m| m.collider == collider);
-        if let Some(motion) = earlier.filter(|m| m.before.len() == before.len()) {
+        let mut interval = self.steps_since_change(collider);
+        let earlier = (self.motions.iter_mut()).find(|m| m.collider == collider);
+        let is_again = |m: &&mut SurfaceMotion| m.pace.age == 0 && m.before.len() == before.len();
+        if let Some(motion) = earlier.filter(is_again) {
+            interval = motion.pace.interval;
             std::mem::swap(&mut motion.before, &mut before);
         }
         self.forget(collider);
+        let seconds = interval as f32 * dt;
         let cloud = shape.cloud();
         let mut velocities = self.spare.pop().unwrap_or_default();
         velocities.clear();
         let points = cloud.points().iter().enumerate();
-        velocities.extend(points.map(|(i, new)| (*new - before[cloud.given_index(i)]) / dt));
+        velocities.extend(points.map(|(i, new)| (*new - before[cloud.given_index(i)]) / seconds));
         self.motions.push(SurfaceMotion {
             collider,
             revision: shape.revision(),
             before,
             velocities,
+            pace: Pace { age: 0, interval },
         });
+        self.changed_at.insert(collider, self.steps);
+    }
+
+    /// Steps since the points of this collider changed, at least 1. Points that never did are as old as the pipeline.
+    fn steps_since_change(&self, collider: ColliderHandle) -> u64 {
+        let changed_at = self.changed_at.get(&collider).copied();
+        (self.steps - changed_at.unwrap_or(0)).max(1)
     }
 
     /// Records that this collider's surface, sampled by `before`, is sampled anew.
     pub(crate) fn record_sampled(&mut self, collider: ColliderHandle, before: Snapshot) {
         self.forget_velocities(collider);
+        self.changed_at.insert(collider, self.steps);
         match self.sampled.iter_mut().find(|m| m.collider == collider) {
             // Twice since the last step: what lay before the first time counts.
-            Some(motion) if motion.age == 0 => self.spare_snapshots.push(before),
+            Some(motion) if motion.pace.age == 0 => self.spare_snapshots.push(before),
             Some(motion) => {
                 let earlier = std::mem::replace(&mut motion.before, before);
                 self.spare_snapshots.extend(motion.earlier.replace(earlier));
-                motion.interval = motion.age;
-                motion.age = 0;
+                motion.pace = Pace {
+                    age: 0,
+                    interval: motion.pace.age,
+                };
             }
             None => self.sampled.push(SampledMotion {
                 collider,
                 before,
                 earlier: None,
-                age: 0,
-                interval: 1,
+                pace: Pace {
+                    age: 0,
+                    interval: 1,
+                },
             }),
         }
     }
@@ -175,17 +204,16 @@ impl SurfaceMotions {
         self.pushed.clear();
     }
 
-    /// After a step, surfaces that deformed stand still until they are moved again. Those that are
-    /// sampled anew every few steps go on until the next sampling is due.
-    pub(crate) fn clear(&mut self) {
-        let motions = self.motions.drain(..);
-        (self.spare).extend(motions.flat_map(|motion| [motion.before, motion.velocities]));
-        for motion in &mut self.sampled {
-            motion.age += 1;
-        }
-        let stopped = self
-            .sampled
-            .extract_if(.., |motion| motion.age > LONGEST_INTERVAL);
+    /// After a step. Surfaces that change every few steps go on until the next change is due, and stand still from then on.
+    pub(crate) fn step_ended(&mut self, colliders: &ColliderSet) {
+        self.steps += 1;
+        (self.changed_at).retain(|collider, _| colliders.contains(*collider));
+        let deformed = self.motions.iter_mut().map(|motion| &mut motion.pace);
+        let sampled = self.sampled.iter_mut().map(|motion| &mut motion.pace);
+        deformed.chain(sampled).for_each(|pace| pace.age += 1);
+        let stopped = (self.motions).extract_if(.., |motion| !motion.pace.is_moving());
+        (self.spare).extend(stopped.flat_map(|motion| [motion.before, motion.velocities]));
+        let stopped = (self.sampled).extract_if(.., |motion| motion.pace.age > LONGEST_INTERVAL);
         for motion in stopped {
             self.spare_snapshots.push(motion.before);
             self.spare_snapshots.extend(motion.earlier);
@@ -195,7 +223,7 @@ impl SurfaceMotions {
     /// Whether one of these colliders has a motion.
     pub(crate) fn have(&self, colliders: [ColliderHandle; 2]) -> bool {
         let deformed = self.motions.iter().map(|motion| motion.collider);
-        let sampled = self.sampled.iter().filter(|motion| motion.is_moving());
+        let sampled = self.sampled.iter().filter(|motion| motion.pace.is_moving());
         deformed
             .chain(sampled.map(|motion| motion.collider))
             .any(|collider| colliders.contains(&collider))
@@ -224,8 +252,8 @@ impl SurfaceMotions {
             }
             return pose.rotation * mean_near(shape.cloud(), &motion.velocities, local);
         }
-        let sampled = (self.sampled.iter()).find(|m| m.collider == collider && m.is_moving());
-        match sampled.and_then(|m| Some(([m.earlier.as_ref()?, &m.before], m.interval))) {
+        let sampled = (self.sampled.iter()).find(|m| m.collider == collider && m.pace.is_moving());
+        match sampled.and_then(|m| Some(([m.earlier.as_ref()?, &m.before], m.pace.interval))) {
             Some((old, interval)) if self.dt > 0.0 => {
                 let normal_in_cloud = pose.rotation.inverse() * normal;
                 let way = way_along(shape.cloud(), old, local, normal_in_cloud);

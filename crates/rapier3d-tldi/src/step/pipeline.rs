@@ -352,7 +352,7 @@ impl TldiPipeline {
             self.memory.update(candidates, &batch, bodies, colliders);
             batch.clear();
         }
-        self.motions.clear();
+        self.motions.step_ended(colliders);
         if let Some((count, first)) = self.shared.take_failures() {
             return Err(TldiError::OnTheSpot { count, first });
         }

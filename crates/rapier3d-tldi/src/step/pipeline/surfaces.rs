@@ -190,10 +190,14 @@ impl TldiPipeline {
         Ok(())
     }
 
-    /// [`set_points`](Self::set_points) for a surface that deforms: the same points, where they are
-    /// a step later. In the step to come they are taken to go on with the velocity that brought
-    /// them there, which reaches the contacts: what stands on a floor that slides or rises is
-    /// carried along. The points before the first call since the last step count, if there are several.
+    /// [`set_points`](Self::set_points) for a surface that deforms: the same points, where they are by now. They are taken to
+    /// go on with the velocity that brought them there, which reaches the contacts: what stands on a floor that slides or
+    /// rises is carried along. If there are several calls since the last step, the points before the first one count.
+    ///
+    /// The velocity is how far the points moved in their collider's frame, divided by the time since they changed last; until
+    /// they change first, by the time since the pipeline's first step. So the speed is right if they come every few steps. The
+    /// same points again change nothing. Points go on for as many steps as there were between the last two changes, at most
+    /// eight; then they stand still.
     ///
     /// Sets [`ActiveHooks::MODIFY_SOLVER_CONTACTS`] on the collider; the hooks of
     /// [`step_with_events`](Self::step_with_events) see its contacts then, too. Cost beside that of
@@ -239,8 +243,8 @@ impl TldiPipeline {
         self.deform_collider(&mut world.colliders, collider, points, normals, dt)
     }
 
-    /// [`deform`](Self::deform) for split sets, for a step of `dt` seconds. Give the step
-    /// [`hooks`](Self::hooks).
+    /// [`deform`](Self::deform) for split sets and steps of `dt` seconds each, also if the points come every few steps only.
+    /// Give the step [`hooks`](Self::hooks).
     ///
     /// # Errors
     /// Those of [`deform`](Self::deform).
@@ -272,20 +276,21 @@ impl TldiPipeline {
         dt: f32,
     ) -> Result<(), TldiError> {
         let cloud = cloud_of(colliders, collider)?.cloud();
-        let before = self.motions.before(cloud);
-        let is_moved = !cloud.consists_of(points, normals);
-        if before.len() != points.len() {
+        let expected = cloud.len() + cloud.dropped();
+        if expected != points.len() {
             return Err(TldiError::OtherPoints {
                 collider,
-                expected: before.len(),
+                expected,
                 found: points.len(),
             });
         }
-        if is_moved {
-            self.change_shape(colliders, collider, |shape| {
-                shape.move_points(points, normals)
-            })?;
+        if cloud.consists_of(points, normals) {
+            return Ok(());
         }
+        let before = self.motions.before(cloud);
+        self.change_shape(colliders, collider, |shape| {
+            shape.move_points(points, normals)
+        })?;
         // Without a time there is no velocity.
         if dt > 0.0 {
             let after = cloud_of(colliders, collider)?;
