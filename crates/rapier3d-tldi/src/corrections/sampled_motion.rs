@@ -6,7 +6,7 @@
 
 use nalgebra::{SMatrix, SVector};
 use rapier3d::glamx::Vec3;
-use rapier3d::math::Vector;
+use rapier3d::math::{Pose, Vector};
 use tldi::{Aabb, BLOCK, PointCloud};
 
 /// Radius about a contact, in mean radii, whose points tell the height of the surface: some thirty. Half: 13 of 636
@@ -38,10 +38,12 @@ const SURE: f32 = 4.0;
 pub(crate) struct Snapshot {
     points: Vec<Vector>,
     blocks: Vec<Aabb>,
+    /// Where the cloud was, in the frame of what carries it.
+    pub(crate) base_from_points: Pose,
 }
 
 impl Snapshot {
-    /// Takes over the points of `cloud`, keeping the memory.
+    /// Takes over the points of `cloud`, keeping the memory and the pose.
     pub(crate) fn take(&mut self, cloud: &PointCloud<'_>) {
         self.points.clear();
         self.points.extend(cloud.points());
@@ -65,6 +67,15 @@ struct Probe {
 }
 
 impl Probe {
+    /// The same line in another frame.
+    fn moved(&self, pose: &Pose) -> Self {
+        Self {
+            point: *pose * self.point,
+            normal: pose.rotation * self.normal,
+            radius: self.radius,
+        }
+    }
+
     /// The points around the line up to `reach` metres away: across it, in radii, and along it, metres.
     fn around(
         &self,
@@ -121,10 +132,11 @@ fn height<const N: usize>(points: &[Vec3]) -> Option<Height> {
     (height.value.is_finite() && height.standard_error.is_finite()).then_some(height)
 }
 
-/// How far the surface of `cloud` moved in the last frame along the unit `normal` at `point`, metres. The points of the
-/// two frames before tell it. 0 if the motion does not exceed the noise.
+/// How far the surface of `cloud` moved in the last frame along the unit `normal` at `point`, metres, seen from what carries
+/// the cloud; `point` and `normal` are in the frame of the cloud. The points of the two frames before tell it. 0 if the
+/// motion does not exceed the noise.
 pub(crate) fn way_along(
-    cloud: &PointCloud<'_>,
+    (cloud, base_from_points): (&PointCloud<'_>, &Pose),
     [earlier, before]: [&Snapshot; 2],
     point: Vector,
     normal: Vector,
@@ -139,6 +151,8 @@ pub(crate) fn way_along(
     let now = probe.around(cloud.blocks(), |i| points[i], cloud.len(), AROUND * radius);
     let of = |old: &Snapshot, steps: f32| {
         let reach = (AROUND + steps * FARTHEST) * radius;
+        let old_from_now = old.base_from_points.inv_mul(base_from_points);
+        let probe = probe.moved(&old_from_now);
         probe.around(&old.blocks, |i| old.points[i], old.points.len(), reach)
     };
     let points = [of(earlier, 2.0), of(before, 1.0), now];
@@ -208,7 +222,8 @@ mod tests {
             snapshot.take(&cloud);
             snapshot
         });
-        way_along(&now, [&earlier, &before], Vector::ZERO, Vector::Y)
+        let here = (&now, &Pose::IDENTITY);
+        way_along(here, [&earlier, &before], Vector::ZERO, Vector::Y)
     }
 
     #[test]

@@ -9,10 +9,10 @@
 
 use crate::PointCloudShape;
 use crate::corrections::sampled_motion::{Snapshot, way_along};
-use crate::step::candidates::pose_of;
+use crate::step::candidates::{parent_of, pose_of};
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodyHandle, RigidBodySet};
-use rapier3d::geometry::{ColliderHandle, ColliderSet, SolverFlags};
-use rapier3d::math::Vector;
+use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet, SolverFlags};
+use rapier3d::math::{Pose, Vector};
 use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
 use std::collections::HashMap;
 use tldi::PointCloud;
@@ -57,6 +57,8 @@ struct SampledMotion {
     /// before that.
     before: Snapshot,
     earlier: Option<Snapshot>,
+    /// Where the points were in the first step that had them, in the frame of what carries them.
+    base_from_points: Pose,
     pace: Pace,
 }
 
@@ -145,13 +147,14 @@ impl SurfaceMotions {
     }
 
     /// Records that this collider's surface, sampled by `before`, is sampled anew.
-    pub(crate) fn record_sampled(&mut self, collider: ColliderHandle, before: Snapshot) {
+    pub(crate) fn record_sampled(&mut self, collider: ColliderHandle, mut before: Snapshot) {
         self.forget_velocities(collider);
         self.changed_at.insert(collider, self.steps);
         match self.sampled.iter_mut().find(|m| m.collider == collider) {
             // Twice since the last step: what lay before the first time counts.
             Some(motion) if motion.pace.age == 0 => self.spare_snapshots.push(before),
             Some(motion) => {
+                before.base_from_points = motion.base_from_points;
                 let earlier = std::mem::replace(&mut motion.before, before);
                 self.spare_snapshots.extend(motion.earlier.replace(earlier));
                 motion.pace = Pace {
@@ -163,6 +166,7 @@ impl SurfaceMotions {
                 collider,
                 before,
                 earlier: None,
+                base_from_points: Pose::IDENTITY,
                 pace: Pace {
                     age: 0,
                     interval: 1,
@@ -189,8 +193,22 @@ impl SurfaceMotions {
         }
     }
 
-    /// Takes over what concerns contacts from the parameters of the step to come.
-    pub(crate) fn prepare(&mut self, integration: &IntegrationParameters) {
+    /// Takes over what concerns contacts from the parameters of the step to come, and where points lie that are new in it.
+    pub(crate) fn prepare(
+        &mut self,
+        integration: &IntegrationParameters,
+        bodies: &RigidBodySet,
+        colliders: &ColliderSet,
+    ) {
+        for motion in self.sampled.iter_mut().filter(|m| m.pace.age == 0) {
+            if let Some(collider) = colliders.get(motion.collider) {
+                motion.base_from_points = base_from_collider(collider, bodies);
+            }
+            // Where the first points were is not known.
+            if motion.earlier.is_none() {
+                motion.before.base_from_points = motion.base_from_points;
+            }
+        }
         let substep = integration.dt / integration.num_solver_iterations as f32;
         let softness = [
             integration.contact_softness,
@@ -253,14 +271,24 @@ impl SurfaceMotions {
             return pose.rotation * mean_near(shape.cloud(), &motion.velocities, local);
         }
         let sampled = (self.sampled.iter()).find(|m| m.collider == collider && m.pace.is_moving());
-        match sampled.and_then(|m| Some(([m.earlier.as_ref()?, &m.before], m.pace.interval))) {
-            Some((old, interval)) if self.dt > 0.0 => {
+        match sampled.and_then(|m| Some((m, m.earlier.as_ref()?))) {
+            Some((motion, earlier)) if self.dt > 0.0 => {
                 let normal_in_cloud = pose.rotation.inverse() * normal;
-                let way = way_along(shape.cloud(), old, local, normal_in_cloud);
-                way / (interval as f32 * self.dt) * normal
+                let now = (shape.cloud(), &motion.base_from_points);
+                let way = way_along(now, [earlier, &motion.before], local, normal_in_cloud);
+                way / (motion.pace.interval as f32 * self.dt) * normal
             }
             _ => Vector::ZERO,
         }
+    }
+}
+
+/// Pose of a collider as seen from what carries it: its body, whose velocity rapier knows, or else the world.
+fn base_from_collider(collider: &Collider, bodies: &RigidBodySet) -> Pose {
+    let of_body = parent_of(collider, bodies).filter(|body| body.is_dynamic_or_kinematic());
+    match (of_body, collider.position_wrt_parent()) {
+        (Some(_), Some(offset)) => *offset,
+        _ => pose_of(collider, bodies),
     }
 }
 

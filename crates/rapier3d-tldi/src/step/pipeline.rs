@@ -187,7 +187,7 @@ impl TldiPipeline {
         if let Some((count, first)) = shared.take_failures() {
             log::warn!("{count} comparisons outside of a step failed; the first: {first}");
         }
-        self.motions.prepare(integration);
+        self.motions.prepare(integration, bodies, colliders);
         // Taken out and put back: no lock is held during the comparison.
         let mut batch = std::mem::take(&mut *shared.batch_mut());
         batch.clear();

@@ -17,10 +17,8 @@ const STAND_IN_RADIUS: f32 = 1.0;
 /// where the sensor was in the frame. A frame without points disables the collider: there are no
 /// contacts, what rested on it wakes, and the collider keeps no point.
 ///
-/// The collider has no body and is at the origin of the world. It may be moved, to a place near the sensor
-/// where coordinates are large (see [`CloudError::CoordinateTooLarge`]), but not in every frame: what stands still would seem to
-/// move. Its friction and
-/// groups are set as those of any other.
+/// The collider has no body and is at the origin of the world. It may be moved with the sensor, before a frame, where
+/// coordinates are large (see [`CloudError::CoordinateTooLarge`]). Its friction and groups are set as those of any other.
 ///
 /// ```
 /// use rapier3d::prelude::*;

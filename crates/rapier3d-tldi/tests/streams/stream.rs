@@ -428,3 +428,48 @@ fn radii_may_come_with_a_frame() -> TestResult {
     assert!(cloud_of(&world, &stream).max_radius() < 0.1);
     Ok(())
 }
+
+/// A box lies on a floor that rises at `floor_speed` m/s. A camera that turns and flies down at 3 m/s sees the floor for a second;
+/// the stream's collider is always where the camera is. Returns the largest speed of the box, m/s.
+fn speed_seen_from_a_camera(floor_speed: f32) -> Result<f32, Box<dyn std::error::Error>> {
+    let (mut world, mut tldi) = attached();
+    let recipe = CloudRecipe {
+        radii: RadiusRule::Global(SPACING),
+        ..CloudRecipe::default()
+    };
+    let mut stream = CloudStream::new(&mut world.colliders, recipe)?;
+    let above = RigidBodyBuilder::dynamic().translation(0.2 * Vector::Y);
+    let (body, _) = world.insert(above, ColliderBuilder::cuboid(0.2, 0.2, 0.2));
+    let dt = world.integration_parameters.dt;
+    let (mut rng, mut fastest) = (Rng::with_seed(4), 0.0_f32);
+    for k in 0..60 {
+        let seconds = k as f32 * dt;
+        let turn = Rotation::from_rotation_z(0.5 * seconds);
+        let camera = Pose::from_parts((4.0 - 3.0 * seconds) * Vector::Y, turn);
+        let sensor_from_world = camera.inverse();
+        let moved = Vector::new(0.01 * rng.f32(), floor_speed * seconds, 0.01 * rng.f32());
+        let floor = square(1.2);
+        let seen: Vec<Vector> = (floor.iter().map(|p| sensor_from_world * (*p + moved))).collect();
+        world.colliders[stream.collider()].set_position(camera);
+        stream.frame(
+            &mut tldi,
+            &world.bodies,
+            &mut world.colliders,
+            &seen,
+            &camera,
+        )?;
+        tldi.step(&mut world)?;
+        fastest = fastest.max(world.bodies[body].linvel().length());
+    }
+    Ok(fastest)
+}
+
+/// What stands still in the world does not move because the camera does, and what moves has its own speed.
+#[test]
+fn a_moving_camera_moves_nothing() -> TestResult {
+    let still = speed_seen_from_a_camera(0.0)?;
+    assert!(still < 0.1, "{still} m/s");
+    let rising = speed_seen_from_a_camera(2.0)?;
+    assert!((1.5..3.0).contains(&rising), "{rising} m/s");
+    Ok(())
+}
