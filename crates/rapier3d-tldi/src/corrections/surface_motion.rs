@@ -10,6 +10,7 @@
 use crate::PointCloudShape;
 use crate::corrections::sampled_motion::{Snapshot, way_along};
 use crate::step::candidates::{parent_of, pose_of};
+use crate::step::prepared::Shared;
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodyHandle, RigidBodySet};
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet, SolverFlags};
 use rapier3d::math::{Pose, Vector};
@@ -319,7 +320,8 @@ fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector
     if total > 0.0 { sum / total } else { nearest.1 }
 }
 
-/// Hooks around the user's own, which give the velocities of deforming clouds to rapier's solver.
+/// Hooks around the user's own, which give the velocities of deforming clouds to rapier's solver, and let sweeps (CCD) pass
+/// pairs whose contacts the user's hooks take away.
 /// Get them from [`TldiPipeline::hooks`](crate::TldiPipeline::hooks).
 ///
 /// ```
@@ -343,6 +345,7 @@ fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector
 /// ```
 pub struct TldiHooks<'a> {
     pub(crate) motions: &'a SurfaceMotions,
+    pub(crate) shared: &'a Shared,
     pub(crate) inner: &'a dyn PhysicsHooks,
 }
 
@@ -385,6 +388,14 @@ impl PhysicsHooks for TldiHooks<'_> {
                 }
             }
         }
+        let has_contacts = |context: &ContactModificationContext<'_>| {
+            let rigid = context.rigid();
+            rigid.is_some_and(|rigid| !rigid.solver_contacts.is_empty())
+        };
+        let had_contacts = has_contacts(context);
         self.inner.modify_solver_contacts(context);
+        if had_contacts && !has_contacts(context) {
+            self.shared.batch().let_through([collider1, collider2]);
+        }
     }
 }

@@ -8,15 +8,19 @@
 //! as it is, until the trough has closed over it. So the body loses the part of its velocity that points into the slope,
 //! as in an impact without friction and rebound.
 //!
+//! **Let through.** A user's hook may take the contacts of a pair away, as a one-way platform does. Rapier does not sweep its own
+//! shapes while they touch, and a sweep must not hold such a pair either.
+//!
 //! Rapier does not name the colliders of a sweep. They are found by their shapes, by the pose of the moving one at the
 //! beginning of the step, and by the place of its target.
 
 use crate::corrections::impulses::{PushedPoint, may_separate, separate};
 use crate::step::prepared::{Batch, Blocked, PreparedPair, Question, address, locked};
 use rapier3d::dynamics::RigidBodySet;
-use rapier3d::geometry::{Collider, ColliderSet};
+use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::Pose;
 use rapier3d::parry::shape::Shape;
+use std::sync::atomic::Ordering;
 use tldi::Penetration;
 
 /// A pair that rapier sweeps: what moves, and its target.
@@ -73,6 +77,19 @@ impl Batch {
             },
             depth,
         })
+    }
+
+    /// Records that the user's hooks took the contacts of the colliders away.
+    pub(crate) fn let_through(&self, colliders: [ColliderHandle; 2]) {
+        if let Some(pair) = (self.pairs.iter()).find(|pair| pair.colliders == colliders) {
+            pair.is_let_through.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Whether they did so for a swept pair.
+    pub(crate) fn lets_through(&self, swept: &SweptPair<'_>) -> bool {
+        let pair = self.swept(swept);
+        pair.is_some_and(|(pair, _)| pair.is_let_through.load(Ordering::Relaxed))
     }
 
     /// Records that a swept pair is held where it is; the normal is from the first shape towards the second.
@@ -141,6 +158,7 @@ mod tests {
                     point: Vector::ZERO,
                     normal: Vector::Y,
                 })),
+                is_let_through: AtomicBool::new(false),
                 is_kept: false,
                 measured: None,
                 shapes: [ground, ball],
@@ -205,6 +223,7 @@ mod tests {
                 parts: first..batch.parts.len(),
                 used: AtomicBool::new(true),
                 blocked: Mutex::default(),
+                is_let_through: AtomicBool::new(false),
                 is_kept: false,
                 measured: None,
                 shapes: [tile.clone(), body.clone()],

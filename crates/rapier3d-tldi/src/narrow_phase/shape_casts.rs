@@ -96,6 +96,9 @@ pub(crate) fn cast_shapes_nonlinear(
         shapes,
         poses: [motions[0].start, motions[1].start],
     };
+    if shared.batch().lets_through(&swept) {
+        return Ok(None);
+    }
     first_of_parts(&pair, |parts, indices, [pose1, pose2]| {
         let motions = [motions[0].prepend(pose1), motions[1].prepend(pose2)];
         if has_cloud(parts[0]) || has_cloud(parts[1]) {

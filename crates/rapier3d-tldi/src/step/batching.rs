@@ -79,6 +79,7 @@ impl<'a> Frame<'a> {
                 parts: first_part..batch.parts.len(),
                 used: AtomicBool::new(false),
                 blocked: Mutex::default(),
+                is_let_through: AtomicBool::new(false),
                 is_kept: kept.is_some(),
                 measured: kept.or_else(|| match question {
                     Question::Contacts(_) => Measured::new(&pair, self.config),
@@ -372,6 +373,7 @@ mod tests {
                 parts: 0..1,
                 used: AtomicBool::new(true),
                 blocked: Mutex::default(),
+                is_let_through: AtomicBool::new(false),
                 is_kept: false,
                 measured: None,
                 shapes: [shape.clone(), shape.clone()],

@@ -86,6 +86,8 @@ pub(crate) struct PreparedPair {
     pub(crate) used: AtomicBool,
     /// Where a sweep held it in this step, though its contacts let it go on.
     pub(crate) blocked: Mutex<Option<Blocked>>,
+    /// Whether the user's hooks took all contacts of a manifold away in this step: sweeps let it through, too.
+    pub(crate) is_let_through: AtomicBool,
     /// It is not compared: the manifolds that rapier has are expected to hold.
     pub(crate) is_kept: bool,
     /// The measurement that this is, or the earlier one that holds.

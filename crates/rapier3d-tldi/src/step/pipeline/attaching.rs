@@ -115,6 +115,7 @@ impl TldiPipeline {
     pub fn hooks<'a>(&'a self, inner: &'a dyn PhysicsHooks) -> TldiHooks<'a> {
         TldiHooks {
             motions: &self.motions,
+            shared: &self.shared,
             inner,
         }
     }
