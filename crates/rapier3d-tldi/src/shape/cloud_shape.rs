@@ -282,9 +282,7 @@ impl PointCloudShape {
         } else {
             let mut cloud = self.cloud().clone();
             change(&mut cloud)?;
-            let mut content = Content::new(cloud, self.mass_model());
-            content.unit_mass = self.content.unit_mass.clone();
-            self.content = Arc::new(content);
+            self.set_cloud(cloud);
         }
         Ok(())
     }

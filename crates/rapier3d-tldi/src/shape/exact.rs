@@ -9,13 +9,12 @@ mod convex;
 mod distance;
 mod line;
 mod mesh;
-mod projection;
 mod sampled;
 mod triangle;
 mod voxels;
 
+use distance::Projection;
 use line::Line;
-use projection::Projection;
 use rapier3d::glamx::{DVec3, Vec3};
 use rapier3d::parry::shape::{
     Ball, Capsule, Cone, ConvexPolyhedron, Cuboid, Cylinder, HalfSpace, Segment, Shape, Triangle,

@@ -143,6 +143,16 @@ struct Moments {
 }
 
 impl Moments {
+    /// Zero, about a point near the middle, so that sums lose no digits far from the cloud's origin.
+    fn about_middle(surfels: &[Surfel]) -> Self {
+        Self {
+            volume: 0.0,
+            first: DVec3::ZERO,
+            second: DMat3::ZERO,
+            origin: surfels.iter().map(|s| s.position).sum::<DVec3>() / surfels.len() as f64,
+        }
+    }
+
     /// ∫ x xᵀ dV about the centre of mass, in m⁵.
     fn central(&self) -> DMat3 {
         self.second - outer(self.first, self.first) * self.volume.recip()
@@ -167,27 +177,17 @@ impl Moments {
     }
 }
 
+/// The matrix a bᵀ.
 fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
-/// A point near the middle, so that moments lose no digits far from the cloud's origin.
-fn middle(surfels: &[Surfel]) -> DVec3 {
-    surfels.iter().map(|s| s.position).sum::<DVec3>() / surfels.len() as f64
-}
-
 /// The moments of a sheet.
 fn shell(surfels: &[Surfel], thickness: f64) -> Moments {
-    let origin = middle(surfels);
-    let mut moments = Moments {
-        volume: 0.0,
-        first: DVec3::ZERO,
-        second: DMat3::ZERO,
-        origin,
-    };
+    let mut moments = Moments::about_middle(surfels);
     for surfel in surfels {
         let volume = surfel.area * thickness;
-        let p = surfel.position - origin;
+        let p = surfel.position - moments.origin;
         moments.volume += volume;
         moments.first += volume * p;
         // A patch has an extent of its own, which alone keeps a single point's inertia above zero.
@@ -200,21 +200,19 @@ fn shell(surfels: &[Surfel], thickness: f64) -> Moments {
 
 /// The moments of the enclosed solid, or `None` if the surfels do not enclose one.
 fn solid(surfels: &[Surfel], mean_radius: f64) -> Option<Moments> {
-    let origin = middle(surfels);
+    let mut moments = Moments::about_middle(surfels);
     let mut area = 0.0;
     let mut vector_area = DVec3::ZERO;
-    let mut volume = 0.0;
-    let mut first = DVec3::ZERO;
-    let mut second = DMat3::ZERO;
     for surfel in surfels {
-        let p = surfel.position - origin;
+        let p = surfel.position - moments.origin;
         let flux = surfel.area * surfel.normal;
         area += surfel.area;
         vector_area += flux;
-        volume += p.dot(flux) / 3.0;
-        first += 0.5 * p * p * flux;
+        moments.volume += p.dot(flux) / 3.0;
+        moments.first += 0.5 * p * p * flux;
         // ∫ x² dV = ⅓ ∮ x³ n_x dA; ∫ xy dV = ½ ∮ x² y n_x dA = ½ ∮ x y² n_y dA: their mean.
         let squares = p * p * flux;
+        let second = &mut moments.second;
         for i in 0..3 {
             second.col_mut(i)[i] += p[i] * squares[i] / 3.0;
             let j = (i + 1) % 3;
@@ -223,13 +221,7 @@ fn solid(surfels: &[Surfel], mean_radius: f64) -> Option<Moments> {
             second.col_mut(j)[i] += product;
         }
     }
-    let closed = vector_area.length() < OPEN * area && volume > FLAT * mean_radius * area;
-    let moments = Moments {
-        volume,
-        first,
-        second,
-        origin,
-    };
+    let closed = vector_area.length() < OPEN * area && moments.volume > FLAT * mean_radius * area;
     // A few points can pass for closed; a solid has an extent along every axis.
     let extents = DSymmetricEigen3::new(moments.central()).eigenvalues;
     (closed && extents.min_element() > 0.0).then_some(moments)

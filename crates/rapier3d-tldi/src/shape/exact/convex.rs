@@ -1,8 +1,7 @@
 //! Rays through convex solids: one entry, one exit.
 
-use super::distance;
+use super::distance::{self, Projection};
 use super::line::Line;
-use super::projection::Projection;
 use rapier3d::glamx::DVec3;
 use rapier3d::parry::shape::{Ball, ConvexPolyhedron, Cuboid, HalfSpace};
 use tldi::RayHit;
@@ -26,9 +25,8 @@ pub(super) fn cuboid(shape: &Cuboid, line: &Line, hits: &mut Vec<RayHit>) {
         return;
     };
     for ((t, axis), side) in [(entry, -1.0), (exit, 1.0)] {
-        let mut normal = DVec3::ZERO;
-        normal[axis] = side * line.direction[axis].signum();
-        line.push(t, normal, hits);
+        let component = side * line.direction[axis].signum();
+        line.push(t, distance::along_axis(axis, component), hits);
     }
 }
 

@@ -1,8 +1,17 @@
 //! Exact signed distance functions, in `f64`.
 
-use super::projection::Projection;
 use super::triangle;
 use rapier3d::glamx::{DVec2, DVec3};
+
+/// Signed distance and outward unit normal at the nearest point of the surface.
+pub(super) type Projection = (f64, DVec3);
+
+/// The vector along an axis with this component.
+pub(super) fn along_axis(axis: usize, component: f64) -> DVec3 {
+    let mut vector = DVec3::ZERO;
+    vector[axis] = component;
+    vector
+}
 
 /// Grows a solid by `border` metres.
 pub(super) fn rounded((distance, normal): Projection, border: f32) -> Projection {
@@ -24,9 +33,7 @@ pub(super) fn cuboid(point: DVec3, half_extents: DVec3) -> Projection {
         return (outside.length(), normal * sign);
     }
     let axis = beyond.max_position();
-    let mut normal = DVec3::ZERO;
-    normal[axis] = sign[axis];
-    (beyond[axis], normal)
+    (beyond[axis], along_axis(axis, sign[axis]))
 }
 
 /// A segment without thickness: the distance is never negative.

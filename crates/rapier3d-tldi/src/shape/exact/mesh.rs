@@ -1,9 +1,10 @@
 //! Triangle meshes and height fields.
 
+use super::distance::Projection;
 use super::line::Line;
-use super::projection::Projection;
 use super::triangle::{self, ShearedLine};
 use rapier3d::glamx::{DVec3, Vec3};
+use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::partitioning::BvhNode;
 use rapier3d::parry::shape::{HeightField, TriMesh, TriMeshFlags, Triangle};
 use tldi::RayHit;
@@ -19,6 +20,11 @@ const STRAIGHT: f64 = 1.0 - 1e-10;
 /// Part of a place's coordinates by which it is rounded. What is shorter has no direction.
 const NOTHING: f64 = 1e-12;
 
+/// By how much boxes are grown for a mesh or height field with these bounds, metres.
+fn margin_of(bounds: &Aabb) -> f64 {
+    ROUNDING * f64::from(bounds.mins.abs().max(bounds.maxs.abs()).max_element())
+}
+
 pub(super) fn cross_triangle(shape: &Triangle, line: &Line, hits: &mut Vec<RayHit>) {
     let vertices = triangle::vertices(shape);
     if let Some(t) = ShearedLine::new(line).crossing(vertices) {
@@ -28,10 +34,8 @@ pub(super) fn cross_triangle(shape: &Triangle, line: &Line, hits: &mut Vec<RayHi
 
 pub(super) fn cross_trimesh(mesh: &TriMesh, line: &Line, hits: &mut Vec<RayHit>) {
     let sheared = ShearedLine::new(line);
-    let aabb = mesh.local_aabb();
-    let margin = ROUNDING * f64::from(aabb.mins.abs().max(aabb.maxs.abs()).max_element());
+    let margin = DVec3::splat(margin_of(&mesh.local_aabb()));
     let near = |node: &BvhNode| {
-        let margin = DVec3::splat(margin);
         line.clip(
             node.mins().as_dvec3() - margin,
             node.maxs().as_dvec3() + margin,
@@ -90,11 +94,7 @@ pub(super) fn project_on_trimesh(mesh: &TriMesh, point: DVec3) -> Projection {
         return signed(point, foot, [normal]);
     }
     let margin = ROUNDING * foot.abs().max_element();
-    let touches = |node: &BvhNode| {
-        let aabb = node.aabb();
-        let gap = (aabb.mins.as_dvec3() - foot).max(foot - aabb.maxs.as_dvec3());
-        gap.max_element() <= margin
-    };
+    let touches = |node: &BvhNode| outside(&node.aabb(), foot).max_element() <= margin;
     let normals = mesh.bvh().leaves(touches).filter_map(|id| {
         let vertices = triangle::vertices(&mesh.triangle(id));
         (foot.distance(triangle::nearest(foot, vertices)) <= margin)
@@ -141,8 +141,7 @@ fn cell_triangles(field: &HeightField, row: usize, column: usize) -> [Option<[DV
 
 pub(super) fn cross_height_field(field: &HeightField, line: &Line, hits: &mut Vec<RayHit>) {
     let aabb = field.root_aabb();
-    let margin =
-        DVec3::splat(ROUNDING * f64::from(aabb.mins.abs().max(aabb.maxs.abs()).max_element()));
+    let margin = DVec3::splat(margin_of(aabb));
     let Some([(entry, _), (exit, _)]) =
         line.clip(aabb.mins.as_dvec3() - margin, aabb.maxs.as_dvec3() + margin)
     else {
@@ -153,20 +152,16 @@ pub(super) fn cross_height_field(field: &HeightField, line: &Line, hits: &mut Ve
         return;
     }
     let sheared = ShearedLine::new(line);
-    let scale = field.scale().as_dvec3();
-    // Grid coordinates along the line: columns run along x, rows along z.
-    let column_at = |t: f64| (line.at(t).x / scale.x + 0.5) * field.ncols() as f64;
-    let row_at = |t: f64| (line.at(t).z / scale.z + 0.5) * field.nrows() as f64;
-    for column in cells(column_at(entry), column_at(exit), field.ncols()) {
+    let column_at = |t: f64| grid_place(field, line.at(t))[0];
+    let row_at = |t: f64| grid_place(field, line.at(t))[1];
+    let (c0, c1) = (column_at(entry), column_at(exit));
+    for column in cells(c0, c1, field.ncols()) {
         // The part of the line over this column.
-        let (c0, c1) = (column_at(entry), column_at(exit));
         let (mut t0, mut t1) = (entry, exit);
         if c0 != c1 {
             let t_at = |c: f64| entry + (exit - entry) * ((c - c0) / (c1 - c0)).clamp(0.0, 1.0);
-            let (ta, tb) = (
-                t_at(column as f64 - CELL_MARGIN),
-                t_at(column as f64 + 1.0 + CELL_MARGIN),
-            );
+            let ta = t_at(column as f64 - CELL_MARGIN);
+            let tb = t_at(column as f64 + 1.0 + CELL_MARGIN);
             (t0, t1) = (ta.min(tb), ta.max(tb));
         }
         for row in cells(row_at(t0), row_at(t1), field.nrows()) {
@@ -177,6 +172,15 @@ pub(super) fn cross_height_field(field: &HeightField, line: &Line, hits: &mut Ve
             }
         }
     }
+}
+
+/// Column and row at a place, with the part of the cell: columns run along x, rows along z.
+fn grid_place(field: &HeightField, place: DVec3) -> [f64; 2] {
+    let scale = field.scale().as_dvec3();
+    [
+        (place.x / scale.x + 0.5) * field.ncols() as f64,
+        (place.z / scale.z + 0.5) * field.nrows() as f64,
+    ]
 }
 
 /// Part of a cell by which ranges of cells are grown against rounding in `f32`. Half or twice: no test of shapes or
@@ -191,50 +195,42 @@ fn cells(a: f64, b: f64, count: usize) -> std::ops::RangeInclusive<usize> {
     first.min(last)..=end.min(last)
 }
 
+/// How far a point is outside of a box along each axis; 0 inside.
+fn outside(aabb: &Aabb, point: DVec3) -> DVec3 {
+    let [mins, maxs] = [aabb.mins, aabb.maxs].map(|corner| corner.as_dvec3());
+    (mins - point).max(point - maxs).max(DVec3::ZERO)
+}
+
+fn cell_bounds(field: &HeightField, row: usize, column: usize) -> Aabb {
+    let at = |i: usize, j: usize| {
+        let height = field.heights()[(i, j)] * field.scale().y;
+        Vec3::new(field.x_at(j), height, field.z_at(i))
+    };
+    let corner = |k: usize| at(row + k % 2, column + k / 2);
+    let corners = [0, 1, 2, 3].map(corner);
+    Aabb::new(
+        corners.into_iter().fold(Vec3::INFINITY, Vec3::min),
+        corners.into_iter().fold(Vec3::NEG_INFINITY, Vec3::max),
+    )
+}
+
 /// Searches the cells in rings around that below the point, until those that are left are farther than the nearest
 /// triangle found.
 pub(super) fn project_on_height_field(field: &HeightField, point: DVec3) -> Projection {
-    let scale = field.scale().as_dvec3();
     let counts = [field.ncols(), field.nrows()];
-    // Of the cell that holds a place, or of the nearest one.
-    let cell_at = |place: DVec3| {
-        let place = [place.x / scale.x, place.z / scale.z];
-        [0, 1].map(|k| (place[k] + 0.5) * counts[k] as f64)
-    };
-    let aabb = field.root_aabb();
-    let beyond = |low: f32, value: f64, high: f32| {
-        (f64::from(low) - value)
-            .max(value - f64::from(high))
-            .max(0.0)
-    };
-    let above = beyond(aabb.mins.y, point.y, aabb.maxs.y);
-    let edge = (scale.x / counts[0] as f64).min(scale.z / counts[1] as f64);
-    let first = cell_at(point);
-    let [column, row] = [0, 1].map(|k| *cells(first[k], first[k], counts[k]).start());
+    let edge = f64::from(field.cell_width().min(field.cell_height()));
+    let above = outside(field.root_aabb(), point).y;
+    let place = grid_place(field, point);
+    let below = [0, 1].map(|k| *cells(place[k], place[k], counts[k]).start());
     let mut nearest = (f64::INFINITY, None);
     for ring in 0..counts[0].max(counts[1]) {
-        let away = (edge * (ring as f64 - 1.0 - CELL_MARGIN)).max(0.0);
-        if away * away + above * above > nearest.0 {
+        let beside = (edge * (ring as f64 - 1.0 - CELL_MARGIN)).max(0.0);
+        if beside * beside + above * above > nearest.0 {
             break;
         }
-        for [column, row] in ring_around([column, row], ring, counts) {
-            let [left, right] = [field.x_at(column), field.x_at(column + 1)];
-            let [front, back] = [field.z_at(row), field.z_at(row + 1)];
-            let heights = [
-                (row, column),
-                (row + 1, column),
-                (row, column + 1),
-                (row + 1, column + 1),
-            ];
-            let heights = heights.map(|at| field.heights()[at] * field.scale().y);
-            let low = heights.into_iter().fold(f32::INFINITY, f32::min);
-            let high = heights.into_iter().fold(f32::NEG_INFINITY, f32::max);
-            let away = DVec3::new(
-                beyond(left, point.x, right),
-                beyond(low, point.y, high),
-                beyond(front, point.z, back),
-            );
-            if away.length_squared() > nearest.0 {
+        for [column, row] in ring_around(below, ring, counts) {
+            let bounds = cell_bounds(field, row, column);
+            if outside(&bounds, point).length_squared() > nearest.0 {
                 continue;
             }
             for vertices in cell_triangles(field, row, column).into_iter().flatten() {
@@ -249,8 +245,8 @@ pub(super) fn project_on_height_field(field: &HeightField, point: DVec3) -> Proj
         // All triangles are removed.
         return (f64::INFINITY, DVec3::Y);
     };
-    let margin = ROUNDING * f64::from(aabb.mins.abs().max(aabb.maxs.abs()).max_element());
-    let [column, row] = cell_at(foot);
+    let margin = margin_of(field.root_aabb());
+    let [column, row] = grid_place(field, foot);
     let around = cells(column, column, counts[0])
         .flat_map(|j| cells(row, row, counts[1]).map(move |i| (i, j)));
     let normals = around

@@ -1,7 +1,7 @@
 //! Shapes known only through their own ray casts and projections.
 
+use super::distance::Projection;
 use super::line::Line;
-use super::projection::Projection;
 use rapier3d::glamx::{DVec3, Vec3};
 use rapier3d::parry::query::Ray;
 use rapier3d::parry::shape::{FeatureId, Shape};

@@ -1,7 +1,7 @@
 //! Voxels: the boundary of the filled cells, without the faces between them.
 
+use super::distance::{Projection, along_axis};
 use super::line::Line;
-use super::projection::Projection;
 use rapier3d::glamx::{DVec3, IVec3, Vec3};
 use rapier3d::parry::query::PointQuery;
 use rapier3d::parry::shape::Voxels;
@@ -31,9 +31,8 @@ pub(super) fn crossings(voxels: &Voxels, line: &Line, hits: &mut Vec<RayHit>) {
         return;
     }
     let normal = |axis: usize, entering: bool| {
-        let mut normal = DVec3::ZERO;
-        normal[axis] = line.direction[axis].signum() * if entering { -1.0 } else { 1.0 };
-        normal
+        let side = if entering { -1.0 } else { 1.0 };
+        along_axis(axis, line.direction[axis].signum() * side)
     };
     let mut key = (line.at(t) / size)
         .floor()
@@ -87,9 +86,7 @@ pub(super) fn project(voxels: &Voxels, point: Vec3) -> Projection {
         // On a face: the one that the point is on.
         let offset = (p - 0.5 * (low + high)) / size;
         let axis = offset.abs().max_position();
-        let mut normal = DVec3::ZERO;
-        normal[axis] = offset[axis].signum();
-        normal
+        along_axis(axis, offset[axis].signum())
     });
     (delta.length(), normal)
 }

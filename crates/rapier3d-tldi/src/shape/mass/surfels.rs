@@ -1,6 +1,7 @@
 //! Turns a cloud into small flat patches.
 
 use super::orient::orient;
+use super::outer;
 use super::surfel::{NEIGHBORS, Surfel};
 use rapier3d::glamx::{DMat3, DSymmetricEigen3, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -115,7 +116,7 @@ fn fitted_normal(points: &[Vec3], neighbors: &[Neighbor]) -> DVec3 {
     let mut covariance = DMat3::ZERO;
     for position in positions() {
         let d = position - mean;
-        covariance += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+        covariance += outer(d, d);
     }
     let eigen = DSymmetricEigen3::new(covariance);
     let least = eigen.eigenvalues.min_position();

@@ -1,7 +1,7 @@
-//! How far an exact surface is at least, by grids of cells.
+//! Bounds of the distance from an exact surface, by grids of cells.
 //!
-//! To ask a surface for a distance is expensive. The distance at the middle of a cell bounds all others in it: a place
-//! is nearer by no more than it is away from the middle. So coarse cells are asked first, and finer ones only where
+//! To ask a surface for a distance is expensive. The distance at the middle of a cell bounds all others in it: it differs
+//! by no more than a place is away from the middle. So coarse cells are asked first, and finer ones only where
 //! the surface may be near. Each cell is asked once.
 
 use crate::Aabb;
@@ -71,14 +71,14 @@ impl CellDistances {
         }
     }
 
-    /// How far the surface is at least from a place, metres: by the first cells that say more than `enough`, or by the
-    /// finest ones. Minus infinity beside all cells.
-    pub(crate) fn at_least(&mut self, exact: &Placed, place: Vec3, enough: f32) -> f32 {
+    /// How far the surface is from a place, metres, at least and at most: by the first cells that say more than `enough`, or
+    /// by the finest ones. Nothing is known beside all cells.
+    pub(crate) fn bounds(&mut self, exact: &Placed, place: Vec3, enough: f32) -> [f32; 2] {
         let folded = self.fold.folded(place);
-        let mut least = f32::NEG_INFINITY;
+        let mut bounds = [f32::NEG_INFINITY, f32::INFINITY];
         let levels = &mut self.levels[..self.count];
         let Some(finest) = (levels.first()).and_then(|level| level.grid.cell(folded)) else {
-            return least;
+            return bounds;
         };
         for (k, level) in levels.iter_mut().enumerate().rev() {
             let at = finest.map(|c| c >> (k as u32 * FINER.ilog2()));
@@ -92,12 +92,12 @@ impl CellDistances {
                 cell.distance = exact.project(cell.middle).0;
                 away = cell.middle.distance(place);
             }
-            least = cell.distance - away;
-            if least > enough {
+            bounds = [cell.distance - away, cell.distance + away];
+            if bounds[0] > enough {
                 break;
             }
         }
-        least
+        bounds
     }
 }
 
@@ -147,6 +147,10 @@ mod tests {
                     least <= distance + rounding,
                     "{least} of {distance} at {place}"
                 );
+                assert!(
+                    most >= distance - rounding,
+                    "{most} of {distance} at {place}"
+                );
                 [least, distance]
             };
             between.iter().map(&mut bound).for_each(drop);
@@ -169,7 +173,7 @@ mod tests {
         let exact = ball.here();
         let mut cells = CellDistances::default();
         cells.begin(points.iter().copied(), 1.0);
-        let near = |place: &&Vec3| cells.at_least(&exact, **place, 1.0) <= 1.0;
+        let near = |place: &&Vec3| cells.bounds(&exact, **place, 1.0)[0] <= 1.0;
         let near = points.iter().filter(near).count();
         let asked = ball.asked();
         assert!((1..200).contains(&near), "{near}");
@@ -181,9 +185,10 @@ mod tests {
         let ball = TestSurface::ball();
         let exact = ball.here();
         let mut cells = CellDistances::default();
-        assert_eq!(cells.at_least(&exact, Vec3::ZERO, 1.0), f32::NEG_INFINITY);
+        let unknown = [f32::NEG_INFINITY, f32::INFINITY];
+        assert_eq!(cells.bounds(&exact, Vec3::ZERO, 1.0), unknown);
         cells.begin([Vec3::ZERO, Vec3::ONE].into_iter(), REACH);
         let beside = Vec3::new(0.5, 0.5, 1.5);
-        assert_eq!(cells.at_least(&exact, beside, 1.0), f32::NEG_INFINITY);
+        assert_eq!(cells.bounds(&exact, beside, 1.0), unknown);
     }
 }

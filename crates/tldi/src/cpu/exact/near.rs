@@ -71,7 +71,7 @@ impl Side {
         for i in 0..self.points.len() {
             let further = self.points.further(i);
             let within = reach + beyond + (1.0 + normals::SUPPORT) * further;
-            let least = cells.at_least(exact, self.points.point(i), within);
+            let [least, _] = cells.bounds(exact, self.points.point(i), within);
             if least <= within {
                 self.support.push(i as u32);
                 if least <= reach + further {

@@ -58,8 +58,8 @@ impl Placed<'_> {
                 return false;
             }
             let place = camera.point_at(u, v, depth);
-            let mut distance = cells.at_least(self, place, near);
-            if distance <= near {
+            let [mut distance, most] = cells.bounds(self, place, near);
+            if distance <= near && most > near {
                 (distance, _) = self.project(place);
             }
             let free = distance - reach;
