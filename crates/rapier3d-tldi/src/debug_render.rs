@@ -2,19 +2,18 @@
 
 use crate::narrow_phase::manifolds;
 use crate::narrow_phase::parts::{
-    Hint, PartPair, ShapePair, append_part_pairs, append_queries, cloud_of, has_cloud, part,
-    part_count, within_reach,
+    PartPair, ShapePair, cloud_of, has_cloud, part, part_count, within_reach,
 };
-use crate::shape::exact::ExactShape;
 use crate::step::candidates::{contact_reach, pose_of};
+use crate::step::prepared::Spot;
 use crate::step::report::cloud_pairs;
 use crate::{PointCloudShape, TldiError, TldiPipeline};
 use rapier3d::dynamics::{IntegrationParameters, RigidBodySet};
-use rapier3d::geometry::{Collider, ColliderSet, ContactPair, NarrowPhase};
+use rapier3d::geometry::{Collider, ColliderSet, NarrowPhase};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::bounding_volume::{Aabb, BoundingVolume};
 use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject, PhysicsWorld};
-use tldi::{Backend, CpuBackend, PairQuery, PairResult, VirtualCamera};
+use tldi::{Backend, CpuBackend, PairResult, VirtualCamera};
 
 bitflags::bitflags! {
     /// What [`TldiPipeline::debug_render`] draws.
@@ -210,7 +209,7 @@ impl TldiPipeline {
         if mode == TldiDebugRenderMode::POINTS || mode.is_empty() {
             return Ok(());
         }
-        let mut comparison = Comparison::default();
+        let mut spot = Spot::default();
         for pair in cloud_pairs(narrow_phase, colliders) {
             let ends = colliders
                 .get(pair.collider1)
@@ -229,89 +228,29 @@ impl TldiPipeline {
                 pos12: pose1.inv_mul(&pose_of(collider2, bodies)),
                 prediction: contact_reach(collider1, collider2, bodies, integration),
             };
-            comparison.compare(self, pair, &shapes)?;
+            if !within_reach(
+                shapes.shape1,
+                shapes.shape2,
+                &shapes.pos12,
+                shapes.prediction,
+            ) {
+                continue;
+            }
+            spot.compare(shapes, &self.config(), CpuBackend::compare)
+                .map_err(|source| TldiError::Pair {
+                    collider1: pair.collider1,
+                    collider2: pair.collider2,
+                    source,
+                })?;
             let mut drawing = Drawing {
                 shapes: &shapes,
                 pose1,
                 object,
                 backend: &mut *backend,
             };
-            comparison.draw(mode, &mut drawing);
+            drawing.draw(mode, &spot);
         }
         Ok(())
-    }
-}
-
-/// A comparison of one pair, with memory for the next.
-#[derive(Default)]
-struct Comparison {
-    backend: CpuBackend,
-    parts: Vec<PartPair>,
-    results: Vec<PairResult>,
-    /// Pixel sizes of the queries, metres.
-    pixel_sizes: Vec<f32>,
-}
-
-impl Comparison {
-    fn compare(
-        &mut self,
-        pipeline: &TldiPipeline,
-        pair: &ContactPair,
-        shapes: &ShapePair<'_>,
-    ) -> Result<(), TldiError> {
-        self.parts.clear();
-        self.pixel_sizes.clear();
-        if !within_reach(
-            shapes.shape1,
-            shapes.shape2,
-            &shapes.pos12,
-            shapes.prediction,
-        ) {
-            return Ok(());
-        }
-        let mut sides: Vec<[ExactShape<'_>; 2]> = Vec::new();
-        let config = pipeline.config();
-        append_part_pairs(*shapes, &config, &mut self.parts, &mut sides, |_, _, _| {
-            Hint::default()
-        });
-        let mut queries: Vec<PairQuery<'_>> = Vec::new();
-        append_queries(&self.parts, &sides, &mut queries);
-        self.pixel_sizes
-            .extend(queries.iter().map(|query| query.params.pixel_size));
-        let outcome = self.backend.compare(&queries, &mut self.results);
-        outcome.map_err(|source| TldiError::Pair {
-            collider1: pair.collider1,
-            collider2: pair.collider2,
-            source,
-        })
-    }
-
-    fn draw<B: DebugRenderBackend>(&self, mode: TldiDebugRenderMode, drawing: &mut Drawing<'_, B>) {
-        for part_pair in &self.parts {
-            let Some(comparison) = &part_pair.comparison else {
-                continue;
-            };
-            let result = &self.results[comparison.query];
-            let pixel_size = self.pixel_sizes[comparison.query] * result.coarser.unwrap_or(1.0);
-            let part_pose = part_pair.poses[0].unwrap_or(Pose::IDENTITY);
-            let world_from_part = drawing.pose1 * part_pose;
-            let zone = drawing.zone(part_pair);
-            if mode.contains(TldiDebugRenderMode::CONTACT_ZONE) {
-                drawing.draw_box(&zone, &world_from_part);
-            }
-            if mode.contains(TldiDebugRenderMode::CAMERAS) {
-                for view in 0..result.axes.len() {
-                    drawing.draw_camera(result, view, pixel_size, &zone, &world_from_part);
-                }
-            }
-            if mode.contains(TldiDebugRenderMode::CONTACT_PIXELS) {
-                drawing.draw_pixels(result, pixel_size, &world_from_part);
-            }
-        }
-        if mode.contains(TldiDebugRenderMode::MANIFOLDS) {
-            let largest = self.pixel_sizes.iter().copied().fold(0.0, f32::max);
-            drawing.draw_manifolds(&self.parts, &self.results, NORMAL_PIXELS * largest);
-        }
     }
 }
 
@@ -325,6 +264,34 @@ struct Drawing<'a, B> {
 }
 
 impl<B: DebugRenderBackend> Drawing<'_, B> {
+    fn draw(&mut self, mode: TldiDebugRenderMode, spot: &Spot) {
+        let mut largest_pixel = 0.0;
+        for part_pair in &spot.parts {
+            let Some(comparison) = &part_pair.comparison else {
+                continue;
+            };
+            largest_pixel = f32::max(largest_pixel, comparison.pixel_size());
+            let result = &spot.results[comparison.query];
+            let pixel_size = comparison.pixel_size() * result.coarser.unwrap_or(1.0);
+            let world_from_part = part_pair.world_from_a(&self.pose1);
+            let zone = self.zone(part_pair);
+            if mode.contains(TldiDebugRenderMode::CONTACT_ZONE) {
+                self.draw_box(&zone, &world_from_part);
+            }
+            if mode.contains(TldiDebugRenderMode::CAMERAS) {
+                for view in 0..result.axes.len() {
+                    self.draw_camera(result, view, pixel_size, &zone, &world_from_part);
+                }
+            }
+            if mode.contains(TldiDebugRenderMode::CONTACT_PIXELS) {
+                self.draw_pixels(result, pixel_size, &world_from_part);
+            }
+        }
+        if mode.contains(TldiDebugRenderMode::MANIFOLDS) {
+            self.draw_manifolds(&spot.parts, &spot.results, NORMAL_PIXELS * largest_pixel);
+        }
+    }
+
     fn line(&mut self, pose: &Pose, [a, b]: [Vector; 2], color: DebugColor) {
         self.backend
             .draw_line(self.object, *pose * a, *pose * b, color);

@@ -184,11 +184,8 @@ impl QueryDispatcher for TldiDispatcher {
             pos12: *pos12,
             prediction: 0.0,
         };
-        let crosses = |pair: &PartPair, results: &[PairResult]| match &pair.comparison {
-            Some(comparison) => {
-                let result = &results[comparison.query];
-                result.collides || result.gap.is_some_and(|gap| gap <= 0.0)
-            }
+        let crosses = |pair: &PartPair, results: &[PairResult]| match pair.result(results) {
+            Some(result) => result.collides || result.gap.is_some_and(|gap| gap <= 0.0),
             None => DefaultQueryDispatcher
                 .intersection_test(
                     &pair.a_from_b,

@@ -197,6 +197,11 @@ impl Comparison {
         }
     }
 
+    /// Edge of a pixel that is asked for, metres.
+    pub(crate) fn pixel_size(&self) -> f32 {
+        self.params.pixel_size
+    }
+
     /// Distance in metres up to which a contact point counts as the one of the step before.
     pub(crate) fn match_distance(&self) -> f32 {
         self.params.prediction.max(2.0 * self.params.pixel_size)

@@ -166,9 +166,9 @@ pub(crate) fn contact(
 fn deepest(pair: &ShapePair<'_>, parts: &[PartPair], results: &[PairResult]) -> Option<Contact> {
     let contacts = parts.iter().filter_map(|part_pair| {
         let pose1 = part_pair.poses[0].unwrap_or(Pose::IDENTITY);
-        let (points, normal, distance) = match &part_pair.comparison {
-            Some(comparison) => {
-                let patches = results[comparison.query].patches.iter();
+        let (points, normal, distance) = match part_pair.result(results) {
+            Some(result) => {
+                let patches = result.patches.iter();
                 let points = patches.flat_map(|patch| patch.points.iter().map(move |p| (patch, p)));
                 let (patch, point) = points.min_by(|p, q| p.1.gap.total_cmp(&q.1.gap))?;
                 ([point.point_a, point.point_b], patch.normal, point.gap)

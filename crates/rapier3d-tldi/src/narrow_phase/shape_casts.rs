@@ -40,21 +40,19 @@ pub(crate) fn cast_shapes(
     first_of_parts(pair, |parts, _, [pose1, pose2]| {
         let pos12 = pose1.inv_mul(&(pair.pos12 * pose2));
         let velocity = pose1.rotation.inverse() * velocity12;
-        if has_cloud(parts[0]) || has_cloud(parts[1]) {
-            if !parts.into_iter().all(has_surface) {
-                return Err(Unsupported);
-            }
-            let moving = Moving::new(parts);
-            let (a_from_b, velocity) = if moving.is_swapped {
-                let inverse = pos12.inverse();
-                (inverse, inverse.rotation * -velocity)
-            } else {
-                (pos12, velocity)
-            };
-            let hit = straight_impact(shared, &moving, a_from_b, velocity, options);
-            return Ok(hit.map(|hit| moving.restore(hit)));
+        if !is_ours(parts)? {
+            let [part1, part2] = parts;
+            return DefaultQueryDispatcher.cast_shapes(&pos12, velocity, part1, part2, options);
         }
-        DefaultQueryDispatcher.cast_shapes(&pos12, velocity, parts[0], parts[1], options)
+        let moving = Moving::new(parts);
+        let (a_from_b, velocity) = if moving.is_swapped {
+            let inverse = pos12.inverse();
+            (inverse, inverse.rotation * -velocity)
+        } else {
+            (pos12, velocity)
+        };
+        let hit = straight_impact(shared, &moving, a_from_b, velocity, options);
+        Ok(hit.map(|hit| moving.restore(hit)))
     })
 }
 
@@ -101,40 +99,9 @@ pub(crate) fn cast_shapes_nonlinear(
     }
     first_of_parts(&pair, |parts, indices, [pose1, pose2]| {
         let motions = [motions[0].prepend(pose1), motions[1].prepend(pose2)];
-        if has_cloud(parts[0]) || has_cloud(parts[1]) {
-            if !parts.into_iter().all(has_surface) {
-                return Err(Unsupported);
-            }
+        if is_ours(parts)? {
             let moving = Moving::new(parts);
-            let motions = moving.order(motions);
-            let from_1_to_2 = if moving.is_swapped { -1.0 } else { 1.0 };
-            let found = shared.batch().penetration(&swept, indices);
-            let penetration = found.map(|found| Penetration {
-                normal: from_1_to_2 * (motions[0].start.rotation.inverse() * found.normal),
-                ..found
-            });
-            let Some(params) = moving.params(&shared.config()) else {
-                return Ok(None);
-            };
-            let turning = Turning {
-                shared,
-                moving: &moving,
-                motions: &motions,
-                params,
-                penetration,
-                end,
-                room: RefCell::default(),
-            };
-            let hit = turning.impact(start);
-            shared.tell_coarser(turning.room.borrow().coarser());
-            if let Some(hit) = hit.filter(|hit| turning.is_blocked(start, hit)) {
-                let world_from_a = motions[0].position_at_time(hit.time_of_impact);
-                let blocked = Blocked {
-                    point: world_from_a * hit.witness1,
-                    normal: from_1_to_2 * (world_from_a.rotation * hit.normal1),
-                };
-                shared.batch().block(&swept, blocked);
-            }
+            let hit = turning_impact(shared, &moving, motions, (start, end), &swept, indices);
             return Ok(hit.map(|hit| moving.restore(hit)));
         }
         DefaultQueryDispatcher.cast_shapes_nonlinear(
@@ -147,6 +114,14 @@ pub(crate) fn cast_shapes_nonlinear(
             stop_at_penetration,
         )
     })
+}
+
+/// Whether one of two parts is a cloud. Declines it if the other one has no surface.
+fn is_ours(parts: [&dyn Shape; 2]) -> Result<bool, Unsupported> {
+    match parts.into_iter().any(has_cloud) {
+        true if !parts.into_iter().all(has_surface) => Err(Unsupported),
+        is_ours => Ok(is_ours),
+    }
 }
 
 /// The earliest hit over all pairs of parts, in the frames of the wholes; `cast` gets the shapes of
@@ -202,6 +177,45 @@ fn overlap(
         subshape1: contact.subshape1,
         subshape2: contact.subshape2,
     }))
+}
+
+/// The impact of two parts with these motions, before they are ordered; their `indices` are those in the pair that is
+/// swept. Tells the batch if the second part is held there.
+fn turning_impact(
+    shared: &Shared,
+    moving: &Moving<'_>,
+    motions: [NonlinearRigidMotion; 2],
+    (start, end): (f32, f32),
+    swept: &SweptPair<'_>,
+    indices: [u32; 2],
+) -> Option<ShapeCastHit> {
+    let motions = moving.order(motions);
+    let from_1_to_2 = if moving.is_swapped { -1.0 } else { 1.0 };
+    let found = shared.batch().penetration(swept, indices);
+    let turning = Turning {
+        shared,
+        moving,
+        motions: &motions,
+        params: moving.params(&shared.config())?,
+        penetration: found.map(|found| Penetration {
+            normal: from_1_to_2 * (motions[0].start.rotation.inverse() * found.normal),
+            ..found
+        }),
+        end,
+        room: RefCell::default(),
+    };
+    let hit = turning.impact(start);
+    shared.tell_coarser(turning.room.borrow().coarser());
+    let hit = hit?;
+    if turning.is_blocked(start, &hit) {
+        let world_from_a = motions[0].position_at_time(hit.time_of_impact);
+        let blocked = Blocked {
+            point: world_from_a * hit.witness1,
+            normal: from_1_to_2 * (world_from_a.rotation * hit.normal1),
+        };
+        shared.batch().block(swept, blocked);
+    }
+    Some(hit)
 }
 
 /// The impact of the second part, of this velocity in the frame of the first, in m/s.

@@ -51,12 +51,13 @@ impl<'a> Frame<'a> {
             prediction,
         };
         self.warn_of_recycling(collider1, collider2);
-        let question = match collider1.is_sensor() || collider2.is_sensor() {
+        let has_sensor = collider1.is_sensor() || collider2.is_sensor();
+        let question = match has_sensor {
             true => Question::Crossing,
             false => Question::Contacts(prediction),
         };
-        let is_measured_anew = question == Question::Crossing
-            || colliders.iter().any(|handle| self.changed.contains(handle));
+        let is_measured_anew =
+            has_sensor || colliders.iter().any(|handle| self.changed.contains(handle));
         let kept = self
             .memory
             .measured(colliders)
@@ -279,11 +280,9 @@ impl PairMemory {
             let pos12 = pose_of(collider1, bodies).inv_mul(&pose_of(collider2, bodies));
             let id = pair_id(pair.colliders);
             let was_used = pair.used.load(Ordering::Relaxed);
-            self.measured.extend(
-                pair.measured
-                    .filter(|_| was_used)
-                    .map(|measured| (id, measured)),
-            );
+            let measured = pair.measured.filter(|_| was_used);
+            self.measured
+                .extend(measured.map(|measured| (id, measured)));
             if pair.is_kept {
                 let first = self.axes.len();
                 self.retain_axes(id);
@@ -293,10 +292,9 @@ impl PairMemory {
                 continue;
             }
             for part in &batch.parts[pair.parts.clone()] {
-                let Some(comparison) = &part.comparison else {
+                let Some(result) = part.result(&batch.results) else {
                     continue;
                 };
-                let result = &batch.results[comparison.query];
                 let key = (id, part.parts);
                 // An axis without contact may be that of the few points that came near first.
                 let axis = match result.contacts.is_empty() {

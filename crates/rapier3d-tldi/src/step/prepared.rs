@@ -305,9 +305,7 @@ impl Shared {
         }
         self.spot_pairs.fetch_add(1, Ordering::Relaxed);
         self.on_the_spot(|spot| {
-            spot.compare(pair, config, |backend, queries, results| {
-                backend.compare(queries, results)
-            })?;
+            spot.compare(pair, config, CpuBackend::compare)?;
             let pixels = count_pixels(&spot.parts, &spot.results);
             self.spot_pixels.fetch_add(pixels, Ordering::Relaxed);
             self.tell_coarser(coarser_pixels(&spot.parts, &spot.results));
@@ -397,7 +395,8 @@ pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Spot {
-    fn compare(
+    /// Compares a pair by `run`; no part of it has a hint.
+    pub(crate) fn compare(
         &mut self,
         pair: ShapePair<'_>,
         config: &TldiConfig,
