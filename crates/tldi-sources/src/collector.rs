@@ -1,8 +1,9 @@
 //! Gathers points, whatever the format, into a [`RawCloud`].
 
+use crate::input::Input;
 use crate::scalar::{Endian, Scalar};
 use crate::slot::{Column, Columns, Slot};
-use crate::{RawCloud, ReadOptions, SourceErrorKind, origin, splat};
+use crate::{RawCloud, ReadOptions, SourceError, SourceErrorKind, origin, splat};
 use tldi::glamx::{DVec3, Vec3};
 
 /// Points seen before the origin is chosen.
@@ -218,6 +219,29 @@ impl Collector {
         }
         if let Some(radii) = &mut self.radii {
             radii.push(sample.radius);
+        }
+        Ok(())
+    }
+
+    /// Reads the points of `count` records of `size` bytes; the errors call them `what`.
+    pub(crate) fn read_records(
+        &mut self,
+        input: &mut Input<'_>,
+        size: usize,
+        count: u64,
+        what: &str,
+        sample: impl Fn(&[u8]) -> Sample,
+    ) -> Result<(), SourceError> {
+        let mut left = count;
+        while left > 0 {
+            let position = input.byte_position();
+            let records = input.records(size, left, what)?;
+            left -= (records.len() / size) as u64;
+            for record in records.chunks_exact(size) {
+                self.push(&sample(record))
+                    .map_err(|kind| SourceError::new(kind, position))?;
+            }
+            input.points_read = self.count();
         }
         Ok(())
     }

@@ -9,6 +9,9 @@ use std::rc::Rc;
 /// Bytes fetched at once, and the most that [`Input::bytes`] can give.
 pub(crate) const BUFFER_SIZE: usize = 1 << 17;
 
+/// How a stream that is packed with gzip begins.
+pub(crate) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+
 /// Longest line in bytes: a face with some ten thousand corners fits.
 pub(crate) const MAX_LINE: usize = BUFFER_SIZE;
 

@@ -1,5 +1,7 @@
 //! Points that move: a deforming mesh as a NumPy array or as a folder of clouds.
 
+use crate::input::GZIP_MAGIC;
+use crate::scalar::{Endian, Scalar};
 use crate::{ReadOptions, SourceError, numbered_order, origin};
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
@@ -202,78 +204,81 @@ fn read_npy(path: &Path) -> Result<MovingPoints, MovingError> {
         path: path.to_owned(),
         source,
     };
-    let bad = |reason: &str| MovingError::Array {
-        path: path.to_owned(),
-        reason: reason.to_owned(),
-    };
     let mut raw = BufReader::new(File::open(path).map_err(io)?);
-    let is_packed = raw.fill_buf().map_err(io)?.starts_with(&[0x1f, 0x8b]);
-    let mut source: Box<dyn Read> = if is_packed {
-        Box::new(MultiGzDecoder::new(&mut raw))
+    let is_packed = raw.fill_buf().map_err(io)?.starts_with(&GZIP_MAGIC);
+    let frames = if is_packed {
+        npy_frames(MultiGzDecoder::new(raw))
     } else {
-        Box::new(&mut raw)
+        npy_frames(raw)
     };
-    // No more is taken than really comes, whatever the header says.
-    let mut exact = |bytes: &mut Vec<u8>, length: u64, what: &str| {
-        bytes.clear();
-        match source.by_ref().take(length).read_to_end(bytes) {
-            Ok(found) if found as u64 == length => Ok(()),
-            Ok(found) => Err(bad(&format!(
-                "the {what} ends early, after {found} of {length} bytes"
-            ))),
-            Err(error) => Err(bad(&format!("the {what} ends early ({error})"))),
-        }
-    };
-    let mut start = Vec::new();
-    exact(&mut start, 8, "header")?;
-    if !start.starts_with(b"\x93NUMPY") {
-        return Err(bad("it is no NumPy file"));
-    }
-    // Version 1 has two bytes of length, later ones four.
-    let mut bytes = Vec::new();
-    exact(&mut bytes, if start[6] == 1 { 2 } else { 4 }, "header")?;
-    let length = bytes
-        .iter()
-        .rev()
-        .fold(0, |length, byte| length << 8 | u64::from(*byte));
-    if length > 1 << 16 {
-        return Err(bad("its header is too long"));
-    }
-    let mut header = Vec::new();
-    exact(&mut header, length, "header")?;
-    let header = String::from_utf8_lossy(&header);
-    let Header { is_double, shape } = parse_header(&header).map_err(|reason| bad(&reason))?;
-    let [frames, points] = shape;
+    MovingPoints::new(frames.map_err(|reason| MovingError::Array {
+        path: path.to_owned(),
+        reason,
+    })?)
+}
+
+/// The frames of an unpacked NumPy file, or what is wrong with it.
+fn npy_frames(mut source: impl Read) -> Result<Vec<Vec<Vec3>>, String> {
+    let header = npy_header(&mut source)?;
+    let header = parse_header(&String::from_utf8_lossy(&header))?;
+    let Header {
+        scalar,
+        shape: [frames, points],
+    } = header;
     if frames == 0 || points == 0 {
-        return Err(bad(&format!(
+        return Err(format!(
             "its shape is ({frames}, {points}, 3): there are no frames, or no points in them"
-        )));
+        ));
     }
     let numbers = frames.checked_mul(points).and_then(|n| n.checked_mul(3));
-    let Some(numbers) = numbers.filter(|n| *n <= MAX_NUMBERS) else {
-        return Err(bad("it is too large"));
-    };
-    let size = if is_double { 8 } else { 4 };
+    if numbers.is_none_or(|n| n > MAX_NUMBERS) {
+        return Err("it is too large".to_owned());
+    }
+    let size = scalar.size();
     let mut found = Vec::new();
-    let mut frame = Vec::new();
     let mut origin = None;
     for index in 0..frames {
         let what = format!("frame {index} of {frames}");
-        exact(&mut frame, numbers / frames * size, &what)?;
-        let number = |bytes: &[u8]| match is_double {
-            true => f64::from_le_bytes(std::array::from_fn(|k| bytes[k])),
-            false => f64::from(f32::from_le_bytes(std::array::from_fn(|k| bytes[k]))),
-        };
-        let values: Vec<f64> = frame.chunks_exact(size as usize).map(number).collect();
-        let points: Vec<DVec3> = values.chunks_exact(3).map(DVec3::from_slice).collect();
+        let bytes = exactly(&mut source, 3 * points * size as u64, &what)?;
+        let numbers = bytes.chunks_exact(size);
+        let numbers: Vec<f64> = numbers.map(|b| scalar.decode(b, Endian::Little)).collect();
+        let points: Vec<DVec3> = numbers.chunks_exact(3).map(DVec3::from_slice).collect();
         let origin = *origin.get_or_insert_with(|| origin::near(&points));
         found.push(points.iter().map(|p| (*p - origin).as_vec3()).collect());
     }
-    MovingPoints::new(found)
+    Ok(found)
+}
+
+/// The next `length` bytes. No more memory is taken than really comes, whatever the header says.
+fn exactly(source: &mut impl Read, length: u64, what: &str) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    match source.take(length).read_to_end(&mut bytes) {
+        Ok(found) if found as u64 == length => Ok(bytes),
+        Ok(found) => Err(format!(
+            "the {what} ends early, after {found} of {length} bytes"
+        )),
+        Err(error) => Err(format!("the {what} ends early ({error})")),
+    }
+}
+
+/// The text of the header.
+fn npy_header(source: &mut impl Read) -> Result<Vec<u8>, String> {
+    let start = exactly(source, 8, "header")?;
+    if !start.starts_with(b"\x93NUMPY") {
+        return Err("it is no NumPy file".to_owned());
+    }
+    // Version 1 has two bytes of length, later ones four.
+    let length = exactly(source, if start[6] == 1 { 2 } else { 4 }, "header")?;
+    let length = (length.iter().rev()).fold(0, |length, byte| length << 8 | u64::from(*byte));
+    if length > 1 << 16 {
+        return Err("its header is too long".to_owned());
+    }
+    exactly(source, length, "header")
 }
 
 struct Header {
-    is_double: bool,
+    scalar: Scalar,
+    /// Frames and points.
     shape: [u64; 2],
 }
 
@@ -287,9 +292,9 @@ fn parse_header(header: &str) -> Result<Header, String> {
     let kind: String = (after("descr")?.chars().skip(1))
         .take_while(|c| *c != '\'')
         .collect();
-    let is_double = match kind.as_str() {
-        "<f4" => false,
-        "<f8" => true,
+    let scalar = match kind.as_str() {
+        "<f4" => Scalar::F32,
+        "<f8" => Scalar::F64,
         _ => return Err(format!("its numbers are {kind}, not <f4 or <f8")),
     };
     if !after("fortran_order")?.starts_with("False") {
@@ -302,7 +307,7 @@ fn parse_header(header: &str) -> Result<Header, String> {
         .collect::<Result<_, _>>()?;
     match sizes[..] {
         [frames, points, 3] => Ok(Header {
-            is_double,
+            scalar,
             shape: [frames, points],
         }),
         _ => Err(format!("its shape is ({inside})")),

@@ -1,6 +1,6 @@
 //! Messages of type `sensor_msgs/PointCloud2`, without ROS.
 
-use crate::collector::{Collector, Layout, Sample, check_count};
+use crate::collector::{Collector, Layout, check_count};
 use crate::scalar::{Endian, Scalar, excerpt};
 use crate::slot::{Column, Columns, Slot};
 use crate::{Position, RawCloud, ReadOptions, SourceError, SourceErrorKind};
@@ -123,13 +123,9 @@ impl PointCloud2<'_> {
         let row_length = self.width as usize * self.point_step as usize;
         for row in self.data.chunks_exact(self.row_step as usize) {
             for point in row[..row_length].chunks_exact(self.point_step as usize) {
-                let mut sample = Sample::EMPTY;
-                for column in &columns.0 {
-                    sample.decode(column, &point[column.place..], endian);
-                }
                 let index = collector.count();
                 collector
-                    .push(&sample)
+                    .push(&columns.sample(point, endian))
                     .map_err(|kind| SourceError::new(kind, Position::Point(index)))?;
             }
         }

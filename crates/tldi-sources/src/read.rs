@@ -1,7 +1,7 @@
 //! The entry points: opens, unpacks, tells the format, and calls its parser.
 
 use crate::error::Result;
-use crate::input::{Counted, Input};
+use crate::input::{Counted, GZIP_MAGIC, Input};
 use crate::options::extension;
 use crate::{Format, Position, Progress, RawCloud, ReadOptions, SourceError, SourceErrorKind};
 use flate2::bufread::MultiGzDecoder;
@@ -91,7 +91,7 @@ fn open<'a>(
     let start = buffered
         .fill_buf()
         .map_err(|e| SourceError::new(SourceErrorKind::Io(e), Position::Byte(0)))?;
-    let gzip = start.starts_with(&[0x1f, 0x8b]);
+    let gzip = start.starts_with(&GZIP_MAGIC);
     let source: Box<dyn Read + 'a> = if gzip {
         Box::new(MultiGzDecoder::new(buffered))
     } else {

@@ -1,6 +1,7 @@
 //! What a named column or property of a file means.
 
-use crate::scalar::Scalar;
+use crate::collector::Sample;
+use crate::scalar::{Endian, Scalar};
 use crate::splat;
 
 /// The value of a point that a column holds.
@@ -96,6 +97,16 @@ impl Columns {
             _ => true,
         });
         columns
+    }
+
+    /// What the bytes of a record say.
+    #[inline]
+    pub(crate) fn sample(&self, record: &[u8], endian: Endian) -> Sample {
+        let mut sample = Sample::EMPTY;
+        for column in &self.0 {
+            sample.decode(column, &record[column.place..], endian);
+        }
+        sample
     }
 
     pub(crate) fn has(&self, slot: Slot) -> bool {

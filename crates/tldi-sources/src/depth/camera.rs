@@ -1,6 +1,6 @@
 //! From a depth image to points with radii and normals.
 
-use super::cloud::{DepthCloud, gathered};
+use super::cloud::DepthCloud;
 use super::sensor::{Intrinsics, SensorModel};
 use super::tile::{DEVIATIONS, Optics, Pixels, REACH, TILE, Window, compute};
 use rayon::prelude::*;
@@ -86,30 +86,14 @@ impl DepthCamera {
             let mut pixels = Pixels::default();
             for left in (0..width).step_by(TILE) {
                 for v in row * TILE..((row + 1) * TILE).min(height) {
-                    let line = (v as f32 - center[1]) / focal[1];
-                    let columns = &columns[left..left + TILE];
-                    camera.tile_line(columns, line, [left, v], &optics, &mut pixels, cloud);
+                    camera.tile_line([left, v], &columns, &optics, &mut pixels, cloud);
                 }
             }
         });
-        let (points, (normals, radii)) = rayon::join(
-            || gathered(&rows, |row| &row.points),
-            || {
-                (
-                    gathered(&rows, |row| &row.normals),
-                    gathered(&rows, |row| &row.radii),
-                )
-            },
-        );
-        let flying = rows.iter().map(|row| row.flying).sum();
+        let mut cloud = DepthCloud::gathered(&rows);
+        cloud.empty = width * height - cloud.points.len() - cloud.flying;
         self.rows = rows;
-        DepthCloud {
-            empty: width * height - points.len() - flying,
-            flying,
-            points,
-            radii,
-            normals,
-        }
+        cloud
     }
 
     /// Depths in metres of those pixels that the sensor is believed in, and their inverses.
@@ -139,13 +123,13 @@ impl DepthCamera {
         }
     }
 
-    /// The points of a line of a tile, from pixel `[left, v]` on.
+    /// The points of a line of a tile, from pixel `[left, v]` on; `columns` are the coordinates of all columns on the
+    /// image plane at depth 1.
     #[inline]
     fn tile_line(
         &self,
-        columns: &[f32],
-        row: f32,
         [left, v]: [usize; 2],
+        columns: &[f32],
         optics: &Optics,
         pixels: &mut Pixels,
         cloud: &mut DepthCloud,
@@ -156,6 +140,8 @@ impl DepthCamera {
             first: self.index(left, v),
             stride: self.stride(),
         };
+        let columns = &columns[left..left + TILE];
+        let row = (v as f32 - self.intrinsics.center[1]) / self.intrinsics.focal[1];
         compute(&window, columns, row, optics, pixels);
         let depth = window.depth();
         for (k, z) in depth.iter().enumerate() {

@@ -28,6 +28,33 @@ impl DepthCloud {
         (self.empty, self.flying) = (0, 0);
     }
 
+    /// The points of all parts, one after the other, and the sums of their counts.
+    pub(super) fn gathered(parts: &[Self]) -> Self {
+        let (points, (normals, radii)) = rayon::join(
+            || concat(parts, |part| &part.points),
+            || {
+                (
+                    concat(parts, |part| &part.normals),
+                    concat(parts, |part| &part.radii),
+                )
+            },
+        );
+        Self {
+            points,
+            radii,
+            normals,
+            empty: parts.iter().map(|part| part.empty).sum(),
+            flying: parts.iter().map(|part| part.flying).sum(),
+        }
+    }
+
+    /// Adds the points of another frame; the counts stay.
+    pub(super) fn append(&mut self, other: &Self) {
+        self.points.extend_from_slice(&other.points);
+        self.radii.extend_from_slice(&other.radii);
+        self.normals.extend_from_slice(&other.normals);
+    }
+
     /// Keeps the points that `keeps` says.
     pub(super) fn retain(&mut self, keeps: impl Fn(Vec3) -> bool) {
         let mut kept = 0;
@@ -53,13 +80,6 @@ impl DepthCloud {
 }
 
 /// One list of all parts together.
-pub(super) fn gathered<T: Copy>(
-    rows: &[DepthCloud],
-    list: impl Fn(&DepthCloud) -> &Vec<T>,
-) -> Vec<T> {
-    let mut all = Vec::with_capacity(rows.iter().map(|row| list(row).len()).sum());
-    for row in rows {
-        all.extend_from_slice(list(row));
-    }
-    all
+fn concat<T: Copy>(parts: &[DepthCloud], list: impl Fn(&DepthCloud) -> &[T]) -> Vec<T> {
+    parts.iter().map(list).collect::<Vec<_>>().concat()
 }

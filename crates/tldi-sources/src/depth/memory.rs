@@ -61,9 +61,7 @@ impl DepthMemory {
                 !camera.sees_through(point, &camera_from_world)
                     && !camera.sees(point, &camera_from_world)
             });
-            whole.points.extend_from_slice(&old.points);
-            whole.radii.extend_from_slice(&old.radii);
-            whole.normals.extend_from_slice(&old.normals);
+            whole.append(old);
         }
         self.remembered.push_back(frame);
         if self.remembered.len() > self.frames {

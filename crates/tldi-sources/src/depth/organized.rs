@@ -1,6 +1,6 @@
 //! Radii and normals of points that come in rows and columns, from the pixels beside.
 
-use super::cloud::{DepthCloud, gathered};
+use super::cloud::DepthCloud;
 use super::ray_window::{Frame, PIXELS, Pixel, Plane, Steps, along_row, is_mixed, place};
 use super::sensor::SensorModel;
 use super::tile::{COVER, DEVIATIONS, SLOPE_ERROR, STEEPEST_IN_WINDOW, TILE, WIDEST};
@@ -82,13 +82,7 @@ impl<'a> OrganizedCloud<'a> {
                 cloud
             })
             .collect();
-        DepthCloud {
-            points: gathered(&tiles, |tile| &tile.points),
-            radii: gathered(&tiles, |tile| &tile.radii),
-            normals: gathered(&tiles, |tile| &tile.normals),
-            empty: tiles.iter().map(|tile| tile.empty).sum(),
-            flying: tiles.iter().map(|tile| tile.flying).sum(),
-        }
+        DepthCloud::gathered(&tiles)
     }
 
     /// The median angle from a pixel to the one beside, radians; 0 where no two are.

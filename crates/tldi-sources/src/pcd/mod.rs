@@ -5,13 +5,14 @@
 //! lines of any length into memory.
 
 mod ascii;
-mod binary;
+mod compressed;
 mod header;
 mod lzf;
 
 use crate::collector::{Collector, Layout, check_count};
 use crate::error::Result;
 use crate::input::Input;
+use crate::scalar::Endian;
 use crate::{Format, RawCloud, ReadOptions, SourceErrorKind};
 use header::{Encoding, Header};
 
@@ -28,9 +29,14 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
     let mut collector = Collector::new(Layout::of(&columns, options), header.points, options);
     match header.encoding {
         Encoding::Ascii => ascii::read(input, &header, &columns, &mut collector)?,
-        Encoding::Binary => binary::read(input, &header, &columns, &mut collector)?,
+        Encoding::Binary => {
+            // Little endian, as the machines that write it are.
+            let sample = |record: &[u8]| columns.sample(record, Endian::Little);
+            let size = header.record_size();
+            collector.read_records(input, size, header.points, "the points", sample)?;
+        }
         Encoding::BinaryCompressed => {
-            binary::read_compressed(input, &header, &columns, &mut collector)?;
+            compressed::read(input, &header, &columns, &mut collector)?;
         }
     }
     let mut cloud = collector.finish()?;

@@ -61,7 +61,8 @@ pub(super) fn read(
     match (element.role, record_size(element)) {
         // A record fits into the buffer: a header has at most 10,000 lines, a value 8 bytes.
         (Role::Vertices, Some(size)) => {
-            read_fixed_vertices(input, element, size, endian, columns, collector)
+            let sample = |record: &[u8]| columns.sample(record, endian);
+            collector.read_records(input, size, element.count, "the vertices", sample)
         }
         (Role::Vertices, None) => read_vertices(input, element, endian, columns, collector),
         (_, Some(size)) => {
@@ -84,35 +85,6 @@ pub(super) fn read(
             Ok(())
         }
     }
-}
-
-/// Vertices without lists: records of `size` bytes.
-fn read_fixed_vertices(
-    input: &mut Input<'_>,
-    element: &Element,
-    size: usize,
-    endian: Endian,
-    columns: &Columns,
-    collector: &mut Collector,
-) -> Result<()> {
-    let mut left = element.count;
-    while left > 0 {
-        let position = input.byte_position();
-        let records = input.records(size, left, "the vertices")?;
-        left -= (records.len() / size) as u64;
-        for record in records.chunks_exact(size) {
-            let mut sample = Sample::EMPTY;
-            for column in &columns.0 {
-                let value = column.scalar.decode(&record[column.place..], endian);
-                sample.set(column.slot, value);
-            }
-            collector
-                .push(&sample)
-                .map_err(|kind| crate::SourceError::new(kind, position))?;
-        }
-        input.points_read = collector.count();
-    }
-    Ok(())
 }
 
 /// Vertices with lists among their properties.

@@ -56,8 +56,7 @@ fn name(field: &[u8]) -> String {
 pub(super) fn named_columns(names: &[String]) -> Columns {
     Columns::new(names.iter().enumerate().filter_map(|(place, name)| {
         let slot = Slot::from_name(name)?;
-        let packed = matches!(slot, Slot::PackedRgb | Slot::PackedRgba);
-        (!packed).then_some(Column {
+        (!slot.is_packed()).then_some(Column {
             slot,
             scalar: Scalar::F64,
             place,

@@ -1,5 +1,4 @@
-//! Binary data, point by point, or compressed and field by field. Little endian, as the machines
-//! that write it are.
+//! Compressed data, field by field. Little endian, as the machines that write it are.
 
 use super::header::Header;
 use super::lzf;
@@ -10,35 +9,9 @@ use crate::scalar::{Endian, Scalar};
 use crate::slot::Columns;
 use crate::{SourceError, SourceErrorKind};
 
-pub(super) fn read(
-    input: &mut Input<'_>,
-    header: &Header,
-    columns: &Columns,
-    collector: &mut Collector,
-) -> Result<()> {
-    let size = header.record_size();
-    let mut left = header.points;
-    while left > 0 {
-        let position = input.byte_position();
-        let records = input.records(size, left, "the points")?;
-        left -= (records.len() / size) as u64;
-        for record in records.chunks_exact(size) {
-            let mut sample = Sample::EMPTY;
-            for column in &columns.0 {
-                sample.decode(column, &record[column.place..], Endian::Little);
-            }
-            collector
-                .push(&sample)
-                .map_err(|kind| SourceError::new(kind, position))?;
-        }
-        input.points_read = collector.count();
-    }
-    Ok(())
-}
-
 /// One block of LZF: two sizes, then data that unpacks to all of the first field, all of the
 /// second, and so on.
-pub(super) fn read_compressed(
+pub(super) fn read(
     input: &mut Input<'_>,
     header: &Header,
     columns: &Columns,
