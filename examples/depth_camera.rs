@@ -8,7 +8,8 @@ use tldi::glamx::{Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, RangeArgument, UpChoice, ended};
 use tldi_examples::depth::{
-    DepthScene, DepthSimulation, DepthSnapshot, FrameSource, GeneratedCamera, camera_up,
+    DepthScene, DepthSimulation, DepthSnapshot, FRAME_SECONDS, FrameSource, GeneratedCamera,
+    camera_up,
 };
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::scan::{positive, within};
@@ -16,7 +17,7 @@ use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::NamedCloud;
 use tldi_examples::spots::{Demand, NoSpot, Spot, find_spots_where};
 use tldi_examples::{load, output};
-use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, viewpoint};
+use tldi_pictures::{BODY_COLORS, Item, Picture, Scene, viewpoint};
 use tldi_sources::depth::{DepthCamera, DepthSequence, SensorModel};
 
 /// Depth frames become a collider that is new in every frame; bodies rest on it and are pushed
@@ -74,7 +75,6 @@ struct Args {
 
 /// Frames of the generated sequence.
 const GENERATED_FRAMES: usize = 150;
-const FRAME_SECONDS: f32 = 1.0 / 30.0;
 /// Width in metres of a body of the generated sequence.
 const GENERATED_BODY_SIZE: f32 = 0.14;
 /// Width of a body that is not given one: a share of the median distance, smaller by a factor until there is
@@ -193,12 +193,16 @@ fn place_bodies(
     if args.count == 0 {
         return Ok((Vec::new(), Vec::new()));
     }
+    let make_bodies = |size: f32| {
+        let (count, seed) = (args.count.into(), args.common.seed);
+        NamedCloud::generated(&BodyShape::WHOLE, count, BODY_SPACING, size, seed)
+    };
     let least = BODY_RADII * first.mean_radius();
     if matches!(source, FrameSource::Generated(_)) {
         let size = args.size.unwrap_or(GENERATED_BODY_SIZE.max(least));
         let spots = GeneratedCamera::spots();
         if usize::from(args.count) <= spots.len() {
-            return Ok((make_bodies(args, size)?, spots));
+            return Ok((make_bodies(size)?, spots));
         }
     }
     let frame = source.frame(source.len() - 1)?;
@@ -211,7 +215,7 @@ fn place_bodies(
     let distance = view.median_depth(first);
     let mut size = args.size.unwrap_or(least.max(SIZE_SHARE * distance));
     loop {
-        let bodies = make_bodies(args, size)?;
+        let bodies = make_bodies(size)?;
         let spots = view.spots(first, up, &bodies, distance, args.common.seed);
         let each_has_its_own = |spots: &Vec<Spot>| spots.iter().all(|spot| spot.level == 0);
         let smaller = SHRINKING * size;
@@ -220,20 +224,6 @@ fn place_bodies(
         }
         size = smaller;
     }
-}
-
-fn make_bodies(args: &Args, size: f32) -> anyhow::Result<Vec<NamedCloud>> {
-    let shapes = [BodyShape::RoundedBox, BodyShape::Pebble, BodyShape::Star];
-    (0..usize::from(args.count))
-        .map(|k| {
-            let shape = shapes[k % shapes.len()];
-            let cloud = load::body_from_surface(shape.sample(BODY_SPACING, args.common.seed))?;
-            Ok(NamedCloud {
-                name: format!("{} {}", shape.name(), k + 1),
-                cloud: load::resized(&cloud, size)?,
-            })
-        })
-        .collect()
 }
 
 /// Where the camera is in the last frame: what it does not see there cannot hold a body.
@@ -269,17 +259,10 @@ impl LastView<'_> {
         distance: f32,
         seed: u64,
     ) -> Result<Vec<Spot>, NoSpot> {
-        let radius = |body: &NamedCloud| {
-            body.cloud
-                .points()
-                .iter()
-                .copied()
-                .map(Vec3::length)
-                .fold(0.0, f32::max)
-        };
+        let radii = bodies.iter().map(|body| load::ball_radius(&body.cloud));
         let demand = Demand {
             count: bodies.len(),
-            body_radius: bodies.iter().map(radius).fold(0.0, f32::max),
+            body_radius: radii.fold(0.0, f32::max),
             seed,
         };
         let (u, v) = up.any_orthonormal_pair();
@@ -385,16 +368,11 @@ fn draw(
     }
     if args.animate {
         let small = camera(ANIMATION_SIZE);
-        let bar = output::progress_bar(snapshots.len(), "pictures");
-        let mut pictures = Vec::new();
-        for snapshot in snapshots {
-            pictures.push(picture(snapshot, &small));
-            bar.inc(1);
-        }
-        bar.finish_and_clear();
+        let pictures = snapshots
+            .iter()
+            .map(|snapshot| Ok(picture(snapshot, &small)));
         let seconds = ANIMATION_FRAMES as f32 * FRAME_SECONDS;
-        let bytes = animation::to_apng(&pictures, seconds)?;
-        output::write_file(&args.out.join("motion.png"), &bytes)?;
+        output::write_animation(&args.out, seconds, pictures)?;
     }
     eprintln!("pictures are in {}", args.out.display());
     Ok(())
@@ -405,20 +383,12 @@ fn entities<'a>(
     clouds: &[&'a PointCloud<'static>],
     snapshot: &'a DepthSnapshot,
 ) -> Vec<(String, Item<'a>)> {
-    let frame = Item {
-        cloud: &snapshot.frame,
-        scene_from_cloud: Pose3::IDENTITY,
-        paint: Paint::Scan,
-    };
+    let frame = Item::scan(&snapshot.frame);
     let colors = BODY_COLORS.iter().cycle();
     let bodies = clouds.iter().zip(&snapshot.world_from_body).zip(colors);
     let bodies = bodies.enumerate().map(|(k, ((cloud, pose), color))| {
-        let body = Item {
-            cloud,
-            scene_from_cloud: *pose,
-            paint: Paint::Body(*color),
-        };
-        (format!("bodies/{}", k + 1), body)
+        let name = format!("bodies/{}", k + 1);
+        (name, Item::body(cloud, *pose, *color))
     });
     std::iter::once(("frame".to_owned(), frame))
         .chain(bodies)

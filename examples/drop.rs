@@ -13,8 +13,9 @@ use tldi_examples::scan::{ScanSource, choose_up, load_scan, positive};
 use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::{DropSimulation, NamedCloud, Snapshot};
 use tldi_examples::spots::{Demand, find_spots};
+use tldi_examples::world::DT;
 use tldi_examples::{load, output};
-use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, thinned, viewpoint};
+use tldi_pictures::{BODY_COLORS, Item, Picture, Scene, animation, thinned, viewpoint};
 
 /// Lets point-cloud bodies fall onto a point-cloud scan and come to rest
 ///
@@ -62,7 +63,7 @@ const ANIMATION_STEPS: usize = 2;
 /// Steps that the animation shows: bodies fall for 15 to 20, and rock for as many again.
 const ANIMATION_END: usize = 90;
 /// Seconds for which a picture of the animation is shown: half speed, since a fall takes a quarter of a second.
-const ANIMATION_SECONDS: f32 = 2.0 * ANIMATION_STEPS as f32 / 60.0;
+const ANIMATION_SECONDS: f32 = 2.0 * ANIMATION_STEPS as f32 * DT;
 /// How often the last picture is repeated, so that one sees where bodies end: a second and a half.
 const ANIMATION_HOLD: usize = 22;
 
@@ -80,9 +81,8 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let bodies = load_bodies(args, scan.mean_radius())?;
     let demand = Demand {
         count: bodies.len(),
-        body_radius: bodies
-            .iter()
-            .map(|body| ball_radius(&body.cloud))
+        body_radius: (bodies.iter())
+            .map(|body| load::ball_radius(&body.cloud))
             .fold(0.0, f32::max),
         seed: args.common.seed,
     };
@@ -146,16 +146,6 @@ fn load_bodies(args: &Args, scan_radius: f32) -> anyhow::Result<Vec<NamedCloud>>
         .collect())
 }
 
-/// Radius in metres of the ball around the origin that holds the cloud.
-fn ball_radius(cloud: &PointCloud<'_>) -> f32 {
-    cloud
-        .points()
-        .iter()
-        .copied()
-        .map(Vec3::length)
-        .fold(0.0, f32::max)
-}
-
 /// What is drawn of a run.
 struct Run {
     /// Before the first step, after [`MID_STEP`] and after the last.
@@ -196,30 +186,21 @@ fn draw(
     folder: &Path,
 ) -> anyhow::Result<()> {
     let clouds = simulation.clouds();
-    let detail = clouds
-        .iter()
-        .map(|cloud| ball_radius(cloud))
-        .fold(0.0, f32::max);
+    let radii = clouds.iter().map(|cloud| load::ball_radius(cloud));
+    let detail = radii.fold(0.0, f32::max);
     let scan = simulation.scan();
     let most = LARGEST_DRAWN_RADIUS * scan.mean_radius();
     let drawn_scan = thinned(scan, 1, |radius| radius.min(most))?;
     let scene = |snapshot: &Snapshot| {
-        let scan = Item {
-            cloud: &drawn_scan,
-            scene_from_cloud: tldi::glamx::Pose3::IDENTITY,
-            paint: Paint::Scan,
-        };
         let bodies = clouds
             .iter()
             .zip(&snapshot.scan_from_body)
             .zip(BODY_COLORS.iter().cycle());
-        let bodies = bodies.map(|((cloud, pose), color)| Item {
-            cloud,
-            scene_from_cloud: *pose,
-            paint: Paint::Body(*color),
-        });
+        let bodies = bodies.map(|((cloud, pose), color)| Item::body(cloud, *pose, *color));
         Scene {
-            items: std::iter::once(scan).chain(bodies).collect(),
+            items: std::iter::once(Item::scan(&drawn_scan))
+                .chain(bodies)
+                .collect(),
             up,
             detail,
         }

@@ -4,16 +4,17 @@ use anyhow::{Context, bail};
 use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tldi::glamx::{DVec3, Pose3, Vec3};
+use tldi::glamx::{DVec3, Vec3};
 use tldi::{KdTree, PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, UpChoice, ended};
 use tldi_examples::gallop::{
-    DT, GallopScene, GallopSimulation, GallopSnapshot, Ground, Runner, creature,
+    GallopScene, GallopSimulation, GallopSnapshot, Runner, WavyGround, creature,
 };
 use tldi_examples::output;
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::scan::positive;
-use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, painted};
+use tldi_examples::world::DT;
+use tldi_pictures::{BODY_COLORS, Item, Picture, Scene, painted};
 use tldi_sources::{MovingPoints, ReadOptions};
 
 /// A deforming cloud gallops over ground that deforms as well
@@ -116,7 +117,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
         size: args.size,
         speed,
         cycle: args.cycle,
-        ground: Ground {
+        ground: WavyGround {
             half_size: GROUND_SIZE.map(|half| half * args.size),
             spacing: args.size / GROUND_POINTS,
             amplitude: WAVE_HEIGHT * args.size,
@@ -238,17 +239,10 @@ fn draw(
         output::write_file(&args.out.join(name), &png)?;
     }
     if args.animate {
-        let bar = output::progress_bar(count, "pictures");
-        let mut pictures = Vec::new();
-        for (index, snapshot) in snapshots.iter().enumerate() {
-            if index != middle {
-                pictures.push(picture(snapshot, &beside(snapshot, size, ANIMATION_SIZE))?);
-            }
-            bar.inc(1);
-        }
-        bar.finish_and_clear();
-        let bytes = animation::to_apng(&pictures, ANIMATION_STEPS as f32 * DT)?;
-        output::write_file(&args.out.join("motion.png"), &bytes)?;
+        let moments = snapshots[..middle].iter().chain(&snapshots[middle + 1..]);
+        let pictures =
+            moments.map(|snapshot| picture(snapshot, &beside(snapshot, size, ANIMATION_SIZE)));
+        output::write_animation(&args.out, ANIMATION_STEPS as f32 * DT, pictures)?;
     }
     eprintln!("pictures are in {}", args.out.display());
     Ok(())
@@ -300,33 +294,16 @@ fn entities<'a>(
     bodies: &[&'a PointCloud<'static>],
     snapshot: &'a GallopSnapshot,
 ) -> Vec<(String, Item<'a>)> {
-    let entity = |name: String, cloud, scene_from_cloud, paint| {
-        let item = Item {
-            cloud,
-            scene_from_cloud,
-            paint,
-        };
-        (name, item)
-    };
     let colors = BODY_COLORS[1..].iter().cycle();
     let loose = (bodies.iter().zip(&snapshot.world_from_body).zip(colors)).enumerate();
     let loose = loose.map(|(k, ((cloud, pose), color))| {
         let name = format!("bodies/{}", k + 1);
-        entity(name, *cloud, *pose, Paint::Body(*color))
+        (name, Item::body(cloud, *pose, *color))
     });
-    let ground = entity(
-        "ground".to_owned(),
-        &snapshot.ground,
-        Pose3::IDENTITY,
-        Paint::Scan,
-    );
-    let skin = Paint::Body(SKIN.map(|c| c / 255.0));
-    let runner = entity(
-        "runner".to_owned(),
-        runner,
-        snapshot.world_from_runner,
-        skin,
-    );
+    let skin = SKIN.map(|c| c / 255.0);
+    let runner = Item::body(runner, snapshot.world_from_runner, skin);
+    let ground = ("ground".to_owned(), Item::scan(&snapshot.ground));
+    let runner = ("runner".to_owned(), runner);
     [ground, runner].into_iter().chain(loose).collect()
 }
 

@@ -5,7 +5,7 @@ use clap::Parser;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tldi::glamx::{Pose3, Vec3};
+use tldi::glamx::Vec3;
 use tldi::{KdTree, PointCloud};
 use tldi_examples::cli::{Common, UpChoice, ended};
 use tldi_examples::lidar::{LidarReport, LidarScene, LidarSimulation, Scanner, Sweep, SweepSource};
@@ -14,7 +14,7 @@ use tldi_examples::scene::BodyShape;
 use tldi_examples::simulation::NamedCloud;
 use tldi_examples::spots::{Demand, find_spots};
 use tldi_examples::{load, output};
-use tldi_pictures::{BODY_COLORS, Item, Paint, Scene, viewpoint};
+use tldi_pictures::{BODY_COLORS, Item, Scene, viewpoint};
 
 /// Turns sweeps of a laser scanner into a collider that is new ten times a second, and drops bodies on it
 ///
@@ -115,24 +115,12 @@ fn scene(args: &Args, [first, last]: [&Sweep; 2]) -> anyhow::Result<LidarScene> 
     let seen: Vec<usize> = (0..first.len()).filter(stays).collect();
     let seen = load::subset(&first, &seen, |p| p, |radius| radius)
         .context("the first and the last sweep have no place in common")?;
-    let bodies = BodyShape::ALL
-        .iter()
-        .cycle()
-        .take(args.bodies.into())
-        .enumerate();
-    let bodies = bodies
-        .map(|(k, shape)| {
-            let cloud = load::body_from_surface(shape.sample(BODY_SPACING, args.common.seed))?;
-            Ok(NamedCloud {
-                name: format!("{} {}", shape.name(), k + 1),
-                cloud: load::resized(&cloud, args.size)?,
-            })
-        })
-        .collect::<anyhow::Result<Vec<_>>>()?;
+    let (count, seed) = (args.bodies.into(), args.common.seed);
+    let bodies = NamedCloud::generated(&BodyShape::ALL, count, BODY_SPACING, args.size, seed)?;
     let demand = Demand {
         count: bodies.len(),
         body_radius: 0.5 * args.size,
-        seed: args.common.seed,
+        seed,
     };
     Ok(LidarScene {
         bodies,
@@ -159,19 +147,10 @@ fn draw(args: &Args, simulation: &LidarSimulation, report: &LidarReport) -> anyh
     let Some(sweep) = simulation.cloud() else {
         return Ok(());
     };
-    let scan = Item {
-        cloud: sweep,
-        scene_from_cloud: Pose3::IDENTITY,
-        paint: Paint::Scan,
-    };
     let bodies = simulation.bodies().zip(BODY_COLORS.iter().cycle());
-    let bodies = bodies.map(|((cloud, pose), color)| Item {
-        cloud,
-        scene_from_cloud: pose,
-        paint: Paint::Body(*color),
-    });
+    let bodies = bodies.map(|((cloud, pose), color)| Item::body(cloud, pose, *color));
     let scene = Scene {
-        items: std::iter::once(scan).chain(bodies).collect(),
+        items: std::iter::once(Item::scan(sweep)).chain(bodies).collect(),
         up: Vec3::from_array(report.up),
         detail: args.size,
     };

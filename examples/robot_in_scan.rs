@@ -5,19 +5,20 @@ use clap::Parser;
 use clap::builder::ArgPredicate;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tldi::glamx::{DVec3, Pose3, Vec3};
+use tldi::glamx::{DVec3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, Triple, ended};
 use tldi_examples::load::Located;
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::robot::{
-    BUILT_IN, Base, DT, Description, MeshFolders, Motion, RobotScene, RobotSimulation,
-    RobotSnapshot, Walk, quadruped,
+    BUILT_IN, Base, Description, MeshFolders, Motion, RobotScene, RobotSimulation, RobotSnapshot,
+    Walk, quadruped,
 };
 use tldi_examples::scan::{ScanSource, choose_up, load_scan, within};
 use tldi_examples::terrain::{Ground, Terrain};
+use tldi_examples::world::DT;
 use tldi_examples::{load, output};
-use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, animation, thinned, viewpoint};
+use tldi_pictures::{BODY_COLORS, Item, Picture, Scene, thinned, viewpoint};
 
 /// A robot whose links are point clouds moves in a scan that is a point cloud
 ///
@@ -278,16 +279,10 @@ fn draw(
     }
     if args.animate {
         let small = camera(ANIMATION_SIZE);
-        let bar = output::progress_bar(snapshots.len(), "pictures");
-        let pictures: Vec<Picture> = (snapshots.iter())
-            .map(|snapshot| {
-                bar.inc(1);
-                picture(snapshot, &small)
-            })
-            .collect();
-        bar.finish_and_clear();
-        let bytes = animation::to_apng(&pictures, ANIMATION_STEPS as f32 * DT)?;
-        output::write_file(&args.out.join("motion.png"), &bytes)?;
+        let pictures = snapshots
+            .iter()
+            .map(|snapshot| Ok(picture(snapshot, &small)));
+        output::write_animation(&args.out, ANIMATION_STEPS as f32 * DT, pictures)?;
     }
     eprintln!("pictures are in {}", args.out.display());
     Ok(())
@@ -299,20 +294,15 @@ fn entities<'a>(
     scan: &'a PointCloud<'a>,
     snapshot: &RobotSnapshot,
 ) -> Vec<(String, Item<'a>)> {
-    let item = |cloud, scene_from_cloud, paint| Item {
-        cloud,
-        scene_from_cloud,
-        paint,
-    };
-    let scan = item(scan, Pose3::IDENTITY, Paint::Scan);
     let links = simulation.links().iter().enumerate().map(|(k, link)| {
-        let paint = Paint::Body(if snapshot.link_touches[k] {
+        let color = if snapshot.link_touches[k] {
             TOUCHING_COLOR
         } else {
             LINK_COLORS[k % 2]
-        });
+        };
         let name = format!("robot/{}", link.name);
-        (name, item(&link.cloud, snapshot.scan_from_link[k], paint))
+        let item = Item::body(&link.cloud, snapshot.scan_from_link[k], color);
+        (name, item)
     });
     let colors = BODY_COLORS[1..].iter().cycle();
     let bodies = (simulation.loose_clouds())
@@ -321,9 +311,9 @@ fn entities<'a>(
         .enumerate()
         .map(|(k, ((cloud, pose), color))| {
             let name = format!("bodies/{}", k + 1);
-            (name, item(cloud, *pose, Paint::Body(*color)))
+            (name, Item::body(cloud, *pose, *color))
         });
-    std::iter::once(("scan".to_owned(), scan))
+    std::iter::once(("scan".to_owned(), Item::scan(scan)))
         .chain(links)
         .chain(bodies)
         .collect()

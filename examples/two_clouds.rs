@@ -10,7 +10,6 @@ use tldi_examples::load::Located;
 use tldi_examples::query::{Answer, CloudQuery};
 use tldi_examples::scene::BodyShape;
 use tldi_examples::{load, output, query_pictures};
-use tldi_pictures::animation;
 
 /// Asks about two clouds once: do they collide, what is the gap, where do they touch
 ///
@@ -140,10 +139,8 @@ fn draw(query: &CloudQuery, answer: &Answer, folder: &Path) -> anyhow::Result<()
 fn animate(args: &Args, query: &CloudQuery) -> anyhow::Result<()> {
     let mut backend = args.common.backend.open()?;
     let end = (query.ask(&mut *backend)?.report.impact).map_or(1.0, |impact| impact.time_seconds);
-    let bar = output::progress_bar(MOTION_PICTURES, "pictures");
     let camera = query_pictures::camera(query, MOTION_PICTURE_SIZE);
-    let mut pictures = Vec::new();
-    for k in 0..MOTION_PICTURES {
+    let pictures = (0..MOTION_PICTURES).map(|k| {
         let time = end * k as f32 / (MOTION_PICTURES - 1) as f32;
         let moved = Pose3::from_translation(query.velocity * time) * query.a_from_b;
         let later = CloudQuery {
@@ -153,10 +150,7 @@ fn animate(args: &Args, query: &CloudQuery) -> anyhow::Result<()> {
             velocity: query.velocity,
         };
         let answer = later.ask(&mut *backend)?;
-        pictures.push(query_pictures::scene(&later, &answer, &camera));
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
-    let bytes = animation::to_apng(&pictures, MOTION_PICTURE_SECONDS)?;
-    output::write_file(&args.out.join("motion.png"), &bytes)
+        Ok(query_pictures::scene(&later, &answer, &camera))
+    });
+    output::write_animation(&args.out, MOTION_PICTURE_SECONDS, pictures)
 }

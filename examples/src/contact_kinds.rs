@@ -10,17 +10,45 @@ use tldi::glamx::Vec3;
 /// Cosine between two pushes on a body from which on it is held between them (120°).
 const OPPOSED: f32 = -0.5;
 
-/// What may help against the depth of a contact; see [`ContactKinds`].
+/// What may help against the depth of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Neither gives way.
+    /// Between two things neither of which gives way, such as a hoof on a scripted path and the ground. It is as
+    /// deep as the script says.
     Scripted,
-    /// The body is held from both sides.
+    /// Of a body that has no room: things that do not give way push it from opposite sides in the same
+    /// step.
     Squeezed,
-    /// Something moved into the body.
+    /// Of a body that what does not give way moves into, such as what comes into the view of a depth camera: it is
+    /// as deep as the way that it moved, less what the body gave way. It is that until the body is out again.
     Pushed,
-    /// Any other.
+    /// Any other, which the solver answers for.
     Resting,
+}
+
+/// Something for each kind of contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct ByKind<T> {
+    /// See [`Kind::Scripted`].
+    pub scripted: T,
+    /// See [`Kind::Squeezed`].
+    pub squeezed: T,
+    /// See [`Kind::Pushed`].
+    pub pushed: T,
+    /// See [`Kind::Resting`].
+    pub resting: T,
+}
+
+impl<T> ByKind<T> {
+    /// What is for contacts of a kind.
+    pub fn of(&mut self, kind: Kind) -> &mut T {
+        match kind {
+            Kind::Scripted => &mut self.scripted,
+            Kind::Squeezed => &mut self.squeezed,
+            Kind::Pushed => &mut self.pushed,
+            Kind::Resting => &mut self.resting,
+        }
+    }
 }
 
 /// A contact that was the deepest of its kind.
@@ -37,17 +65,9 @@ pub struct WorstContact {
 /// The deepest contacts, by kind; null where nothing penetrated.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ContactKinds {
-    /// Between two things neither of which gives way, such as a hoof on a scripted path and the ground. It is as
-    /// deep as the script says.
-    pub scripted: Option<WorstContact>,
-    /// Of a body that has no room: things that do not give way push it from opposite sides in the same
-    /// step.
-    pub squeezed: Option<WorstContact>,
-    /// Of a body that what does not give way moves into, such as what comes into the view of a depth camera: it is
-    /// as deep as the way that it moved, less what the body gave way. It is that until the body is out again.
-    pub pushed: Option<WorstContact>,
-    /// Of all others, which the solver answers for.
-    pub resting: Option<WorstContact>,
+    /// The deepest of each kind.
+    #[serde(flatten)]
+    pub deepest: ByKind<Option<WorstContact>>,
     /// Bodies that something moved into and that are not out again.
     #[serde(skip)]
     inside: HashSet<ColliderHandle>,
@@ -101,12 +121,7 @@ impl ContactKinds {
         };
         let kinds: Vec<Kind> = contacts.iter().map(kind_of).collect();
         for (contact, kind) in contacts.iter().zip(&kinds) {
-            let worst = match kind {
-                Kind::Scripted => &mut self.scripted,
-                Kind::Squeezed => &mut self.squeezed,
-                Kind::Pushed => &mut self.pushed,
-                Kind::Resting => &mut self.resting,
-            };
+            let worst = self.deepest.of(*kind);
             if contact.depth > worst.map_or(0.0, |worst| worst.depth) {
                 *worst = Some(WorstContact {
                     depth: contact.depth,
@@ -124,10 +139,10 @@ impl ContactKinds {
     /// Those of writing.
     pub fn write_lines(&self, out: &mut impl Write) -> io::Result<()> {
         let kinds = [
-            ("scripted, neither gives way", self.scripted),
-            ("squeezed between the two", self.squeezed),
-            ("pushed by what moves in", self.pushed),
-            ("resting and others", self.resting),
+            ("scripted, neither gives way", self.deepest.scripted),
+            ("squeezed between the two", self.deepest.squeezed),
+            ("pushed by what moves in", self.deepest.pushed),
+            ("resting and others", self.deepest.resting),
         ];
         for (name, worst) in kinds {
             match worst {
@@ -182,31 +197,31 @@ mod tests {
         let gap = contact(ground, body, Vec3::Y, -0.01);
         kinds.count(2, &[gap], &world, still);
         assert_eq!(
-            (kinds.scripted, kinds.resting),
+            (kinds.deepest.scripted, kinds.deepest.resting),
             (worst(0.3, 1), worst(0.01, 1))
         );
-        assert_eq!(kinds.squeezed, None);
+        assert_eq!(kinds.deepest.squeezed, None);
         // The hoof comes from above: its normal leads from the hoof down into the body.
         let under_hoof = contact(hoof, body, -Vec3::Y, 0.2);
         kinds.count(3, &[on_ground, under_hoof], &world, still);
         assert_eq!(
-            (kinds.squeezed, kinds.resting),
+            (kinds.deepest.squeezed, kinds.deepest.resting),
             (worst(0.2, 3), worst(0.01, 1))
         );
-        assert_eq!(kinds.pushed, None);
+        assert_eq!(kinds.deepest.pushed, None);
         // Something comes from the side: the body is not only resting, wherever it touches.
         let from_side = contact(ground, body, Vec3::X, 0.1);
         let comes = |c: &CloudContact| c.normal == Vec3::X;
         kinds.count(4, &[on_ground, from_side], &world, comes);
         assert_eq!(
-            (kinds.pushed, kinds.resting),
+            (kinds.deepest.pushed, kinds.deepest.resting),
             (worst(0.1, 4), worst(0.01, 1))
         );
         // What came stands still, and the body is still inside, even deeper: it is not resting yet.
         let deeper = contact(ground, body, Vec3::X, 0.12);
         kinds.count(5, &[on_ground, deeper], &world, still);
         assert_eq!(
-            (kinds.pushed, kinds.resting),
+            (kinds.deepest.pushed, kinds.deepest.resting),
             (worst(0.12, 5), worst(0.01, 1))
         );
         // It is out when all that is left is what rapier leaves, a millimetre, and rests from then on.
@@ -215,7 +230,7 @@ mod tests {
         let again = contact(ground, body, Vec3::Y, 0.02);
         kinds.count(7, &[again], &world, still);
         assert_eq!(
-            (kinds.pushed, kinds.resting),
+            (kinds.deepest.pushed, kinds.deepest.resting),
             (worst(0.12, 5), worst(0.02, 7))
         );
     }

@@ -189,6 +189,12 @@ pub fn on_surfaces(scan: &PointCloud<'_>) -> Vec<bool> {
         .collect()
 }
 
+/// Radius in metres of the ball around the origin that holds a cloud.
+pub fn ball_radius(cloud: &PointCloud<'_>) -> f32 {
+    let distances = cloud.points().iter().map(|p| p.length());
+    distances.fold(0.0, f32::max)
+}
+
 /// The cloud moved so that its bounds are centred on its origin, and scaled so that its largest
 /// extent is `size` metres.
 ///

@@ -7,6 +7,7 @@ use std::fs::OpenOptions;
 use std::io::{self, IsTerminal, StdoutLock, Write};
 use std::path::Path;
 use tldi::glamx::DVec3;
+use tldi_pictures::{Picture, animation};
 
 /// A progress bar over `length` of `things` (a plural) on a terminal; hidden elsewhere.
 pub fn progress_bar(length: usize, things: &str) -> ProgressBar {
@@ -40,6 +41,24 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
+/// Draws pictures one after the other, and writes them to `motion.png` of a folder, each shown for so many seconds.
+///
+/// # Errors
+/// Those of drawing, and of the file system, with the path.
+pub fn write_animation(
+    folder: &Path,
+    seconds: f32,
+    pictures: impl Iterator<Item = anyhow::Result<Picture>>,
+) -> anyhow::Result<()> {
+    let bar = progress_bar(pictures.size_hint().0, "pictures");
+    let pictures: Vec<Picture> = pictures.inspect(|_| bar.inc(1)).collect::<Result<_, _>>()?;
+    bar.finish_and_clear();
+    write_file(
+        &folder.join("motion.png"),
+        &animation::to_apng(&pictures, seconds)?,
+    )
+}
+
 /// Makes sure that a file can be written later: makes its folder, and opens the file for writing. Its content stays, and
 /// a file that was not there is not there afterwards either.
 ///
@@ -61,7 +80,7 @@ pub fn check_writable(path: &Path) -> anyhow::Result<()> {
 
 /// Results whose places are relative to an origin: that of the file.
 #[derive(Serialize)]
-struct Located<'a, R> {
+struct WithOrigin<'a, R> {
     #[serde(flatten)]
     report: &'a R,
     /// Left out where it is zero.
@@ -90,8 +109,8 @@ pub fn publish(
         .and_then(|()| write_origin(&mut out))
         .and_then(|()| out.flush());
     if let Some(path) = json {
-        let located = Located { report, origin };
-        write_file(path, &serde_json::to_vec_pretty(&located)?)?;
+        let report = WithOrigin { report, origin };
+        write_file(path, &serde_json::to_vec_pretty(&report)?)?;
     }
     told.context("cannot write the table")
 }

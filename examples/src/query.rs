@@ -1,6 +1,7 @@
 //! One query about two clouds: do they collide, how far apart are they, where do they touch.
 
 use crate::devices::Devices;
+use crate::world::DT;
 use anyhow::Context;
 use rapier3d::parry::query::QueryDispatcher;
 use rapier3d_tldi::prelude::*;
@@ -9,9 +10,6 @@ use std::io::{self, Write};
 use std::time::Instant;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Backend, CpuBackend, ImpactQuery, PairQuery, PairResult, Params, Surface, View};
-
-/// Time in seconds for which the motion of a query is looked ahead to choose the view: a frame.
-const FRAME_SECONDS: f32 = 1.0 / 60.0;
 
 /// Two clouds and how they are placed.
 pub struct CloudQuery {
@@ -102,7 +100,8 @@ impl CloudQuery {
             a_from_b: self.a_from_b,
             view: View::Aim {
                 policy: CameraPolicy::AllDirections,
-                motion: self.velocity * FRAME_SECONDS,
+                // As far as in a step.
+                motion: self.velocity * DT,
                 last_axis: None,
             },
             params,

@@ -7,7 +7,7 @@ use tldi::glamx::{Pose3, Vec3};
 use tldi::{CloudError, ContactPixel, Facing, KdTree, Layer, PointCloud, Tldi, VirtualCamera};
 use tldi_pictures::sheet::{Key, Panel, sheet};
 use tldi_pictures::viewpoint;
-use tldi_pictures::{BODY_COLORS, Item, Paint, Picture, Scene, painted};
+use tldi_pictures::{BODY_COLORS, Item, Picture, Scene, painted};
 
 /// Width or height in picture pixels that panels are enlarged to, at most: a layer, contact pixels, and
 /// the width of a section.
@@ -87,15 +87,10 @@ pub fn zone(
 
 fn placed<'a>([a, b]: [&'a PointCloud<'a>; 2], query: &CloudQuery) -> Scene<'a> {
     let radius = |cloud: &PointCloud<'_>| 0.5 * cloud.bounds().extents().length();
-    let item = |cloud, scene_from_cloud, color| Item {
-        cloud,
-        scene_from_cloud,
-        paint: Paint::Body(color),
-    };
     Scene {
         items: vec![
-            item(a, Pose3::IDENTITY, BODY_COLORS[0]),
-            item(b, query.a_from_b, BODY_COLORS[1]),
+            Item::body(a, Pose3::IDENTITY, BODY_COLORS[0]),
+            Item::body(b, query.a_from_b, BODY_COLORS[1]),
         ],
         up: Vec3::Y,
         // The frame holds 2.2 of these around each cloud's middle.

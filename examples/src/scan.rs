@@ -82,11 +82,10 @@ pub fn choose_up(choice: UpChoice, scan: &PointCloud<'_>) -> Vec3 {
     if let UpChoice::Given(up) = choice {
         return up;
     }
-    let points: Vec<Vec3> = scan.points().to_vec();
     let Up {
         direction,
         confidence,
-    } = detect_up(&points, scan.normals().unwrap_or_default());
+    } = detect_up(scan.points(), scan.normals().unwrap_or_default());
     let [x, y, z] = direction.to_array();
     let remark = match confidence {
         Confidence::Clear => "",

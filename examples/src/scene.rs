@@ -1,5 +1,6 @@
 //! The generated scene: a furnished room as a scanner would see it, and bodies to drop into it.
 
+use crate::random;
 use crate::surface_sampling::{SampledSurface, sample_surface};
 use fastrand::Rng;
 use tldi::Aabb;
@@ -35,9 +36,7 @@ pub fn furnished_room(spacing: f32, noise: f32, seed: u64) -> SampledSurface {
     );
     let mut rng = Rng::with_seed(seed ^ 0x6e6f_6973);
     for (point, normal) in room.points.iter_mut().zip(&room.normals) {
-        // A sum of three uniform numbers is near enough to a normal distribution (variance 1/4).
-        let error = 2.0 * noise * (rng.f32() + rng.f32() + rng.f32() - 1.5);
-        *point += error * *normal;
+        *point += noise * random::normal(&mut rng) * *normal;
     }
     room
 }
@@ -203,6 +202,9 @@ pub enum BodyShape {
 impl BodyShape {
     /// All shapes.
     pub const ALL: [Self; 4] = [Self::Torus, Self::RoundedBox, Self::Star, Self::Pebble];
+
+    /// Those without a hole.
+    pub const WHOLE: [Self; 3] = [Self::RoundedBox, Self::Pebble, Self::Star];
 
     /// Name for reports.
     pub fn name(self) -> &'static str {

@@ -1,8 +1,11 @@
 //! Lets bodies fall onto a scan and records what happens.
 
+use crate::load;
 use crate::report::{BodyReport, DropReport};
+use crate::scene::BodyShape;
 use crate::spots::Spot;
 use crate::step_totals::StepTotals;
+use crate::world::{self, DT, TOUCHING_GAP};
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -12,18 +15,11 @@ use tldi::glamx::{Pose3, Quat, Vec3};
 
 /// Mass per volume of the bodies in kg/m³: wood.
 const DENSITY: f32 = 500.0;
-/// Standard gravity in m/s².
-const GRAVITY: f32 = 9.81;
-/// Length of a step in seconds.
-const DT: f32 = 1.0 / 60.0;
 /// Angular damping of the bodies, per second: what rolling costs on a real surface, which rapier
 /// does not model.
 const ROLLING_RESISTANCE: f32 = 1.0;
 /// Largest tilt of a body at the start, in radians (5°).
 const MAX_TILT: f32 = 0.087;
-
-/// Gap up to which surfaces touch, in mean radii of the scan: what sampling leaves uncertain.
-const TOUCHING_GAP: f32 = 0.2;
 
 /// A cloud and a name for it.
 #[derive(Clone, Debug)]
@@ -32,6 +28,31 @@ pub struct NamedCloud {
     pub name: String,
     /// The cloud, centred on its origin.
     pub cloud: PointCloud<'static>,
+}
+
+impl NamedCloud {
+    /// Generated bodies, one shape after the other, numbered from 1. Their largest extent is `size` metres, and the
+    /// distance of their points the part `spacing` of a width.
+    ///
+    /// # Errors
+    /// [`CloudError`] if a cloud cannot have that size.
+    pub fn generated(
+        shapes: &[BodyShape],
+        count: usize,
+        spacing: f32,
+        size: f32,
+        seed: u64,
+    ) -> Result<Vec<Self>, CloudError> {
+        (shapes.iter().cycle().take(count).enumerate())
+            .map(|(k, shape)| {
+                let cloud = load::body_from_surface(shape.sample(spacing, seed))?;
+                Ok(Self {
+                    name: format!("{} {}", shape.name(), k + 1),
+                    cloud: load::resized(&cloud, size)?,
+                })
+            })
+            .collect()
+    }
 }
 
 /// Poses and contacts at one moment.
@@ -75,13 +96,7 @@ impl DropSimulation {
         seed: u64,
         backend: Box<dyn Backend>,
     ) -> Result<Self, TldiError> {
-        let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
-        let mut world = PhysicsWorld {
-            gravity: -GRAVITY * up,
-            ..PhysicsWorld::default()
-        };
-        world.integration_parameters.dt = DT;
-        tldi.attach(&mut world);
+        let (mut world, tldi) = world::attached(up, backend)?;
         world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan.clone()));
         let mut rng = Rng::with_seed(seed);
         let bodies = bodies

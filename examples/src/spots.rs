@@ -42,7 +42,7 @@ pub struct NoSpot {
 
 /// Radius of the disc around a spot, in body radii: with room for a body that tips over, else just
 /// for the body.
-const ROOM: [f32; 2] = [2.5, 1.0];
+const DISC_RADII: [f32; 2] = [2.5, 1.0];
 /// Height differences within a footprint, in body radii, from ideal to barely acceptable.
 const LEVEL_TOLERANCES: [f32; 4] = [0.15, 0.3, 0.6, 1.0];
 /// Share of a footprint's pixels that must be seen and within the tolerance.
@@ -77,7 +77,7 @@ pub fn find_spots_where(
     let mut places: Vec<Vec3> = Vec::new();
     // The best that give all bodies a place of their own; else those that give the most.
     let qualities = (LEVEL_TOLERANCES.iter())
-        .flat_map(|tolerance| ROOM.map(|room| (*tolerance, room * demand.body_radius)));
+        .flat_map(|tolerance| DISC_RADII.map(|room| (*tolerance, room * demand.body_radius)));
     for (tolerance, radius) in qualities {
         let mut candidates = map.places_within(radius, tolerance * radius);
         candidates.retain(|place| is_usable(*place));

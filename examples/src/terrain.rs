@@ -1,6 +1,7 @@
 //! Generated rooms for robots that walk: rough ground as a scanner in the room sees it, with all that is
 //! wrong with such scans, and the truth about the ground.
 
+use crate::random::{self, between};
 use crate::scene::rounded_block;
 use crate::surface_sampling::{SampledSurface, sample_surface};
 use fastrand::Rng;
@@ -153,8 +154,7 @@ impl Terrain {
             }
             let times = 1 + usize::from(rng.f32() < TWICE);
             let ray = (*point - SCANNER) / range;
-            // A sum of three uniform numbers is near enough to a normal distribution (variance 1/4).
-            let error = 2.0 * NOISE * (rng.f32() + rng.f32() + rng.f32() - 1.5);
+            let error = NOISE * random::normal(&mut rng);
             for time in 0..times {
                 seen.points
                     .push(*point + error * ray + time as f32 * TWICE_APART * Vec3::X);
@@ -175,10 +175,6 @@ impl Terrain {
 /// Distance to the two walls in metres, inside the room.
 fn walls(point: Vec3) -> f32 {
     (point.x - ROOM.min.x - 0.01).min(ROOM.max.y - 0.01 - point.y)
-}
-
-fn between(rng: &mut Rng, [low, high]: [f32; 2]) -> f32 {
-    low + (high - low) * rng.f32()
 }
 
 fn color(point: Vec3, is_wall: bool) -> [u8; 4] {

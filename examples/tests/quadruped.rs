@@ -7,10 +7,11 @@ use std::path::Path;
 use tldi::glamx::Vec3;
 use tldi_examples::load;
 use tldi_examples::robot::{
-    Base, DT, Description, MeshFolders, Motion, RobotScene, RobotSimulation, StandingReport, Walk,
+    Base, Description, MeshFolders, Motion, RobotScene, RobotSimulation, StandingReport, Walk,
     quadruped,
 };
 use tldi_examples::terrain::{Ground, Terrain};
+use tldi_examples::world::DT;
 use tldi_wgpu::BackendChoice;
 
 /// On a terrain stands the quadruped with its twelve joints, unless another robot is named.

@@ -44,7 +44,25 @@ pub struct Scene<'a> {
     pub detail: f32,
 }
 
-impl Item<'_> {
+impl<'a> Item<'a> {
+    /// A scan whose frame is that of the scene.
+    pub fn scan(cloud: &'a PointCloud<'a>) -> Self {
+        Self {
+            cloud,
+            scene_from_cloud: Pose3::IDENTITY,
+            paint: Paint::Scan,
+        }
+    }
+
+    /// A body.
+    pub fn body(cloud: &'a PointCloud<'a>, scene_from_cloud: Pose3, color: [f32; 3]) -> Self {
+        Self {
+            cloud,
+            scene_from_cloud,
+            paint: Paint::Body(color),
+        }
+    }
+
     /// The image of the item as `camera` sees it.
     pub fn image(&self, camera: &VirtualCamera) -> Tldi {
         let params = Params::for_radius(self.cloud.mean_radius());

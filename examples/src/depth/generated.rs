@@ -1,5 +1,6 @@
 //! A generated depth sequence: a camera over a low table, across which a ball is moved.
 
+use crate::random;
 use crate::spots::Spot;
 use fastrand::Rng;
 use rayon::prelude::*;
@@ -91,8 +92,7 @@ impl GeneratedCamera {
                     let direction = pose.rotation * Vec3::new(x, y, 1.0);
                     // The ray's parameter is the depth: its direction is 1 along the camera's z.
                     let depth = nearest(pose.translation, direction, ball);
-                    let error = 2.0 * (rng.f32() + rng.f32() + rng.f32() - 1.5);
-                    let seen = depth + error * model.deviation(depth);
+                    let seen = depth + random::normal(&mut rng) * model.deviation(depth);
                     if seen < model.range[1] {
                         (1e3 * seen).round() as u16
                     } else {

@@ -11,5 +11,5 @@ pub use camera_up::{CameraUp, UnclearUp, camera_up};
 pub use generated::GeneratedCamera;
 pub use registered::{RegisteredFrames, TruePixel};
 pub use report::{DepthReport, FrameReport};
-pub use simulation::{DepthScene, DepthSimulation, DepthSnapshot};
+pub use simulation::{DepthScene, DepthSimulation, DepthSnapshot, FRAME_SECONDS};
 pub use source::{FrameSource, TimedFrame};

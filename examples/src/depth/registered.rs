@@ -1,6 +1,7 @@
 //! Generated depth frames with all that is wrong with real ones, and the truth: a room with a table and
 //! boxes, seen by a camera whose frames are registered to another one.
 
+use crate::random::between;
 use fastrand::Rng;
 use tldi::VirtualCamera;
 use tldi::glamx::{Pose3, Vec3};
@@ -52,7 +53,7 @@ impl RegisteredFrames {
     /// A scene of its own for every seed.
     pub fn new(seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
-        let mut within = |low: f32, high: f32| low + (high - low) * rng.f32();
+        let mut within = |low: f32, high: f32| between(&mut rng, [low, high]);
         let table = {
             let middle = Vec3::new(within(-0.3, 0.3), within(0.1, 0.6), 0.0);
             let half = Vec3::new(within(0.5, 0.8), within(0.35, 0.5), 0.0);

@@ -1,6 +1,7 @@
 //! What a run of `depth_camera` found.
 
 use crate::contact_kinds::ContactKinds;
+use crate::median::median_and_most;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -92,13 +93,6 @@ impl DepthReport {
     /// # Errors
     /// Those of writing.
     pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
-        let column = |value: Column<'_>| {
-            let mut values: Vec<f64> = self.frames.iter().map(value).collect();
-            values.sort_by(f64::total_cmp);
-            let last = values.len().saturating_sub(1);
-            let at = |k: usize| values.get(k).copied().unwrap_or(0.0);
-            [at(last / 2), at(last)]
-        };
         writeln!(out, "{:<22} {:>10} {:>10}", "of a frame", "median", "most")?;
         let rows: [(&str, Column<'_>); 7] = [
             ("points", &|f| f.points as f64),
@@ -110,7 +104,7 @@ impl DepthReport {
             ("latency ms", &|f| f.latency_ms),
         ];
         for (name, value) in rows {
-            let [median, most] = column(value);
+            let [median, most] = median_and_most(self.frames.iter().map(value));
             let digits = if name.ends_with("ms") { 2 } else { 0 };
             writeln!(out, "{name:<22} {median:>10.digits$} {most:>10.digits$}")?;
         }

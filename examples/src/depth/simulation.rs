@@ -3,9 +3,12 @@
 use super::report::{DepthBodyReport, DepthReport, FrameReport};
 use super::source::TimedFrame;
 use crate::contact_kinds::ContactKinds;
+use crate::load;
+use crate::median::median_and_most;
 use crate::simulation::NamedCloud;
 use crate::spots::Spot;
 use crate::step_totals::StepTotals;
+use crate::world::{self, DT, TOUCHING_GAP};
 use anyhow::Context;
 use fastrand::Rng;
 use rapier3d::prelude::*;
@@ -16,10 +19,10 @@ use tldi::Backend;
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi_sources::depth::{DepthCamera, DepthMemory};
 
-/// Length of a step in seconds, and steps from one frame to the next: 30 frames a second.
-const DT: f32 = 1.0 / 60.0;
+/// Steps from one frame to the next.
 const STEPS_PER_FRAME: usize = 2;
-const GRAVITY: f32 = 9.81;
+/// Seconds from one frame to the next: 30 frames a second.
+pub const FRAME_SECONDS: f32 = STEPS_PER_FRAME as f32 * DT;
 /// Mass per volume of the bodies in kg/m³.
 const DENSITY: f32 = 300.0;
 /// Height of a body over its spot at the start, metres.
@@ -104,13 +107,7 @@ impl DepthSimulation {
         let points = camera.points(&first.depths, &first.world_from_camera);
         let seen = points.points.clone();
         let cloud = points.into_builder().build()?.into_owned();
-        let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
-        let mut world = PhysicsWorld {
-            gravity: -GRAVITY * scene.up,
-            ..PhysicsWorld::default()
-        };
-        world.integration_parameters.dt = DT;
-        tldi.attach(&mut world);
+        let (mut world, tldi) = world::attached(scene.up, backend)?;
         // Its mass is never asked for: it is fixed.
         let collider = tldi.collider(cloud).density(0.0);
         let (_, surface) = world.insert(RigidBodyBuilder::fixed(), collider);
@@ -126,13 +123,7 @@ impl DepthSimulation {
                     RigidBodyBuilder::dynamic().pose(pose).angular_damping(1.0),
                     tldi.collider(named.cloud.clone()).density(DENSITY),
                 );
-                let radius = named
-                    .cloud
-                    .points()
-                    .iter()
-                    .copied()
-                    .map(Vec3::length)
-                    .fold(0.0, f32::max);
+                let radius = load::ball_radius(&named.cloud);
                 let below = height_below(&seen, pose.translation, radius, scene.up);
                 Body {
                     named,
@@ -279,7 +270,7 @@ impl DepthSimulation {
                 .map(|body| *self.world.bodies[body.handle].position())
                 .collect(),
             contacts: contacts
-                .filter(|contact| contact.depth > -0.2 * frame.mean_radius())
+                .filter(|contact| contact.depth > -TOUCHING_GAP * frame.mean_radius())
                 .map(|contact| contact.point)
                 .collect(),
             frame,
@@ -288,19 +279,17 @@ impl DepthSimulation {
 
     /// What happened so far.
     pub fn report(&self, missing_frames: Vec<String>) -> DepthReport {
-        let mut latencies: Vec<f64> = self.frames.iter().map(|frame| frame.latency_ms).collect();
-        latencies.sort_by(f64::total_cmp);
-        let last = latencies.len().saturating_sub(1);
-        let latency = |k: usize| latencies.get(k).copied().unwrap_or(0.0);
+        let latencies = self.frames.iter().map(|frame| frame.latency_ms);
+        let [median_latency_ms, max_latency_ms] = median_and_most(latencies);
         DepthReport {
             totals: self.totals.clone(),
-            frame_rate: 1.0 / (DT * STEPS_PER_FRAME as f32),
+            frame_rate: 1.0 / FRAME_SECONDS,
             up: self.up.to_array(),
             max_penetration: self.max_penetration,
             deepest: self.deepest.clone(),
             missing_frames,
-            median_latency_ms: latency(last / 2),
-            max_latency_ms: latency(last),
+            median_latency_ms,
+            max_latency_ms,
             frames: self.frames.clone(),
             bodies: self
                 .bodies

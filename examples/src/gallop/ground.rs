@@ -1,11 +1,11 @@
-//! Ground that oscillates: a wave runs through a sheet of points.
+//! WavyGround that oscillates: a wave runs through a sheet of points.
 
 use std::f32::consts::TAU;
 use tldi::glamx::Vec3;
 
 /// A sheet of points about the origin, y up. Lengths in metres, times in seconds.
 #[derive(Clone, Copy, Debug)]
-pub struct Ground {
+pub struct WavyGround {
     /// Half the length along x and half the width along z.
     pub half_size: [f32; 2],
     /// Distance of neighbouring points.
@@ -18,7 +18,7 @@ pub struct Ground {
     pub period: f32,
 }
 
-impl Ground {
+impl WavyGround {
     /// Number of points along x and z.
     fn counts(&self) -> [usize; 2] {
         self.half_size
@@ -55,7 +55,7 @@ mod tests {
     /// Normals are across the differences of neighbouring points.
     #[test]
     fn normals_are_across_the_surface() {
-        let ground = Ground {
+        let ground = WavyGround {
             half_size: [1.0, 0.6],
             spacing: 0.01,
             amplitude: 0.05,

@@ -8,8 +8,8 @@ mod simulation;
 mod truth;
 
 pub use creature::creature;
-pub use ground::Ground;
+pub use ground::WavyGround;
 pub use report::{GallopFrame, GallopReport};
 pub use runner::{FacesOutOfRange, Runner};
-pub use simulation::{DT, GallopScene, GallopSimulation, GallopSnapshot};
-pub use truth::{Comparisons, TrueDepth, TrueDepths};
+pub use simulation::{GallopScene, GallopSimulation, GallopSnapshot};
+pub use truth::{Comparisons, TrueDepth};

@@ -1,7 +1,8 @@
 //! What a run of `gallop` found.
 
-use super::truth::{Comparisons, TrueDepths};
-use crate::contact_kinds::ContactKinds;
+use super::truth::Comparisons;
+use crate::contact_kinds::{ByKind, ContactKinds};
+use crate::median::median_and_most;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -27,7 +28,7 @@ pub struct GallopReport {
     /// The deepest contacts after a step, by kind.
     pub deepest: ContactKinds,
     /// What contacts say beside how deep things truly are, by kind: hooves, waves and bodies have known shapes.
-    pub true_depths: TrueDepths,
+    pub true_depths: ByKind<Comparisons>,
     /// Every step.
     pub frames: Vec<GallopFrame>,
     /// Loose bodies.
@@ -83,11 +84,8 @@ impl GallopReport {
                 body.name, body.displacement
             )?;
         }
-        let median = |value: fn(&GallopFrame) -> f64| {
-            let mut values: Vec<f64> = self.frames.iter().map(value).collect();
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied().unwrap_or(0.0)
-        };
+        let median =
+            |value: fn(&GallopFrame) -> f64| median_and_most(self.frames.iter().map(value))[0];
         let contacts: usize = self.frames.iter().map(|frame| frame.contacts).sum();
         writeln!(
             out,
@@ -96,17 +94,12 @@ impl GallopReport {
             median(|frame| frame.step_ms)
         )?;
         self.deepest.write_lines(out)?;
-        let TrueDepths {
-            scripted,
-            squeezed,
-            pushed,
-            resting,
-        } = self.true_depths;
+        let depths = &self.true_depths;
         for (name, of_kind) in [
-            ("scripted", scripted),
-            ("squeezed", squeezed),
-            ("pushed", pushed),
-            ("resting", resting),
+            ("scripted", depths.scripted),
+            ("squeezed", depths.squeezed),
+            ("pushed", depths.pushed),
+            ("resting", depths.resting),
         ] {
             let Comparisons {
                 compared,

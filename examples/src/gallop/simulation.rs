@@ -1,13 +1,14 @@
 //! The run: both clouds get new points in every step.
 
-use super::ground::Ground;
+use super::ground::WavyGround;
 use super::report::{GallopBody, GallopFrame, GallopReport};
 use super::runner::Runner;
-use super::truth::{TrueBody, TrueDepth, TrueDepths, below_ground};
-use crate::contact_kinds::{ContactKinds, Kind};
+use super::truth::{Comparisons, TrueBody, TrueDepth, below_ground};
+use crate::contact_kinds::{ByKind, ContactKinds, Kind};
 use crate::load;
 use crate::scene::BodyShape;
 use crate::step_totals::StepTotals;
+use crate::world::{self, DT, TOUCHING_GAP};
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -15,8 +16,6 @@ use std::time::Instant;
 use tldi::Backend;
 use tldi::glamx::{Pose3, Quat, Vec3};
 
-/// Length of a step in seconds.
-pub const DT: f32 = 1.0 / 60.0;
 /// Mass per volume of the bodies in kg/m³.
 const DENSITY: f32 = 150.0;
 /// Width of the bodies, and the strip along the run on which they lie, in sizes of what runs.
@@ -35,7 +34,7 @@ pub struct GallopScene {
     /// Seconds of a cycle.
     pub cycle: f32,
     /// What it runs over.
-    pub ground: Ground,
+    pub ground: WavyGround,
     /// Number of loose bodies.
     pub bodies: usize,
     /// Seed of their places.
@@ -71,7 +70,7 @@ pub struct GallopSimulation {
     totals: StepTotals,
     max_penetration: f32,
     deepest: ContactKinds,
-    true_depths: TrueDepths,
+    true_depths: ByKind<Comparisons>,
 }
 
 struct Body {
@@ -90,11 +89,7 @@ impl GallopSimulation {
     /// # Errors
     /// Where a cloud cannot be made.
     pub fn new(scene: GallopScene, backend: Box<dyn Backend>) -> anyhow::Result<Self> {
-        let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
-        let mut world = PhysicsWorld::default();
-        world.integration_parameters.dt = DT;
-        tldi.attach(&mut world);
-
+        let (mut world, tldi) = world::attached(Vec3::Y, backend)?;
         let (points, normals) = scene.ground.at(0.0);
         let ground_points = points.len();
         // What covers a square grid, with a margin for its slopes.
@@ -137,7 +132,7 @@ impl GallopSimulation {
             totals: StepTotals::new(DT),
             max_penetration: 0.0,
             deepest: ContactKinds::default(),
-            true_depths: TrueDepths::default(),
+            true_depths: ByKind::default(),
         })
     }
 
@@ -219,7 +214,8 @@ impl GallopSimulation {
             });
             let truth = truth.max(0.0);
             if told > 0.0 || truth > 0.0 {
-                (self.true_depths).count(kind, TrueDepth { told, truth, step });
+                let depth = TrueDepth { told, truth, step };
+                self.true_depths.of(kind).count(depth);
             }
         };
         let points = runner_cloud.points().iter().map(|&p| *runner_pose * p);
@@ -244,7 +240,7 @@ impl GallopSimulation {
             .contacts(&self.world.narrow_phase, &self.world.colliders);
         contacts
             .filter(|c| c.collider1 == runner || c.collider2 == runner)
-            .filter(|c| c.depth > -0.2 * self.mean_radius)
+            .filter(|c| c.depth > -TOUCHING_GAP * self.mean_radius)
             .collect()
     }
 

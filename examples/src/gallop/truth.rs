@@ -1,7 +1,6 @@
 //! How deep things are in each other by their shapes as generated, beside what the contacts say.
 
-use super::ground::Ground;
-use crate::contact_kinds::Kind;
+use super::ground::WavyGround;
 use crate::scene::BodyShape;
 use serde::Serialize;
 use tldi::PointCloud;
@@ -29,43 +28,25 @@ pub struct Comparisons {
     pub worst: Option<TrueDepth>,
 }
 
-/// By kind of contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct TrueDepths {
-    /// What runs, in the ground.
-    pub scripted: Comparisons,
-    /// Bodies between a hoof and the ground.
-    pub squeezed: Comparisons,
-    /// Bodies that a hoof moved into.
-    pub pushed: Comparisons,
-    /// All others.
-    pub resting: Comparisons,
-}
-
-impl TrueDepths {
+impl Comparisons {
     /// Counts a pair in which something touches.
-    pub(super) fn count(&mut self, kind: Kind, depth: TrueDepth) {
-        let of_kind = match kind {
-            Kind::Scripted => &mut self.scripted,
-            Kind::Squeezed => &mut self.squeezed,
-            Kind::Pushed => &mut self.pushed,
-            Kind::Resting => &mut self.resting,
-        };
+    pub(super) fn count(&mut self, depth: TrueDepth) {
         let error = |depth: TrueDepth| (depth.told - depth.truth).abs();
-        of_kind.compared += 1;
-        of_kind.mean_error += (error(depth) - of_kind.mean_error) / of_kind.compared as f32;
-        if of_kind
-            .worst
-            .is_none_or(|worst| error(worst) < error(depth))
-        {
-            of_kind.worst = Some(depth);
+        self.compared += 1;
+        self.mean_error += (error(depth) - self.mean_error) / self.compared as f32;
+        if self.worst.is_none_or(|worst| error(worst) < error(depth)) {
+            self.worst = Some(depth);
         }
     }
 }
 
 /// How deep the deepest of these points, in the world, is below the ground at a time; negative over it and beside it. To
 /// first order in the height over the surface, which bends by less than 2 % over a hoof.
-pub(super) fn below_ground(ground: &Ground, time: f32, points: impl Iterator<Item = Vec3>) -> f32 {
+pub(super) fn below_ground(
+    ground: &WavyGround,
+    time: f32,
+    points: impl Iterator<Item = Vec3>,
+) -> f32 {
     let [along, across] = ground.half_size;
     let depth = |p: Vec3| {
         let (surface, normal) = ground.surface(p.x, p.z, time);

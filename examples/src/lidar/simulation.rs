@@ -2,9 +2,11 @@
 
 use super::report::{LidarBodyReport, LidarReport, SweepReport};
 use super::source::{Sweep, recipe};
+use crate::median::median_and_most;
 use crate::simulation::NamedCloud;
 use crate::spots::Spot;
 use crate::step_totals::StepTotals;
+use crate::world::{self, DT};
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 use std::time::Instant;
@@ -13,8 +15,6 @@ use tldi::glamx::{Pose3, Quat, Vec3};
 
 /// Steps from one sweep to the next, at ten sweeps a second.
 const STEPS_PER_SWEEP: usize = 6;
-const DT: f32 = 1.0 / 60.0;
-const GRAVITY: f32 = 9.81;
 /// Mass per volume of the bodies in kg/m³: wood.
 const DENSITY: f32 = 500.0;
 /// Angular damping, per second: what rolling costs on a real surface.
@@ -51,13 +51,7 @@ impl LidarSimulation {
     /// # Errors
     /// Those of [`TldiPipeline::with_backend`].
     pub fn new(scene: LidarScene, backend: Box<dyn Backend>) -> anyhow::Result<Self> {
-        let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
-        let mut world = PhysicsWorld {
-            gravity: -GRAVITY * scene.up,
-            ..PhysicsWorld::default()
-        };
-        world.integration_parameters.dt = DT;
-        tldi.attach(&mut world);
+        let (mut world, tldi) = world::attached(scene.up, backend)?;
         let stream = CloudStream::new(&mut world.colliders, recipe())?;
         let upright = Quat::from_rotation_arc(Vec3::Y, scene.up);
         let bodies = (scene.bodies.iter().zip(&scene.spots))
@@ -150,17 +144,14 @@ impl LidarSimulation {
 
     /// What happened so far.
     pub fn report(&self) -> LidarReport {
-        let mut latencies: Vec<f64> = self
-            .sweeps
-            .iter()
-            .map(|sweep| sweep.update_ms + sweep.step_ms)
-            .collect();
-        latencies.sort_by(f64::total_cmp);
+        let latencies = self.sweeps.iter();
+        let latencies = latencies.map(|sweep| sweep.update_ms + sweep.step_ms);
+        let [median_latency_ms, max_latency_ms] = median_and_most(latencies);
         LidarReport {
             totals: self.totals.clone(),
             up: self.scene.up.to_array(),
-            median_latency_ms: latencies.get(latencies.len() / 2).copied().unwrap_or(0.0),
-            max_latency_ms: latencies.last().copied().unwrap_or(0.0),
+            median_latency_ms,
+            max_latency_ms,
             sweeps: self.sweeps.clone(),
             bodies: (0..self.bodies.len())
                 .map(|k| self.body_report(k))

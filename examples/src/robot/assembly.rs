@@ -1,11 +1,11 @@
 //! From a robot's description to rapier's bodies, joints and motors.
 
 use super::Motion;
-use super::description::Description;
 use super::kinematics::{JointKind, Kinematics};
-use super::links::{LinkCloud, collision_groups, silent_pairs};
+use super::links::{collision_groups, silent_pairs};
+use super::model::Model;
 use super::placing::Placement;
-use super::plan::Build;
+use crate::world::GRAVITY;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 use rapier3d_urdf::{UrdfLoaderOptions, UrdfMultibodyOptions, UrdfRobot};
@@ -48,16 +48,19 @@ pub(super) struct Assembled {
 }
 
 /// Puts the robot into the world: multibody joints, motors, mimic joints, start pose.
-#[allow(clippy::too_many_arguments, reason = "all that a robot is made of")]
 pub(super) fn assemble(
     world: &mut PhysicsWorld,
     tldi: &TldiPipeline,
-    robot: &Description,
-    clouds: &[LinkCloud],
-    build: &Build,
+    model: &Model,
     placement: &Placement,
-    start: &[f32],
 ) -> anyhow::Result<Assembled> {
+    let Model {
+        description: robot,
+        clouds,
+        build,
+        start,
+        root_from_link,
+    } = model;
     let kinematics = &robot.kinematics;
     let options = UrdfLoaderOptions {
         create_colliders_from_collision_shapes: false,
@@ -80,8 +83,7 @@ pub(super) fn assemble(
         UrdfMultibodyOptions::empty(),
     );
     let links: Vec<RigidBodyHandle> = handles.links.iter().map(|link| link.body).collect();
-    let root_from_link = kinematics.poses(start);
-    let silent = silent_pairs(kinematics, clouds, &root_from_link);
+    let silent = silent_pairs(kinematics, clouds, root_from_link);
     let groups = collision_groups(clouds.len(), &silent);
     let mut cloud_of_collider = HashMap::new();
     for (k, (link, groups)) in clouds.iter().zip(groups).enumerate() {
@@ -113,7 +115,7 @@ pub(super) fn assemble(
         driven: Vec::new(),
         mass,
         stands: !build.is_fixed,
-        default_effort: mass * 9.81 * build.size,
+        default_effort: mass * GRAVITY * build.size,
     };
     assembled.set_up_joints(world, kinematics, &joints, start);
     Ok(assembled)

@@ -3,8 +3,8 @@
 use super::links::world_groups;
 use super::placing::Placement;
 use super::report::LooseBodyReport;
-use crate::load;
 use crate::scene::BodyShape;
+use crate::simulation::NamedCloud;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 use tldi::glamx::{Pose3, Quat, Vec3};
@@ -55,13 +55,11 @@ pub(super) fn lay_bodies(
     size: f32,
     placement: &Placement,
     seed: u64,
-) -> anyhow::Result<Vec<LooseBody>> {
-    let shapes = [BodyShape::RoundedBox, BodyShape::Pebble, BodyShape::Star];
+) -> Result<Vec<LooseBody>, CloudError> {
+    let count = placement.bodies.len();
+    let clouds = NamedCloud::generated(&BodyShape::WHOLE, count, LOOSE_SPACING, size, seed)?;
     let mut bodies = Vec::new();
-    for (k, surface) in placement.bodies.iter().enumerate() {
-        let shape = shapes[k % shapes.len()];
-        let sample = load::body_from_surface(shape.sample(LOOSE_SPACING, seed))?;
-        let cloud = load::resized(&sample, size)?;
+    for (NamedCloud { name, cloud }, surface) in clouds.into_iter().zip(&placement.bodies) {
         let half_height = 0.5 * cloud.bounds().extents().y;
         let pose = Pose3::from_parts(
             *surface + (half_height + LOOSE_DROP) * up,
@@ -74,7 +72,7 @@ pub(super) fn lay_bodies(
                 .collision_groups(world_groups()),
         );
         bodies.push(LooseBody {
-            name: format!("{} {}", shape.name(), k + 1),
+            name,
             cloud,
             handle,
             collider,

@@ -7,6 +7,7 @@ mod geometry;
 mod kinematics;
 mod links;
 mod loose_bodies;
+mod model;
 mod motion;
 mod own_camera;
 mod packages;
@@ -29,5 +30,9 @@ pub use plan::{Base, Tip};
 pub use quadruped::{Walk, quadruped};
 pub use report::{Hardest, LinkReport, LooseBodyReport, RobotReport};
 pub use self_filter::SelfFilter;
-pub use simulation::{DT, RobotScene, RobotSimulation, RobotSnapshot};
+pub use simulation::{RobotScene, RobotSimulation, RobotSnapshot};
 pub use standing::StandingReport;
+
+fn count(flags: &[bool]) -> usize {
+    flags.iter().filter(|flag| **flag).count()
+}

@@ -1,6 +1,7 @@
 //! A robot's own camera, which sees the scan and the robot.
 
 use super::links::LinkCloud;
+use crate::random;
 use fastrand::Rng;
 use tldi::PointCloud;
 use tldi::glamx::{Pose3, Vec3};
@@ -37,9 +38,7 @@ impl OwnCamera {
 
     /// A measuring error.
     fn error(&mut self) -> Vec3 {
-        // A sum of three uniform numbers is near enough to a normal distribution (variance 1/4).
-        let mut component =
-            || 2.0 * self.noise * (self.rng.f32() + self.rng.f32() + self.rng.f32() - 1.5);
+        let mut component = || self.noise * random::normal(&mut self.rng);
         Vec3::new(component(), component(), component())
     }
 }

@@ -54,7 +54,7 @@ const FINALISTS: usize = 12;
 const RING: [f32; 2] = [0.35, 0.7];
 const LEVELS: [f32; 2] = [-0.25, 0.4];
 /// Radius of the level disc around a body, in its radii: with room to push it, else just for it.
-const ROOM: [f32; 2] = [2.8, 1.0];
+const DISC_RADII: [f32; 2] = [2.8, 1.0];
 /// Least distance of two bodies, in their radii.
 const APART: f32 = 3.5;
 
@@ -85,7 +85,10 @@ pub fn place(
     bases.truncate(CANDIDATES);
     let surfaces = if site.reach > 0.0 && site.bodies > 0 {
         let places = |room: &f32| level_places(scan, up, room * site.body_radius);
-        let found = ROOM.iter().map(places).find(|places| !places.is_empty());
+        let found = DISC_RADII
+            .iter()
+            .map(places)
+            .find(|places| !places.is_empty());
         found.unwrap_or_default()
     } else {
         Vec::new()

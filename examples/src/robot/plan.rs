@@ -3,6 +3,7 @@
 use super::Motion;
 use super::kinematics::{Aim, JointKind, Kinematics};
 use super::links::LinkCloud;
+use super::model::Model;
 use super::placing::Placement;
 use fastrand::Rng;
 use tldi::PointCloud;
@@ -202,29 +203,26 @@ pub(super) fn start_pose(kinematics: &Kinematics, build: &Build) -> Vec<f32> {
 
 /// The reaching motion through the bodies, or onto the scan where there are none; a gait for a robot
 /// that is not fixed.
-#[allow(clippy::too_many_arguments, reason = "all that a plan depends on")]
 pub(super) fn plan_motion(
-    kinematics: &Kinematics,
-    clouds: &[LinkCloud],
-    build: &Build,
-    start: &[f32],
+    model: &Model,
     placement: &Placement,
     scan: &PointCloud<'_>,
     up: Vec3,
     body_size: f32,
     seed: u64,
 ) -> Motion {
-    let Some(tip) = build.tip else {
+    let kinematics = &model.description.kinematics;
+    let Some(tip) = model.build.tip else {
         let wheel_radius = |link: usize| {
-            let cloud = clouds.iter().find(|cloud| cloud.link == link);
+            let cloud = model.clouds.iter().find(|cloud| cloud.link == link);
             let mut extents = cloud.map_or([0.0; 3], |c| c.cloud.bounds().extents().to_array());
             extents.sort_by(f32::total_cmp);
             0.5 * extents[1]
         };
-        return Motion::gait(kinematics, start, wheel_radius);
+        return Motion::gait(kinematics, &model.start, wheel_radius);
     };
     let root_from_scan = placement.scan_from_root.inverse();
-    let home = kinematics.poses(start)[tip.link] * tip.point;
+    let home = model.root_from_link[tip.link] * tip.point;
     let mut corners = vec![home];
     if placement.bodies.is_empty() {
         for touch in touchable(scan, &root_from_scan, &tip, seed) {
@@ -254,7 +252,7 @@ pub(super) fn plan_motion(
     corners.push(home);
     let path = polyline(&corners, PATH_STEP * tip.reach);
     let stations = path.into_iter().map(|target| tip.aims(target));
-    Motion::reaching(kinematics, tip.link, stations, start)
+    Motion::reaching(kinematics, tip.link, stations, &model.start)
 }
 
 /// Points of the scan in front of the robot and in reach, in the frame of the root.

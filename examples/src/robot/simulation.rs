@@ -2,18 +2,20 @@
 
 use super::assembly::{Assembled, assemble};
 use super::description::Description;
-use super::links::{LinkCloud, Spacing, clouds_of_links, world_groups};
+use super::links::{LinkCloud, Spacing, world_groups};
 use super::loose_bodies::{LooseBody, lay_bodies, loose_size};
+use super::model::Model;
 use super::own_camera::OwnCamera;
-use super::placing::{Site, place};
-use super::plan::{Base, Build, Tip, plan_motion, start_pose};
+use super::placing::Site;
+use super::plan::{Base, Tip, plan_motion};
 use super::report::{LinkReport, RobotReport};
 use super::standing::Standing;
 use super::tally::{self, LinkTally};
-use super::{Motion, SelfFilter};
+use super::{Motion, SelfFilter, count};
 use crate::load;
 use crate::step_totals::StepTotals;
 use crate::terrain::Terrain;
+use crate::world::{self, DT, GRAVITY, TOUCHING_GAP};
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 use std::collections::HashMap;
@@ -21,11 +23,8 @@ use std::time::Instant;
 use tldi::Backend;
 use tldi::glamx::{Pose3, Vec3};
 
-/// Length of a step in seconds.
-pub const DT: f32 = 1.0 / 60.0;
 /// Steps from one frame of the robot's camera to the next: 30 frames a second.
 const STEPS_PER_FRAME: usize = 2;
-const GRAVITY: f32 = 9.81;
 /// Speed in m/s at which penetrations are pushed out: an arm that motors press into a scan does not
 /// jump back.
 const PUSH_OUT_SPEED: f32 = 0.5;
@@ -34,14 +33,8 @@ const PUSH_OUT_SPEED: f32 = 0.5;
 const CONTACT_FREQUENCY: f32 = 120.0;
 /// Height of a robot that is not fixed over its surface at the start, metres.
 const ROBOT_DROP: f32 = 0.005;
-/// Distance within which a place counts as blocked by a point of the scan, metres.
-const CLEARANCE: f32 = 0.03;
-/// Standard deviations of the sensor's noise within which a point is on the robot.
-const NOISE_MARGIN: f32 = 3.0;
 /// Distance from the middle of the scan, in its diagonals, at which a robot is lost.
 const FAR_AWAY: f32 = 10.0;
-/// Gap up to which surfaces are drawn as touching, in mean radii of the scan.
-const TOUCHING_GAP: f32 = 0.2;
 
 /// What a simulation is made of.
 pub struct RobotScene {
@@ -93,9 +86,7 @@ pub struct RobotSimulation {
     scan: PointCloud<'static>,
     scan_collider: ColliderHandle,
     up: Vec3,
-    robot: Description,
-    build: Build,
-    clouds: Vec<LinkCloud>,
+    model: Model,
     assembled: Assembled,
     tally: Vec<LinkTally>,
     loose: Vec<LooseBody>,
@@ -114,79 +105,36 @@ impl RobotSimulation {
     /// # Errors
     /// Where there is no place, or a cloud cannot be made.
     pub fn new(scene: RobotScene, backend: Box<dyn Backend>) -> anyhow::Result<Self> {
-        let RobotScene {
-            mut robot,
-            up,
-            seed,
-            ..
-        } = scene;
-        let scan_radius = scene.scan.mean_radius();
-        let (clouds, warnings) = clouds_of_links(&robot, Spacing { scan_radius })?;
-        for warning in &warnings {
-            eprintln!("warning: {warning}");
-        }
-        robot.warnings.extend(warnings);
-        let build = Build::of(&robot.kinematics, &clouds, scene.base);
-        let start = start_pose(&robot.kinematics, &build);
-        let root_from_link = robot.kinematics.poses(&start);
-        let margin = NOISE_MARGIN * scene.sensor_noise;
+        let RobotScene { scan, up, seed, .. } = scene;
+        let scan_radius = scan.mean_radius();
+        let model = Model::new(scene.robot, scene.base, Spacing { scan_radius })?;
+        let is_fixed = model.build.is_fixed;
         let loose_size = loose_size(scan_radius);
         let site = Site {
-            footprint: build.footprint,
-            lift: build.lift + if build.is_fixed { 0.0 } else { ROBOT_DROP },
-            reach: build.tip.map_or(0.0, |tip| tip.reach),
+            footprint: model.build.footprint,
+            lift: model.build.lift + if is_fixed { 0.0 } else { ROBOT_DROP },
+            reach: model.build.tip.map_or(0.0, |tip| tip.reach),
             body_radius: 0.6 * loose_size,
-            bodies: if build.is_fixed { scene.bodies } else { 0 },
+            bodies: if is_fixed { scene.bodies } else { 0 },
             facing: scene.facing,
             seed,
         };
-        let points: Vec<Vec3> = scene.scan.points().to_vec();
-        let obstacles = SelfFilter::new(&clouds, if build.is_fixed { CLEARANCE } else { 0.0 });
-        let placement = place(&scene.scan, up, &site, scene.at, |scan_from_root| {
-            let poses: Vec<Pose3> = root_from_link
-                .iter()
-                .map(|p| *scan_from_root * *p)
-                .collect();
-            // With a margin that is refused there is no place.
-            let in_the_way = obstacles.on_robot(&points, &poses);
-            in_the_way.map_or(usize::MAX, |on| count(&on))
-        })?;
-        let scan_from_link: Vec<Pose3> = (root_from_link.iter())
-            .map(|pose| placement.scan_from_root * *pose)
-            .collect();
+        let placement = model.place(&scan, up, &site, scene.at)?;
+        let scan_from_link = model.scan_from_link(&placement.scan_from_root);
 
-        // What stands on its own feet keeps the ground under them.
-        let kept_margin = if build.is_fixed { margin } else { 0.0 };
-        let filter = (scene.self_filter)
-            .then(|| SelfFilter::new(&clouds, kept_margin + build.model_error(&clouds)));
+        let filter = scene.self_filter.then(|| model.filter(scene.sensor_noise));
         let on_robot = match &filter {
-            Some(filter) if build.is_fixed => filter.on_robot(&points, &scan_from_link)?,
-            _ => vec![false; points.len()],
+            Some(filter) if is_fixed => filter.on_robot(scan.points(), &scan_from_link)?,
+            _ => vec![false; scan.len()],
         };
-        let self_filtered = count(&on_robot);
-        let on_surface = load::on_surfaces(&scene.scan);
-        let kept: Vec<usize> = (0..points.len())
+        let on_surface = load::on_surfaces(&scan);
+        let kept: Vec<usize> = (0..scan.len())
             .filter(|i| on_surface[*i] && !on_robot[*i])
             .collect();
-        let scan = load::subset(&scene.scan, &kept, |p| p, |r| r)?;
+        let scan = load::subset(&scan, &kept, |p| p, |r| r)?;
 
-        let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
-        let mut world = PhysicsWorld {
-            gravity: -GRAVITY * up,
-            ..PhysicsWorld::default()
-        };
-        world.integration_parameters.dt = DT;
-        world
-            .integration_parameters
-            .normalized_max_corrective_velocity = PUSH_OUT_SPEED;
-        if !build.is_fixed {
-            // Feet hold by friction while they are pushed out, too.
-            let parameters = &mut world.integration_parameters;
-            parameters.friction_in_bias_pass = true;
-            parameters.contact_softness.natural_frequency = CONTACT_FREQUENCY;
-            parameters.static_contact_softness.natural_frequency = CONTACT_FREQUENCY;
-        }
-        tldi.attach(&mut world);
+        let (mut world, tldi) = world::attached(up, backend)?;
+        soften(&mut world.integration_parameters, is_fixed);
         let scan_shape = if scene.own_camera {
             // Every frame has other points: one radius for all, and normals found on the way.
             let bare = PointCloud::builder(scan.points().to_vec());
@@ -196,49 +144,32 @@ impl RobotSimulation {
         };
         let collider = tldi.collider(scan_shape).collision_groups(world_groups());
         let (_, scan_collider) = world.insert(RigidBodyBuilder::fixed(), collider);
-        let assembled = assemble(
-            &mut world, &tldi, &robot, &clouds, &build, &placement, &start,
-        )?;
+        let assembled = assemble(&mut world, &tldi, &model, &placement)?;
         let loose = lay_bodies(&mut world, &tldi, up, loose_size, &placement, seed)?;
-        let motion = scene.motion.unwrap_or_else(|| {
-            plan_motion(
-                &robot.kinematics,
-                &clouds,
-                &build,
-                &start,
-                &placement,
-                &scan,
-                up,
-                loose_size,
-                seed,
-            )
-        });
-        let of_clouds: Vec<Pose3> = (clouds.iter())
-            .map(|link| scan_from_link[link.link])
-            .collect();
+        let motion = (scene.motion)
+            .unwrap_or_else(|| plan_motion(&model, &placement, &scan, up, loose_size, seed));
         let standing = scene.terrain.map(|terrain| {
+            let links = model.clouds.iter().map(|link| scan_from_link[link.link]);
             let (root, weight) = (placement.scan_from_root, GRAVITY * assembled.mass);
-            Standing::new(terrain, &scan, &clouds, &root, &of_clouds, weight)
+            let links: Vec<Pose3> = links.collect();
+            Standing::new(terrain, &scan, &model.clouds, &root, &links, weight)
         });
+        let camera = || OwnCamera::new(scene.sensor_noise, seed);
         Ok(Self {
             standing,
-            tally: vec![LinkTally::default(); clouds.len()],
-            own_camera: scene
-                .own_camera
-                .then(|| OwnCamera::new(scene.sensor_noise, seed)),
+            tally: vec![LinkTally::default(); model.clouds.len()],
+            own_camera: scene.own_camera.then(camera),
             world,
             tldi,
             scan,
             scan_collider,
             up,
-            robot,
-            build,
-            clouds,
+            model,
             assembled,
             loose,
             motion,
             filter,
-            self_filtered,
+            self_filtered: count(&on_robot),
             totals: StepTotals::new(DT),
             max_penetration: 0.0,
         })
@@ -251,7 +182,7 @@ impl RobotSimulation {
 
     /// The tip that reaches, if the robot has one.
     pub fn tip(&self) -> Option<Tip> {
-        self.build.tip
+        self.model.build.tip
     }
 
     /// Takes one step of 1/60 s.
@@ -267,7 +198,7 @@ impl RobotSimulation {
         let targets = self.motion.positions(time);
         (self.assembled).drive(
             &mut self.world,
-            &self.robot.kinematics,
+            &self.model.description.kinematics,
             &targets,
             &self.motion,
         );
@@ -289,7 +220,7 @@ impl RobotSimulation {
         let world_from_link: Vec<Pose3> = (self.assembled.links.iter())
             .map(|body| *self.world.bodies[*body].position())
             .collect();
-        let mut frame = camera.frame(&self.scan, &self.clouds, &world_from_link);
+        let mut frame = camera.frame(&self.scan, &self.model.clouds, &world_from_link);
         if let Some(filter) = &self.filter {
             let on_robot = filter.on_robot(&frame, &world_from_link)?;
             self.self_filtered = count(&on_robot);
@@ -307,7 +238,7 @@ impl RobotSimulation {
             let body = self.loose.iter().find(|body| body.collider == collider);
             match (body, link_of.get(&collider)) {
                 (Some(body), _) => body.name.clone(),
-                (None, Some(link)) => self.clouds[*link].name.clone(),
+                (None, Some(link)) => self.model.clouds[*link].name.clone(),
                 (None, None) => "scan".to_owned(),
             }
         };
@@ -340,19 +271,26 @@ impl RobotSimulation {
             .filter(|c| [c.collider1, c.collider2].contains(&self.scan_collider))
             .map(|contact| (contact.point, contact.depth));
         let forces: Vec<f32> = self.tally.iter().map(|tally| tally.force).collect();
-        standing.observe(&self.scan, &self.clouds, &root, &links, contacts, &forces);
+        standing.observe(
+            &self.scan,
+            &self.model.clouds,
+            &root,
+            &links,
+            contacts,
+            &forces,
+        );
     }
 
     /// Where the root is.
     fn root(&self) -> Pose3 {
-        let root = self.assembled.links[self.robot.kinematics.root()];
+        let root = self.assembled.links[self.model.description.kinematics.root()];
         *self.world.bodies[root].position()
     }
 
     fn scan_from_link(&self) -> Vec<Pose3> {
         let pose =
             |link: &LinkCloud| *self.world.bodies[self.assembled.links[link.link]].position();
-        self.clouds.iter().map(pose).collect()
+        self.model.clouds.iter().map(pose).collect()
     }
 
     /// The scan without what lay on the robot at the start.
@@ -362,7 +300,7 @@ impl RobotSimulation {
 
     /// The robot's links.
     pub fn links(&self) -> &[LinkCloud] {
-        &self.clouds
+        &self.model.clouds
     }
 
     /// The clouds of the loose bodies, each in its own frame.
@@ -397,14 +335,20 @@ impl RobotSimulation {
     pub fn report(&self) -> RobotReport {
         let link =
             |(link, tally): (&LinkCloud, &LinkTally)| tally.report(&link.name, link.cloud.len());
-        let links: Vec<LinkReport> = self.clouds.iter().zip(&self.tally).map(link).collect();
+        let links: Vec<LinkReport> = self
+            .model
+            .clouds
+            .iter()
+            .zip(&self.tally)
+            .map(link)
+            .collect();
         RobotReport {
             totals: self.totals.clone(),
             scan_points: self.scan.len(),
             self_filtered_points: self.self_filtered,
             mean_radius: self.scan.mean_radius(),
             up: self.up.to_array(),
-            base_fixed: self.build.is_fixed,
+            base_fixed: self.model.build.is_fixed,
             base: self.root().translation.to_array(),
             driven_joints: self.assembled.driven_joints(),
             link_count: links.len(),
@@ -419,25 +363,25 @@ impl RobotSimulation {
                 .iter()
                 .map(|body| body.report(&self.world.bodies))
                 .collect(),
-            warnings: self.robot.warnings.clone(),
+            warnings: self.model.description.warnings.clone(),
         }
     }
 
     /// The name of a link that is too far from the scan to come back.
     pub fn thrown_out(&self) -> Option<&str> {
         let bounds = self.scan.bounds();
-        let farthest = FAR_AWAY * bounds.extents().length().max(self.build.size);
+        let farthest = FAR_AWAY * bounds.extents().length().max(self.model.build.size);
         let is_lost = |pose: &Pose3| {
             let distance = pose.translation.distance(bounds.center());
             distance.is_nan() || distance > farthest
         };
         let lost = self.scan_from_link().iter().position(is_lost)?;
-        Some(&self.clouds[lost].name)
+        Some(&self.model.clouds[lost].name)
     }
 
     /// Whether the robot is fixed or still on the scan: not below its lowest point.
     pub fn is_on_scan(&self) -> bool {
-        if self.build.is_fixed {
+        if self.model.build.is_fixed {
             return true;
         }
         let lowest = (self.scan.points().iter().map(|&p| p.dot(self.up))).fold(f32::MAX, f32::min);
@@ -445,6 +389,13 @@ impl RobotSimulation {
     }
 }
 
-fn count(flags: &[bool]) -> usize {
-    flags.iter().filter(|flag| **flag).count()
+/// Contacts that give way as motors and feet need it.
+fn soften(parameters: &mut IntegrationParameters, is_fixed: bool) {
+    parameters.normalized_max_corrective_velocity = PUSH_OUT_SPEED;
+    if !is_fixed {
+        // Feet hold by friction while they are pushed out, too.
+        parameters.friction_in_bias_pass = true;
+        parameters.contact_softness.natural_frequency = CONTACT_FREQUENCY;
+        parameters.static_contact_softness.natural_frequency = CONTACT_FREQUENCY;
+    }
 }

@@ -1,5 +1,6 @@
 //! How well a robot stands on ground whose surface is known.
 
+use super::count;
 use super::links::LinkCloud;
 use crate::terrain::Terrain;
 use serde::Serialize;
@@ -95,7 +96,7 @@ impl Standing {
         let heights: Vec<f32> = clouds.iter().zip(links).map(lowest).collect();
         let least = heights.iter().copied().fold(f32::MAX, f32::min);
         let feet: Vec<bool> = heights.iter().map(|h| *h < least + FOOT_HEIGHT).collect();
-        let count = feet.iter().filter(|is_foot| **is_foot).count();
+        let count = count(&feet);
         // The start is above the ground by the drop.
         let start_height = root.translation.z - least;
         Self {
