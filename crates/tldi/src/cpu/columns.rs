@@ -308,7 +308,7 @@ impl Touching {
         tiles: &Tiles,
         rect: &Rect,
         support_px: f32,
-        mut meet: impl FnMut(usize) -> bool,
+        meet: impl Fn(usize) -> bool,
     ) -> Option<Rect> {
         let [width, height] = tiles.dims;
         self.modelled.clear();

@@ -250,7 +250,7 @@ impl Side {
         self.columns.reduce_both(&tiles);
         let support_px = self.support_radius(view.cloud) / seen.pixel_size;
         let reach = reach + tiles.half_diagonal() * seen.pixel_size;
-        let (columns, cells) = (&self.columns, &mut self.cell_distances);
+        let (columns, cells) = (&self.columns, &self.cell_distances);
         let Shared { touching, fold, .. } = shared;
         let meets = |tile: usize| {
             let depths = columns.depths(tile);

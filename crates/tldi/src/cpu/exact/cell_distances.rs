@@ -1,8 +1,8 @@
 //! Bounds of the distance from an exact surface, by grids of cells.
 //!
 //! To ask a surface for a distance is expensive. The distance at the middle of a cell bounds all others in it: it differs
-//! by no more than a place is away from the middle. So coarse cells are asked first, and finer ones only where
-//! the surface may be near. Each cell is asked once.
+//! by no more than a place is away from the middle. So coarse cells are asked first, and finer ones only where the
+//! surface may be near. Each cell is asked once.
 
 use crate::Aabb;
 use crate::cpu::exact::placed::Placed;
@@ -13,30 +13,43 @@ use glamx::Vec3;
 /// Finer cells along an edge of a coarser one: a power of two.
 const FINER: usize = 4;
 
+/// Half the diagonal of a cell whose edge is 1, and a little more: places in corners are rounded.
+const HALF_DIAGONAL: f32 = 0.8661;
+
 /// Memory of one cloud, kept from call to call.
 #[derive(Default)]
 pub(crate) struct CellDistances {
-    /// Of the places, before they are in cells.
+    /// Of the places, before they are in cells. Most fold nothing.
     fold: SpaceFold,
-    /// The finest first.
+    /// The finest cells.
+    grid: ZoneGrid,
+    cells: Vec<Cell>,
+    /// Of each cell before folding, infinite until it is asked for. None where nothing is folded.
+    middles: Vec<Vec3>,
+    /// Coarser cells, the coarsest last. None where places are folded: what is far apart may be in one cell then.
     levels: Vec<Level>,
     /// How many of them are in use.
     count: usize,
 }
 
+#[derive(Clone, Copy)]
+struct Cell {
+    /// Of the distances in it, metres.
+    bounds: [f32; 2],
+    /// Whether they are as close as one distance tells.
+    is_asked: bool,
+}
+
+const UNKNOWN: Cell = Cell {
+    bounds: [f32::NEG_INFINITY, f32::INFINITY],
+    is_asked: false,
+};
+
 #[derive(Default)]
 struct Level {
     grid: ZoneGrid,
-    half_diagonal: f32,
-    cells: Vec<Cell>,
-}
-
-#[derive(Clone, Copy)]
-struct Cell {
-    /// Infinite until the cell is asked for.
-    middle: Vec3,
-    /// From there to the surface, metres.
-    distance: f32,
+    /// At the middle of each cell, metres. Not a number until it is asked for.
+    distances: Vec<f32>,
 }
 
 impl CellDistances {
@@ -49,69 +62,108 @@ impl CellDistances {
         let most = points.len().max(1) as f32;
         let bounds = points.clone().fold(Aabb::EMPTY, Aabb::including);
         self.fold.clear();
-        let mut grid = ZoneGrid::with_cells(&bounds, reach, most);
-        if is_coarse(grid.inv_cell, reach) {
+        self.grid = ZoneGrid::with_cells(&bounds, reach, most);
+        self.count = 0;
+        self.middles.clear();
+        if is_coarse(self.grid.inv_cell, reach) {
             self.fold.find(reach, points.clone());
             let folded = points.map(|point| self.fold.folded(point));
             let bounds = folded.fold(Aabb::EMPTY, Aabb::including);
-            grid = ZoneGrid::with_cells(&bounds, reach, most);
+            self.grid = ZoneGrid::with_cells(&bounds, reach, most);
+            self.middles.resize(self.grid.cells(), Vec3::INFINITY);
+        } else {
+            let mut grid = self.grid;
+            while grid.dims.iter().any(|n| *n > 2 * FINER) {
+                grid.inv_cell /= FINER as f32;
+                grid.dims = grid.dims.map(|n| n.div_ceil(FINER));
+                if self.count == self.levels.len() {
+                    self.levels.push(Level::default());
+                }
+                let level = &mut self.levels[self.count];
+                level.grid = grid;
+                level.distances.clear();
+                level.distances.resize(grid.cells(), f32::NAN);
+                self.count += 1;
+            }
         }
-        self.count = 0;
-        loop {
-            if self.count == self.levels.len() {
-                self.levels.push(Level::default());
-            }
-            self.levels[self.count].begin(grid);
-            self.count += 1;
-            if grid.dims.iter().all(|n| *n <= FINER) {
-                break;
-            }
-            grid.inv_cell /= FINER as f32;
-            grid.dims = grid.dims.map(|n| n.div_ceil(FINER));
+        self.cells.clear();
+        self.cells.resize(self.grid.cells(), UNKNOWN);
+    }
+
+    /// How far the surface is from a place, metres, at least and at most: by the coarsest cell that says more than `enough`,
+    /// or by the finest. Nothing is known beside all cells.
+    #[inline]
+    pub(crate) fn bounds(&mut self, exact: &Placed, place: Vec3, enough: f32) -> [f32; 2] {
+        if !self.middles.is_empty() {
+            return self.folded_bounds(exact, place);
+        }
+        let Some(at) = self.grid.cell(place) else {
+            return UNKNOWN.bounds;
+        };
+        let cell = self.cells[self.grid.index(at)];
+        if cell.is_asked || cell.bounds[0] > enough {
+            cell.bounds
+        } else {
+            self.refined_bounds(exact, at, enough)
         }
     }
 
-    /// How far the surface is from a place, metres, at least and at most: by the first cells that say more than `enough`, or
-    /// by the finest ones. Nothing is known beside all cells.
-    pub(crate) fn bounds(&mut self, exact: &Placed, place: Vec3, enough: f32) -> [f32; 2] {
-        let folded = self.fold.folded(place);
-        let mut bounds = [f32::NEG_INFINITY, f32::INFINITY];
-        let levels = &mut self.levels[..self.count];
-        let Some(finest) = (levels.first()).and_then(|level| level.grid.cell(folded)) else {
-            return bounds;
-        };
-        for (k, level) in levels.iter_mut().enumerate().rev() {
-            let at = finest.map(|c| c >> (k as u32 * FINER.ilog2()));
-            let [x, y, _] = level.grid.dims;
-            let cell = &mut level.cells[(at[2] * y + at[1]) * x + at[0]];
-            let mut away = cell.middle.distance(place);
-            // After folding, one cell may hold places on both sides of a gap. The distance that it keeps is of one side.
-            if away > level.half_diagonal {
-                let middle = Vec3::from_array(at.map(|c| c as f32 + 0.5));
-                cell.middle = level.grid.min + middle / level.grid.inv_cell + (place - folded);
-                cell.distance = exact.project(cell.middle).0;
-                away = cell.middle.distance(place);
+    /// The same by what is known without asking.
+    #[inline]
+    pub(crate) fn known_bounds(&self, place: Vec3) -> [f32; 2] {
+        match self.grid.cell(place) {
+            Some(at) if self.middles.is_empty() && !self.cells.is_empty() => {
+                self.cells[self.grid.index(at)].bounds
             }
-            bounds = [cell.distance - away, cell.distance + away];
-            if bounds[0] > enough {
-                break;
+            _ => UNKNOWN.bounds,
+        }
+    }
+
+    /// The same by the finest cells. One of them may hold places on both sides of a gap. What it keeps is of one side.
+    fn folded_bounds(&mut self, exact: &Placed, place: Vec3) -> [f32; 2] {
+        let folded = self.fold.folded(place);
+        let Some(at) = self.grid.cell(folded) else {
+            return UNKNOWN.bounds;
+        };
+        let k = self.grid.index(at);
+        let half_diagonal = HALF_DIAGONAL / self.grid.inv_cell;
+        if self.middles[k].distance(place) > half_diagonal {
+            self.middles[k] = self.grid.middle(at) + (place - folded);
+            self.cells[k] = Cell::asked(exact, self.middles[k], half_diagonal);
+        }
+        self.cells[k].bounds
+    }
+
+    /// What coarser cells, or else the surface, tell of one of the finest.
+    fn refined_bounds(&mut self, exact: &Placed, at: [usize; 3], enough: f32) -> [f32; 2] {
+        let middle = self.grid.middle(at);
+        let half_diagonal = HALF_DIAGONAL / self.grid.inv_cell;
+        let cell = &mut self.cells[self.grid.index(at)];
+        for (k, level) in self.levels[..self.count].iter_mut().enumerate().rev() {
+            let at = at.map(|c| c >> ((k as u32 + 1) * FINER.ilog2()));
+            let asked_at = level.grid.middle(at);
+            let distance = &mut level.distances[level.grid.index(at)];
+            if distance.is_nan() {
+                *distance = exact.project(asked_at).0;
+            }
+            let away = asked_at.distance(middle) + half_diagonal;
+            cell.bounds = [*distance - away, *distance + away];
+            if cell.bounds[0] > enough {
+                return cell.bounds;
             }
         }
-        bounds
+        *cell = Cell::asked(exact, middle, half_diagonal);
+        cell.bounds
     }
 }
 
-impl Level {
-    fn begin(&mut self, grid: ZoneGrid) {
-        self.grid = grid;
-        // A place in a corner is rounded.
-        self.half_diagonal = 1.001 * 0.5 * 3.0f32.sqrt() / grid.inv_cell;
-        let unasked = Cell {
-            middle: Vec3::INFINITY,
-            distance: 0.0,
-        };
-        self.cells.clear();
-        self.cells.resize(grid.dims.iter().product(), unasked);
+impl Cell {
+    fn asked(exact: &Placed, middle: Vec3, half_diagonal: f32) -> Self {
+        let (distance, _) = exact.project(middle);
+        Self {
+            bounds: [distance - half_diagonal, distance + half_diagonal],
+            is_asked: true,
+        }
     }
 }
 
@@ -140,16 +192,12 @@ mod tests {
             cells.begin(points.iter().copied(), REACH);
             let between: Vec<Vec3> = (0..2000).map(|_| random()).collect();
             let mut bound = |place: &Vec3| {
-                let (least, distance) =
-                    (cells.at_least(&exact, *place, REACH), place.length() - 1.0);
+                let [least, most] = cells.bounds(&exact, *place, REACH);
+                let distance = place.length() - 1.0;
                 let rounding = 1e-6 * place.length();
                 assert!(
-                    least <= distance + rounding,
-                    "{least} of {distance} at {place}"
-                );
-                assert!(
-                    most >= distance - rounding,
-                    "{most} of {distance} at {place}"
+                    (least - rounding..=most + rounding).contains(&distance),
+                    "{place}"
                 );
                 [least, distance]
             };

@@ -1,4 +1,4 @@
-//! Surfaces for tests, which count how often they are asked for a distance.
+//! Surfaces for tests, which count how often they are asked for a distance. They tell nothing else.
 
 use crate::cpu::exact::placed::Placed;
 use crate::{Aabb, RayHit, RaySurface};
@@ -41,12 +41,10 @@ impl TestSurface {
 
 impl RaySurface for TestSurface {
     fn bounds(&self) -> Aabb {
-        unimplemented!("no test asks for them")
+        Aabb::EMPTY
     }
 
-    fn crossings(&self, _: Vec3, _: Vec3, _: f32, _: &mut Vec<RayHit>) {
-        unimplemented!("no test casts rays")
-    }
+    fn crossings(&self, _: Vec3, _: Vec3, _: f32, _: &mut Vec<RayHit>) {}
 
     fn project(&self, point: Vec3) -> (f32, Vec3) {
         self.asked.fetch_add(1, Ordering::Relaxed);
