@@ -10,6 +10,7 @@ pub(crate) mod noise;
 pub(crate) mod part_shape;
 pub(crate) mod patch_types;
 pub(crate) mod patches;
+mod point_axes;
 pub(crate) mod ramp;
 pub(crate) mod smooth;
 pub(crate) mod supports;

@@ -4,8 +4,9 @@ use crate::contact::bowl::{Floor, GAP_PER_SLOPE, Lowest, relative_radius, slope_
 use crate::contact::crease::{Face, Frame, lower_by};
 use crate::contact::links::Links;
 use crate::contact::main_plane::LEAST_PLANE;
+use crate::contact::point_axes::longest_axis;
 use crate::contact::smooth::{Smooth, common_normal};
-use crate::contact::supports::{longest_axis, supports};
+use crate::contact::supports::supports;
 use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, Params};
 use glamx::Vec3;
 

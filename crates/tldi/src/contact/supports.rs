@@ -1,7 +1,8 @@
 //! Which of many contact points the solver gets.
 
-use crate::contact::bowl::{Bowl, Floor, Lowest, Valley};
+use crate::contact::bowl::{Bowl, Floor, Lowest};
 use crate::contact::main_plane::GapPlane;
+use crate::contact::point_axes::MainAxes;
 use crate::contact::ramp::ramp;
 use crate::{ContactPoint, PATCH_POINTS};
 use arrayvec::ArrayVec;
@@ -40,10 +41,6 @@ pub struct Supports {
 /// seeds instead of one; twice: no change.
 const LOWEST: f32 = 2.5;
 
-/// Least extent across the longest direction, as a share of that along it: less is rounding. Half or twice: no row
-/// changes.
-const LEAST_WIDTH: f32 = 1e-6;
-
 /// Least extent across, as a share of that along, of points that tell how steeply their gaps rise across. Half or
 /// twice: no change.
 const LEAST_KNOWN_WIDTH: f32 = 0.1;
@@ -61,10 +58,6 @@ const UNBENT: [f32; 2] = [0.3, 0.5];
 /// Roughness, in units of the least roughness, up to which there is no bend, and from which there
 /// may be one. Both halved or doubled: no change in any suite.
 const SMOOTH: [f32; 2] = [0.5, 1.0];
-
-/// How far from the floor of a valley points tell how low it is, in standard deviations across it. Half or twice: no
-/// row changes.
-const NEAR_FLOOR: f32 = 0.4;
 
 /// Which of `points`, on one plane with the unit normal `normal`, a body would rest on. Of four directions at right
 /// angles to each other, along which the points reach out farthest, each gives the point that is farthest out and
@@ -146,89 +139,6 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     }
 }
 
-/// The main axes of points on one plane.
-struct MainAxes {
-    centre: Vec3,
-    normal: Vec3,
-    /// Unit vectors; the points extend the most along the first.
-    axes: [Vec3; 2],
-    /// Standard deviations along them, metres.
-    sigma: Vec2,
-}
-
-impl MainAxes {
-    fn of(points: &[ContactPoint], normal: Vec3) -> Self {
-        let middles = || points.iter().map(ContactPoint::middle);
-        let count = points.len() as f32;
-        let centre = middles().sum::<Vec3>() / count;
-        let longest = longest_axis(middles(), centre, normal);
-        let mut own = Self {
-            centre,
-            normal,
-            axes: [longest, normal.cross(longest)],
-            sigma: Vec2::ONE,
-        };
-        let squares = middles().map(|middle| own.along(middle)).map(|d| d * d);
-        let variance = squares.sum::<Vec2>() / count;
-        let sigma = Vec2::new(variance.x.sqrt(), variance.y.sqrt());
-        // Points in a row, or a single one, have no extent across.
-        own.sigma = sigma.max(Vec2::splat(f32::MIN_POSITIVE.max(LEAST_WIDTH * sigma.x)));
-        own
-    }
-
-    /// Coordinates from the centre along the axes, metres.
-    fn along(&self, point: Vec3) -> Vec2 {
-        let off = point - self.centre;
-        Vec2::new(off.dot(self.axes[0]), off.dot(self.axes[1]))
-    }
-
-    /// The same in standard deviations.
-    fn place(&self, point: &ContactPoint) -> Vec2 {
-        self.along(point.middle()) / self.sigma
-    }
-
-    /// The contact at a place, with this gap. The surfaces bend away from the plane: it is as high as the nearest of
-    /// `points`.
-    fn contact_at(&self, place: Vec2, gap: f32, points: &[ContactPoint]) -> ContactPoint {
-        let aside = place * self.sigma;
-        let middle = self.centre + aside.x * self.axes[0] + aside.y * self.axes[1];
-        let off = |p: &ContactPoint| (p.middle() - middle).reject_from_normalized(self.normal);
-        let nearest = (points.iter())
-            .min_by(|p, q| off(p).length_squared().total_cmp(&off(q).length_squared()));
-        let above = nearest.map_or(0.0, |p| (p.middle() - middle).dot(self.normal));
-        ContactPoint::about(middle + above * self.normal, gap, self.normal)
-    }
-
-    /// The floor of a valley whose gaps rise by `slope` in a standard deviation of each place; `None` if no two points
-    /// are near it.
-    fn floor(&self, valley: Valley, slope: Vec2, points: &[ContactPoint]) -> Option<Floor> {
-        let Valley {
-            across,
-            place: lowest,
-            bend,
-        } = valley;
-        let along = 1 - across;
-        let near = (points.iter().map(|p| (self.place(p), p.gap)))
-            .filter(|(place, _)| (place[across] - lowest).abs() <= NEAR_FLOOR);
-        let (mut ends, mut sum, mut count) = ([f32::INFINITY, f32::NEG_INFINITY], 0.0, 0.0);
-        for (place, gap) in near {
-            let at = place[along];
-            ends = [ends[0].min(at), ends[1].max(at)];
-            sum += gap - slope[along] * at - bend * (place[across] - lowest).powi(2);
-            count += 1.0;
-        }
-        let end = |at: f32| {
-            let mut place = Vec2::splat(at);
-            place[across] = lowest;
-            self.contact_at(place, sum / count + slope[along] * at, points)
-        };
-        (ends[0] < ends[1]).then(|| Floor {
-            ends: ends.map(end),
-            radius: 0.5 / bend * self.sigma[across].powi(2) * self.axes[across],
-        })
-    }
-}
-
 /// Indices of the places that are farthest out in one of four directions at right angles. How low a place is counts, too.
 fn farthest_out(
     lows: impl ExactSizeIterator<Item = (Vec2, f32)> + Clone,
@@ -263,20 +173,6 @@ fn corner_angle(places: impl Iterator<Item = Vec2>) -> f32 {
         square.rotate(square)
     };
     0.25 * places.map(fourth_power).sum::<Vec2>().to_angle()
-}
-
-/// Direction across `normal`, of unit length, in which points about `centre` extend the most.
-pub(crate) fn longest_axis(points: impl Iterator<Item = Vec3>, centre: Vec3, normal: Vec3) -> Vec3 {
-    let (u, v) = normal.any_orthonormal_pair();
-    let (mut uu, mut uv, mut vv) = (0.0, 0.0, 0.0);
-    for p in points {
-        let d = Vec2::new((p - centre).dot(u), (p - centre).dot(v));
-        uu += d.x * d.x;
-        uv += d.x * d.y;
-        vv += d.y * d.y;
-    }
-    let (sin, cos) = (0.5 * (2.0 * uv).atan2(uu - vv)).sin_cos();
-    cos * u + sin * v
 }
 
 #[cfg(test)]

@@ -10,7 +10,8 @@ use crate::cpu::fold::{SpaceFold, is_coarse};
 use crate::cpu::zone::ZoneGrid;
 use glamx::Vec3;
 
-/// Finer cells along an edge of a coarser one: a power of two.
+/// Finer cells along an edge of a coarser one: a power of two. Of 64,000 cells in a test, 36 are asked; with half 38,
+/// with twice 145.
 const FINER: usize = 4;
 
 /// Half the diagonal of a cell whose edge is 1, and a little more: places in corners are rounded.

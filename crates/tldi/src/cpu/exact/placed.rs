@@ -15,6 +15,10 @@ const LEAST_FREE: f32 = 0.05;
 /// Half as many draw a few columns more in which nothing meets; twice as many cost as much again.
 const MOST_STEPS: usize = 64;
 
+/// Least step that a march takes by a bound, as a share of what the bound leaves open: shorter ones would be many. Half
+/// or twice: no test of columns fails.
+const LEAST_STEP: f32 = 0.25;
+
 /// An exact surface where a pair has it.
 #[derive(Clone, Copy)]
 pub(crate) struct Placed<'a> {
@@ -59,8 +63,7 @@ impl Placed<'_> {
             }
             let place = camera.point_at(u, v, depth);
             let [mut distance, most] = cells.known_bounds(place);
-            // A step by a bound is no shorter than a quarter of what the bound leaves open: it would be one of many.
-            if most > near && 4.0 * (distance - near) < most - distance {
+            if most > near && distance - near < LEAST_STEP * (most - distance) {
                 (distance, _) = self.project(place);
             }
             let free = distance - reach;
