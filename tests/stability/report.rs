@@ -92,7 +92,7 @@ impl Report {
         )
     }
 
-    /// The table of passes, and what fails: of ours in full, of others folded.
+    /// The summary, and what else does not pass: of ours what is not applicable, of others folded.
     fn markdown(&self) -> String {
         let mut text = self.summary();
         for method in self.methods() {
@@ -249,7 +249,7 @@ impl Report {
         else {
             bail!("{} has no place marked {BEGIN} … {END}", file.display());
         };
-        let (scenes, table) = (self.scenes_text(), self.markdown());
+        let (scenes, table) = (self.scenes_text(), self.summary());
         write(
             file,
             &format!("{before}{BEGIN}\n\n{table}\n{scenes}\n{END}{after}"),
