@@ -47,9 +47,10 @@
 //!   beginning of the step: what a surface does that deforms comes after.
 //! - Segments, polylines and shapes without width have no surface, and pass through clouds; so do rapier's
 //!   soft bodies. The pipeline says so once for each such collider ([`TldiError::PassesThrough`]).
-//! - Rapier's `KinematicCharacterController` asks rapier's own dispatcher and passes through clouds, and so does
-//!   everything in a world that no pipeline is attached to. The crate sees neither collider nor step then, only that
-//!   it is not asked: it warns once in the [`log`].
+//! - In a world that no pipeline is attached to, everything passes through clouds. The crate sees neither collider nor
+//!   step then, only that it is not asked: it warns once in the [`log`].
+//! - Rapier's `KinematicCharacterController` walks on clouds, but asks rapier's own dispatcher whether it is grounded: never
+//!   (`docs/in_your_app.md` shows what to do). The same warning says so.
 //! - A body wholly inside a cloud's volume, surfaces apart, is not in contact.
 //! - Rapier cannot serialise custom shapes, nor the state of pairs with clouds.
 

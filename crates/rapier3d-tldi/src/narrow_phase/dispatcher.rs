@@ -39,10 +39,12 @@ use tldi::PairResult;
 /// # Shape casts
 /// The distance of a straight cast is exact to 0.2 r̄ of the coarser cloud if surfaces meet face
 /// on. Otherwise it is exact to a pixel divided by the cosine between normal and motion. A target
-/// distance counts along the normal. With `stop_at_penetration` off, and in turning casts, a shape
-/// passes two things: surfaces that touch it at the start, unless the motion goes on towards them
-/// by more than a pixel; and surfaces that only its rim would meet. The rim is two pixels wide, or
-/// three where the motion goes on by no more than that. Turning casts are early by up to a pixel.
+/// distance counts along the normal. With `stop_at_penetration` off, a straight cast is held at its
+/// start by what touches the shape there, if the motion leads into it: by more than 0.2 pixels in
+/// its first pixel. Of the rest, and in turning casts, a shape passes two things: surfaces that touch
+/// it at the start, unless the motion goes on towards them by more than a pixel; and surfaces that
+/// only its rim would meet. The rim is two pixels wide, or three where the motion goes on by no more
+/// than that. Turning casts are early by up to a pixel.
 /// They may miss a surface that the shape touches only briefly: for less than it takes to turn by
 /// half its CCD thickness. In a step of the pipeline, they ignore, from behind, a sheet that the
 /// shape's contacts push it out of. Cost: both clouds and the layers in the way are read once for

@@ -18,7 +18,7 @@ use rapier3d::parry::query::{
 };
 use rapier3d::parry::shape::Shape;
 use std::cell::RefCell;
-use tldi::{BackendError, ImpactQuery, Penetration, Room};
+use tldi::{BackendError, ContactPoint, Impact, ImpactQuery, Params, Penetration, Room};
 
 /// Least cosine between normal and motion by which a target distance is divided: beyond, the
 /// surface is seen edge-on. Half or twice: no test of queries fails.
@@ -51,7 +51,17 @@ pub(crate) fn cast_shapes(
         } else {
             (pos12, velocity)
         };
-        let hit = straight_impact(shared, &moving, a_from_b, velocity, options);
+        let Some(params) = moving.params(&shared.config()) else {
+            return Ok(None);
+        };
+        let straight = Straight {
+            moving: &moving,
+            a_from_b,
+            velocity,
+            options,
+            params,
+        };
+        let hit = (straight.held_at_the_start(shared)).or_else(|| straight.impact(shared));
         Ok(hit.map(|hit| moving.restore(hit)))
     })
 }
@@ -218,44 +228,100 @@ fn turning_impact(
     Some(hit)
 }
 
-/// The impact of the second part, of this velocity in the frame of the first, in m/s.
-fn straight_impact(
-    shared: &Shared,
-    moving: &Moving<'_>,
+/// A straight motion of the second of two parts.
+struct Straight<'a> {
+    moving: &'a Moving<'a>,
+    /// At the start.
     a_from_b: Pose,
+    /// In the frame of the first, m/s.
     velocity: Vector,
     options: ShapeCastOptions,
-) -> Option<ShapeCastHit> {
-    let params = moving.params(&shared.config())?;
-    let speed = velocity.as_dvec3().length();
-    let [max_time, target_distance] =
-        [options.max_time_of_impact, options.target_distance].map(f64::from);
-    let direction = velocity.as_dvec3().try_normalize()?;
-    // A cast without an end is one of the longest that there is.
-    let ahead = target_distance / f64::from(LEAST_COSINE);
-    let length = (speed * max_time + ahead).min(f64::from(f32::MAX));
-    let way = StraightWay::new(moving.parts, &a_from_b, length * direction, &params)?;
-    let [a, b] = moving.parts.map(ExactShape);
-    let query = ImpactQuery {
-        a: surface(&a),
-        b: surface(&b),
-        a_from_b: rigid(way.begin(&a_from_b)),
-        motion: way.motion(),
-        touching: match options.stop_at_penetration {
-            true => 0.0,
-            false => TOUCHING * params.pixel_size,
-        },
-        core_only: !options.stop_at_penetration,
-        penetration: None,
-        params,
-    };
-    let mut room = Room::default();
-    let impact = shared.impact_on_the_spot(&query, &mut room);
-    shared.tell_coarser(room.coarser());
-    let impact = impact?;
-    let cosine = -impact.normal.dot(way.direction);
-    let early = target_distance / f64::from(cosine.max(LEAST_COSINE));
-    let time = (way.from + f64::from(impact.distance) - early).max(0.0) / speed;
-    let moved = way.at(&a_from_b, impact.distance);
-    (time <= max_time).then(|| hit_of(&impact, time as f32, &moved))
+    params: Params,
+}
+
+impl Straight<'_> {
+    /// Where only penetrations count that the motion does not end: the deepest contact at the start that it makes deeper.
+    /// Over a pixel of the way, for which a contact speaks, it must become deeper than gaps scatter.
+    fn held_at_the_start(&self, shared: &Shared) -> Option<ShapeCastHit> {
+        let Self {
+            moving, options, ..
+        } = self;
+        if options.stop_at_penetration {
+            return None; // that is known already
+        }
+        let touching = TOUCHING * self.params.pixel_size;
+        let direction = self.velocity.as_dvec3().try_normalize()?.as_vec3();
+        let length = self.velocity.length() * options.max_time_of_impact;
+        let way = length.min(self.params.pixel_size) * direction;
+        let pair = ShapePair {
+            shape1: moving.parts[0],
+            shape2: moving.parts[1],
+            pos12: self.a_from_b,
+            prediction: touching,
+        };
+        let mut room = Room::default();
+        let found = shared.contacts_on_the_way(pair, &shared.config(), &mut room, |patches| {
+            let holding = patches.iter().flat_map(|patch| {
+                let approach = -patch.normal.dot(way);
+                let holds = move |point: &&ContactPoint| {
+                    approach > 0.0 && point.gap - approach < options.target_distance - touching
+                };
+                let impact = |point: &ContactPoint| Impact {
+                    distance: point.gap,
+                    point: point.point_a,
+                    normal: patch.normal,
+                    coarser: None,
+                };
+                patch.points.iter().filter(holds).map(impact)
+            });
+            holding.min_by(|m, n| m.distance.total_cmp(&n.distance))
+        });
+        shared.tell_coarser(room.coarser());
+        found.map(|impact| ShapeCastHit {
+            status: ShapeCastStatus::PenetratingOrWithinTargetDist,
+            ..hit_of(&impact, 0.0, &self.a_from_b)
+        })
+    }
+
+    /// The impact on the way.
+    fn impact(&self, shared: &Shared) -> Option<ShapeCastHit> {
+        let Self {
+            moving,
+            a_from_b,
+            velocity,
+            options,
+            params,
+        } = self;
+        let speed = velocity.as_dvec3().length();
+        let [max_time, target_distance] =
+            [options.max_time_of_impact, options.target_distance].map(f64::from);
+        let direction = velocity.as_dvec3().try_normalize()?;
+        // A cast without an end is one of the longest that there is.
+        let ahead = target_distance / f64::from(LEAST_COSINE);
+        let length = (speed * max_time + ahead).min(f64::from(f32::MAX));
+        let way = StraightWay::new(moving.parts, a_from_b, length * direction, params)?;
+        let [a, b] = moving.parts.map(ExactShape);
+        let query = ImpactQuery {
+            a: surface(&a),
+            b: surface(&b),
+            a_from_b: rigid(way.begin(a_from_b)),
+            motion: way.motion(),
+            touching: match options.stop_at_penetration {
+                true => 0.0,
+                false => TOUCHING * params.pixel_size,
+            },
+            core_only: !options.stop_at_penetration,
+            penetration: None,
+            params: *params,
+        };
+        let mut room = Room::default();
+        let impact = shared.impact_on_the_spot(&query, &mut room);
+        shared.tell_coarser(room.coarser());
+        let impact = impact?;
+        let cosine = -impact.normal.dot(way.direction);
+        let early = target_distance / f64::from(cosine.max(LEAST_COSINE));
+        let time = (way.from + f64::from(impact.distance) - early).max(0.0) / speed;
+        let moved = way.at(a_from_b, impact.distance);
+        (time <= max_time).then(|| hit_of(&impact, time as f32, &moved))
+    }
 }

@@ -457,7 +457,7 @@ impl Shape for PointCloudShape {
             log::warn!(
                 "rapier's own dispatcher was asked about contacts of a point cloud, and finds none: bodies pass \
                  through it. Call TldiPipeline::attach before the world's first step. Rapier's \
-                 KinematicCharacterController always asks that dispatcher: move the character as a body"
+                 KinematicCharacterController always asks it whether it is grounded: docs/in_your_app.md"
             );
         });
         ShapeType::Custom

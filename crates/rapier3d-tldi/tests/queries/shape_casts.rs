@@ -150,6 +150,18 @@ fn target_distance_and_penetration() -> TestResult {
     };
     assert!(cast(0.15, Vector::Y, until(10.0))?.is_some());
     assert!(cast(0.15, Vector::Y, through)?.is_none());
+    // As rapier does: what goes deeper is held at once, also on a short way, and what slides is not.
+    for (height, velocity, time) in [(0.15, -2.0 * Vector::Y, 10.0), (0.19, -Vector::Y, 0.02)] {
+        let until = ShapeCastOptions {
+            max_time_of_impact: time,
+            ..through
+        };
+        let hit = cast(height, velocity, until)?.ok_or("it goes on into the floor")?;
+        assert_eq!(hit.time_of_impact, 0.0, "{height}");
+        assert_eq!(hit.status, ShapeCastStatus::PenetratingOrWithinTargetDist);
+        assert!(hit.normal1.y > 0.99, "{hit:?}");
+    }
+    assert!(cast(0.2, Vector::X, through)?.is_none());
     Ok(())
 }
 
