@@ -6,18 +6,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
-use tldi_examples::cli::{Common, RangeArgument, UpChoice, ended};
+use tldi_examples::cli::{Common, RangeArgument, UpChoice, ended, positive, within};
 use tldi_examples::depth::{
     DepthScene, DepthSimulation, DepthSnapshot, FRAME_SECONDS, FrameSource, GeneratedCamera,
-    camera_up,
+    WantedBodies, camera_up,
 };
+use tldi_examples::output;
+use tldi_examples::pictures::{self, ANIMATION_SIZE, Entity, PICTURE_SIZE};
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
-use tldi_examples::scan::{positive, within};
-use tldi_examples::scene::BodyShape;
-use tldi_examples::simulation::NamedCloud;
-use tldi_examples::spots::{Demand, NoSpot, Spot, find_spots_where};
-use tldi_examples::{load, output};
-use tldi_pictures::{BODY_COLORS, Item, Picture, Scene, viewpoint};
+use tldi_pictures::{BODY_COLORS, Item, Scene, viewpoint};
 use tldi_sources::depth::{DepthCamera, DepthSequence, SensorModel};
 
 /// Depth frames become a collider that is new in every frame; bodies rest on it and are pushed
@@ -41,9 +38,6 @@ struct Args {
     /// Seconds for which the first frame stays, so that the bodies land before things move
     #[arg(long, value_name = "S", default_value_t = 1.5, value_parser = within(0.0, 3600.0), allow_hyphen_values = true)]
     hold: f32,
-    /// How often the frames are shown
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
-    loops: u16,
     /// Remember the points of this many frames where the present one does not see
     #[arg(long, value_name = "N", default_value_t = 0)]
     memory: usize,
@@ -75,18 +69,6 @@ struct Args {
 
 /// Frames of the generated sequence.
 const GENERATED_FRAMES: usize = 150;
-/// Width in metres of a body of the generated sequence.
-const GENERATED_BODY_SIZE: f32 = 0.14;
-/// Width of a body that is not given one: a share of the median distance, smaller by a factor until there is
-/// place, and at least this many mean radii of a frame.
-const SIZE_SHARE: f32 = 0.08;
-const SHRINKING: f32 = 0.8;
-const BODY_RADII: f32 = 8.0;
-/// Room around a place that must be in view in the last frame, in body radii.
-const ROOM_IN_VIEW: f32 = 2.5;
-const BODY_SPACING: f32 = 0.03;
-const PICTURE_SIZE: [u32; 2] = [1280, 720];
-const ANIMATION_SIZE: [u32; 2] = [640, 360];
 /// Frames from one picture of the animation to the next.
 const ANIMATION_FRAMES: usize = 3;
 /// Of the points of a frame, one in as many is kept for the animation.
@@ -118,20 +100,14 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let cloud = seen.into_builder().build()?.into_owned();
     let up = match args.up {
         UpChoice::Given(up) => up,
-        UpChoice::Auto => {
-            let normals = cloud.normals().unwrap_or_default();
-            let up = camera_up(normals, &first.world_from_camera)?;
-            let [x, y, z] = up.direction.to_array();
-            eprintln!(
-                "up is {x:.3},{y:.3},{z:.3}: {:.0} % of the normals say so, and at most {:.0} % as much speaks for \
-                 another; --up X,Y,Z sets it",
-                100.0 * up.share,
-                100.0 * up.rival
-            );
-            up.direction
-        }
+        UpChoice::Auto => find_up(&cloud, &first.world_from_camera)?,
     };
-    let (bodies, spots) = place_bodies(&source, &camera, &cloud, up, args)?;
+    let wanted = WantedBodies {
+        count: args.count.into(),
+        size: args.size,
+        seed: args.common.seed,
+    };
+    let (bodies, spots) = wanted.placed(&source, camera.clone(), &cloud, up)?;
     let scene = DepthScene {
         camera,
         up,
@@ -144,13 +120,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let recording = args.recording.start("depth_camera", up)?;
     let snapshots = simulate(&mut simulation, &source, recording, args)?;
     let report = simulation.report(missing);
-    let json = args.common.json.as_deref();
-    output::publish(
-        &report,
-        source.origin(),
-        |out| report.write_table(out),
-        json,
-    )?;
+    output::publish(&report, source.origin(), args.common.json.as_deref())?;
     if !args.common.no_pictures {
         draw(&simulation, up, &snapshots, args)?;
     }
@@ -181,114 +151,17 @@ fn open(args: &Args) -> anyhow::Result<(FrameSource, Vec<String>)> {
     Ok((FrameSource::Folder(sequence), missing))
 }
 
-/// Bodies, and where they are dropped. Where their size is not given, it is as large as the distance of
-/// what is seen suggests, or smaller until each has a place of its own.
-fn place_bodies(
-    source: &FrameSource,
-    camera: &DepthCamera,
-    first: &PointCloud<'_>,
-    up: Vec3,
-    args: &Args,
-) -> anyhow::Result<(Vec<NamedCloud>, Vec<Spot>)> {
-    if args.count == 0 {
-        return Ok((Vec::new(), Vec::new()));
-    }
-    let make_bodies = |size: f32| {
-        let (count, seed) = (args.count.into(), args.common.seed);
-        NamedCloud::generated(&BodyShape::WHOLE, count, BODY_SPACING, size, seed)
-    };
-    let least = BODY_RADII * first.mean_radius();
-    if matches!(source, FrameSource::Generated(_)) {
-        let size = args.size.unwrap_or(GENERATED_BODY_SIZE.max(least));
-        let spots = GeneratedCamera::spots();
-        if usize::from(args.count) <= spots.len() {
-            return Ok((make_bodies(size)?, spots));
-        }
-    }
-    let frame = source.frame(source.len() - 1)?;
-    let mut camera = camera.clone();
-    camera.points(&frame.depths, &frame.world_from_camera);
-    let view = LastView {
-        camera: &camera,
-        camera_from_world: frame.world_from_camera.inverse(),
-    };
-    let distance = view.median_depth(first);
-    let mut size = args.size.unwrap_or(least.max(SIZE_SHARE * distance));
-    loop {
-        let bodies = make_bodies(size)?;
-        let spots = view.spots(first, up, &bodies, distance, args.common.seed);
-        let each_has_its_own = |spots: &Vec<Spot>| spots.iter().all(|spot| spot.level == 0);
-        let smaller = SHRINKING * size;
-        if args.size.is_some() || smaller < least || spots.as_ref().is_ok_and(each_has_its_own) {
-            return Ok((bodies, spots?));
-        }
-        size = smaller;
-    }
-}
-
-/// Where the camera is in the last frame: what it does not see there cannot hold a body.
-struct LastView<'a> {
-    camera: &'a DepthCamera,
-    camera_from_world: Pose3,
-}
-
-impl LastView<'_> {
-    fn depth(&self, point: Vec3) -> f32 {
-        (self.camera_from_world * point).z
-    }
-
-    /// Median depth in metres of the points.
-    fn median_depth(&self, cloud: &PointCloud<'_>) -> f32 {
-        let mut depths: Vec<f32> = cloud
-            .points()
-            .iter()
-            .copied()
-            .map(|point| self.depth(point))
-            .collect();
-        let middle = depths.len() / 2;
-        *(depths.select_nth_unstable_by(middle, f32::total_cmp).1)
-    }
-
-    /// Places in view, with the room around them; nearer than `distance` metres if there are enough,
-    /// where depths are sharper, and anywhere if there are none.
-    fn spots(
-        &self,
-        first: &PointCloud<'_>,
-        up: Vec3,
-        bodies: &[NamedCloud],
-        distance: f32,
-        seed: u64,
-    ) -> Result<Vec<Spot>, NoSpot> {
-        let radii = bodies.iter().map(|body| load::ball_radius(&body.cloud));
-        let demand = Demand {
-            count: bodies.len(),
-            body_radius: radii.fold(0.0, f32::max),
-            seed,
-        };
-        let (u, v) = up.any_orthonormal_pair();
-        let room = ROOM_IN_VIEW * demand.body_radius;
-        // Some pixels are empty: half of those on the way to the sides must show the surface.
-        let is_in_view = |place: Vec3| {
-            let at = |k: f32| [u, -u, v, -v].map(|side| place + k * side);
-            let is_inside = |p: &Vec3| self.camera.is_in_view(*p, &self.camera_from_world);
-            let disc: Vec<Vec3> = (1..=4)
-                .flat_map(|k| at(0.25 * k as f32 * demand.body_radius))
-                .collect();
-            let seen = disc
-                .iter()
-                .filter(|p| self.camera.sees(**p, &self.camera_from_world));
-            at(room).iter().all(is_inside) && 2 * seen.count() >= disc.len()
-        };
-        let near = find_spots_where(first, up, &demand, |place| {
-            is_in_view(place) && self.depth(place) <= distance
-        });
-        match near {
-            Ok(spots) if spots.iter().all(|spot| spot.level == 0) => Ok(spots),
-            // What holds bodies now may all be gone in the end.
-            _ => find_spots_where(first, up, &demand, is_in_view)
-                .or_else(|_| find_spots_where(first, up, &demand, |_| true)),
-        }
-    }
+/// The direction that is up in what a frame shows, which is told.
+fn find_up(frame: &PointCloud<'_>, world_from_camera: &Pose3) -> anyhow::Result<Vec3> {
+    let up = camera_up(frame.normals().unwrap_or_default(), world_from_camera)?;
+    let [x, y, z] = up.direction.to_array();
+    eprintln!(
+        "up is {x:.3},{y:.3},{z:.3}: {:.0} % of the normals say so, and at most {:.0} % as much speaks for \
+         another; --up X,Y,Z sets it",
+        100.0 * up.share,
+        100.0 * up.rival
+    );
+    Ok(up.direction)
 }
 
 /// Shows all frames; snapshots before the first, at three fifths and after the last or, for an
@@ -300,19 +173,17 @@ fn simulate(
     args: &Args,
 ) -> anyhow::Result<Vec<DepthSnapshot>> {
     let held = (args.hold / FRAME_SECONDS).round() as usize;
-    let shown = source.len() * usize::from(args.loops);
-    let all = held + shown;
+    let all = held + source.count();
     let bar = output::progress_bar(all, "frames");
     let mut snapshots = vec![simulation.snapshot(1)?];
-    let order = std::iter::repeat_n(0, held).chain((0..shown).map(|k| k % source.len()));
+    let order = std::iter::repeat_n(0, held).chain(0..source.count());
     for (k, index) in order.enumerate() {
         let frame = source.frame(index)?;
         (simulation.take_frame(&frame)).with_context(|| format!("{} failed", frame.name))?;
         if let Some(recording) = &mut recording {
             let snapshot = simulation.snapshot(ANIMATION_POINT_STEP)?;
-            let clouds: Vec<&PointCloud<'static>> = simulation.clouds().collect();
-            let entities = entities(&clouds, &snapshot);
-            recording.show(k as f32 * FRAME_SECONDS, &entities, &snapshot.contacts)?;
+            let things = entities(simulation, &snapshot);
+            recording.show(k as f32 * FRAME_SECONDS, &things, &snapshot.contacts)?;
             let intrinsics = source.intrinsics();
             recording.camera(&RecordedCamera {
                 size: intrinsics.size.map(|n| n as f32),
@@ -338,9 +209,8 @@ fn draw(
     snapshots: &[DepthSnapshot],
     args: &Args,
 ) -> anyhow::Result<()> {
-    let clouds: Vec<&PointCloud<'static>> = simulation.clouds().collect();
-    let picture = |snapshot: &DepthSnapshot, camera: &VirtualCamera| -> Picture {
-        scene_of(&clouds, up, snapshot).draw(camera, &snapshot.contacts)
+    let picture = |snapshot: &DepthSnapshot, camera: &VirtualCamera| {
+        Ok(scene_of(simulation, up, snapshot).draw(camera, &snapshot.contacts))
     };
     let [initial, last] = [&snapshots[0], &snapshots[snapshots.len() - 1]];
     // Bodies that fell off are not followed.
@@ -352,59 +222,38 @@ fn draw(
         .filter(|pose| near(pose))
         .map(|pose| pose.translation)
         .collect();
-    let camera = |size| {
-        let shown = scene_of(&clouds, up, initial);
-        viewpoint::choose(&shown, &places, size)
-    };
-    output::make_folder(&args.out)?;
+    let camera = |size| viewpoint::choose(&scene_of(simulation, up, initial), &places, size);
     let large = camera(PICTURE_SIZE);
     let mid = &snapshots[(snapshots.len() * 3 / 5).min(snapshots.len() - 2)];
-    for (snapshot, name) in [
-        (initial, "initial.png"),
-        (mid, "mid.png"),
-        (last, "final.png"),
-    ] {
-        output::write_file(&args.out.join(name), &picture(snapshot, &large).to_png()?)?;
-    }
+    let stills = [
+        ("initial.png", picture(initial, &large)),
+        ("mid.png", picture(mid, &large)),
+        ("final.png", picture(last, &large)),
+    ];
+    output::write_pictures(&args.out, stills)?;
     if args.animate {
         let small = camera(ANIMATION_SIZE);
-        let pictures = snapshots
-            .iter()
-            .map(|snapshot| Ok(picture(snapshot, &small)));
+        let pictures = snapshots.iter().map(|snapshot| picture(snapshot, &small));
         let seconds = ANIMATION_FRAMES as f32 * FRAME_SECONDS;
-        output::write_animation(&args.out, seconds, pictures)?;
+        output::write_animation(&args.out, seconds, 0, pictures)?;
     }
     eprintln!("pictures are in {}", args.out.display());
     Ok(())
 }
 
-/// All that is there, by name.
-fn entities<'a>(
-    clouds: &[&'a PointCloud<'static>],
-    snapshot: &'a DepthSnapshot,
-) -> Vec<(String, Item<'a>)> {
-    let frame = Item::scan(&snapshot.frame);
-    let colors = BODY_COLORS.iter().cycle();
-    let bodies = clouds.iter().zip(&snapshot.world_from_body).zip(colors);
-    let bodies = bodies.enumerate().map(|(k, ((cloud, pose), color))| {
-        let name = format!("bodies/{}", k + 1);
-        (name, Item::body(cloud, *pose, *color))
-    });
-    std::iter::once(("frame".to_owned(), frame))
-        .chain(bodies)
-        .collect()
+/// All that is there.
+fn entities<'a>(simulation: &'a DepthSimulation, snapshot: &'a DepthSnapshot) -> Vec<Entity<'a>> {
+    let frame = ("frame".to_owned(), Item::scan(&snapshot.frame));
+    let bodies = pictures::bodies(simulation.clouds(), &snapshot.world_from_body, &BODY_COLORS);
+    std::iter::once(frame).chain(bodies).collect()
 }
 
 fn scene_of<'a>(
-    clouds: &[&'a PointCloud<'static>],
+    simulation: &'a DepthSimulation,
     up: Vec3,
     snapshot: &'a DepthSnapshot,
 ) -> Scene<'a> {
-    let items = entities(clouds, snapshot).into_iter();
-    let sizes = clouds.iter().map(|cloud| cloud.bounds().extents().length());
-    Scene {
-        items: items.map(|(_, item)| item).collect(),
-        up,
-        detail: sizes.fold(0.1, f32::max),
-    }
+    let sizes = (simulation.clouds()).map(|cloud| cloud.bounds().extents().length());
+    let detail = sizes.fold(0.1, f32::max);
+    pictures::scene(entities(simulation, snapshot), up, detail)
 }

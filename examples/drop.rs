@@ -4,18 +4,19 @@ use anyhow::{Context, bail};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use tldi::PointCloud;
 use tldi::glamx::Vec3;
-use tldi_examples::cli::{Common, ended};
+use tldi::{PointCloud, VirtualCamera};
+use tldi_examples::bodies::NamedCloud;
+use tldi_examples::cli::{Common, ended, positive};
+use tldi_examples::drop::{DropReport, DropSimulation, Snapshot};
 use tldi_examples::load::Located;
-use tldi_examples::report::DropReport;
-use tldi_examples::scan::{ScanSource, choose_up, load_scan, positive};
+use tldi_examples::pictures::{self, ANIMATION_SIZE, PICTURE_SIZE};
+use tldi_examples::scan::{ScanSource, choose_up, load_scan};
 use tldi_examples::scene::BodyShape;
-use tldi_examples::simulation::{DropSimulation, NamedCloud, Snapshot};
 use tldi_examples::spots::{Demand, find_spots};
 use tldi_examples::world::DT;
 use tldi_examples::{load, output};
-use tldi_pictures::{BODY_COLORS, Item, Picture, Scene, animation, thinned, viewpoint};
+use tldi_pictures::{BODY_COLORS, Item, viewpoint};
 
 /// Lets point-cloud bodies fall onto a point-cloud scan and come to rest
 ///
@@ -52,12 +53,6 @@ struct Args {
 const BODY_SPACING: f32 = 0.025;
 /// The step in which `mid.png` is made: bodies have just landed.
 const MID_STEP: usize = 15;
-/// Radius in mean radii up to which points of the scan are drawn: lone ones, such as a depth
-/// camera's flying pixels, have far larger ones and would hide what is behind them.
-const LARGEST_DRAWN_RADIUS: f32 = 3.0;
-const PICTURE_SIZE: [u32; 2] = [1280, 720];
-/// Columns and rows of the animation: a page shows it at this size, and four times the pixels make four times the file.
-const ANIMATION_SIZE: [u32; 2] = [640, 360];
 /// Steps from one picture of the animation to the next. One doubles the file, four jump while bodies fall.
 const ANIMATION_STEPS: usize = 2;
 /// Steps that the animation shows: bodies fall for 15 to 20, and rock for as many again.
@@ -79,20 +74,12 @@ fn run(args: &Args) -> anyhow::Result<()> {
     } = load_scan(&args.source, args.common.seed)?;
     let up = choose_up(args.source.up, &scan);
     let bodies = load_bodies(args, scan.mean_radius())?;
-    let demand = Demand {
-        count: bodies.len(),
-        body_radius: (bodies.iter())
-            .map(|body| load::ball_radius(&body.cloud))
-            .fold(0.0, f32::max),
-        seed: args.common.seed,
-    };
-    let spots = find_spots(&scan, up, &demand)?;
+    let spots = find_spots(&scan, up, &Demand::of(&bodies, args.common.seed))?;
     let (seed, backend) = (args.common.seed, args.common.backend.open()?);
     let mut simulation = DropSimulation::new(scan, up, bodies, &spots, seed, backend)?;
     let run = simulate(&mut simulation, args)?;
     let report = simulation.report();
-    let json = args.common.json.as_deref();
-    output::publish(&report, origin, |out| report.write_table(out), json)?;
+    output::publish(&report, origin, args.common.json.as_deref())?;
     if !args.common.no_pictures {
         draw(&simulation, &report, up, &run, &args.out)?;
     }
@@ -185,25 +172,17 @@ fn draw(
     run: &Run,
     folder: &Path,
 ) -> anyhow::Result<()> {
-    let clouds = simulation.clouds();
-    let radii = clouds.iter().map(|cloud| load::ball_radius(cloud));
+    let radii = simulation.clouds().map(load::ball_radius);
     let detail = radii.fold(0.0, f32::max);
-    let scan = simulation.scan();
-    let most = LARGEST_DRAWN_RADIUS * scan.mean_radius();
-    let drawn_scan = thinned(scan, 1, |radius| radius.min(most))?;
+    let scan = pictures::drawable(simulation.scan())?;
     let scene = |snapshot: &Snapshot| {
-        let bodies = clouds
-            .iter()
-            .zip(&snapshot.scan_from_body)
-            .zip(BODY_COLORS.iter().cycle());
-        let bodies = bodies.map(|((cloud, pose), color)| Item::body(cloud, *pose, *color));
-        Scene {
-            items: std::iter::once(Item::scan(&drawn_scan))
-                .chain(bodies)
-                .collect(),
-            up,
-            detail,
-        }
+        let scan = ("scan".to_owned(), Item::scan(&scan));
+        let clouds = simulation.clouds();
+        let bodies = pictures::bodies(clouds, &snapshot.scan_from_body, &BODY_COLORS);
+        pictures::scene(std::iter::once(scan).chain(bodies), up, detail)
+    };
+    let picture = |snapshot: &Snapshot, camera: &VirtualCamera| {
+        Ok(scene(snapshot).draw(camera, &snapshot.contacts))
     };
     // A body that was lost is looked for where it started, not where it fell to.
     let [initial, _, last] = &run.stills;
@@ -217,27 +196,14 @@ fn draw(
         .map(|pose| pose.translation)
         .collect();
     let camera = |size| viewpoint::choose(&scene(&in_sight), &starts, size);
-    let still_camera = camera(PICTURE_SIZE);
-    output::make_folder(folder)?;
+    let large = camera(PICTURE_SIZE);
+    let stills = run.stills.iter().map(|snapshot| picture(snapshot, &large));
     let names = ["initial.png", "mid.png", "final.png"];
-    for (snapshot, name) in run.stills.iter().zip(names) {
-        let picture = scene(snapshot).draw(&still_camera, &snapshot.contacts);
-        output::write_file(&folder.join(name), &picture.to_png()?)?;
-    }
+    output::write_pictures(folder, names.into_iter().zip(stills))?;
     if !run.motion.is_empty() {
-        let camera = camera(ANIMATION_SIZE);
-        let bar = output::progress_bar(run.motion.len(), "pictures");
-        let mut pictures: Vec<Picture> = (run.motion.iter())
-            .map(|snapshot| {
-                bar.inc(1);
-                scene(snapshot).draw(&camera, &snapshot.contacts)
-            })
-            .collect();
-        let last = pictures.last().cloned();
-        pictures.extend(std::iter::repeat_n(last, ANIMATION_HOLD).flatten());
-        let bytes = animation::to_apng(&pictures, ANIMATION_SECONDS)?;
-        output::write_file(&folder.join("motion.png"), &bytes)?;
-        bar.finish_and_clear();
+        let small = camera(ANIMATION_SIZE);
+        let pictures = run.motion.iter().map(|snapshot| picture(snapshot, &small));
+        output::write_animation(folder, ANIMATION_SECONDS, ANIMATION_HOLD, pictures)?;
     }
     eprintln!("pictures are in {}", folder.display());
     Ok(())

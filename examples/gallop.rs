@@ -6,15 +6,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use tldi::glamx::{DVec3, Vec3};
 use tldi::{KdTree, PointCloud, VirtualCamera};
-use tldi_examples::cli::{Common, UpChoice, ended};
+use tldi_examples::cli::{Common, UpChoice, ended, positive};
 use tldi_examples::gallop::{
     GallopScene, GallopSimulation, GallopSnapshot, Runner, WavyGround, creature,
 };
 use tldi_examples::output;
+use tldi_examples::pictures::{self, ANIMATION_SIZE, Entity, PICTURE_SIZE};
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
-use tldi_examples::scan::positive;
 use tldi_examples::world::DT;
-use tldi_pictures::{BODY_COLORS, Item, Picture, Scene, painted};
+use tldi_pictures::{BODY_COLORS, Item, painted};
 use tldi_sources::{MovingPoints, ReadOptions};
 
 /// A deforming cloud gallops over ground that deforms as well
@@ -83,8 +83,6 @@ const MOST_STEPS: usize = 600;
 const TINTED: f32 = 0.06;
 const SKIN: [f32; 3] = [166.0, 122.0, 84.0];
 const TINT: [f32; 3] = [235.0, 60.0, 30.0];
-const PICTURE_SIZE: [u32; 2] = [1280, 720];
-const ANIMATION_SIZE: [u32; 2] = [640, 360];
 /// Steps from one picture of the animation to the next.
 const ANIMATION_STEPS: usize = 3;
 
@@ -99,18 +97,10 @@ fn run(args: &Args) -> anyhow::Result<()> {
     if !(file_size.is_finite() && file_size > 0.0) {
         bail!("the frames have no extent: all points coincide");
     }
-    let up = match args.up {
-        UpChoice::Given(up) => up,
-        UpChoice::Auto => Vec3::Y,
-    };
-    let stride = runner.stand(up, args.size);
-    let speed = args.speed.unwrap_or_else(|| {
-        let by_feet = stride / args.cycle;
-        if by_feet > 0.1 * args.size {
-            by_feet
-        } else {
-            LEAST_SPEED * args.size
-        }
+    let stride = runner.stand(args.up.or_else(|| Vec3::Y), args.size);
+    let speed = args.speed.unwrap_or_else(|| match stride / args.cycle {
+        by_feet if by_feet > 0.1 * args.size => by_feet,
+        _ => LEAST_SPEED * args.size,
     });
     let scene = GallopScene {
         runner,
@@ -134,8 +124,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let recording = args.recording.start("gallop", Vec3::Y)?;
     let snapshots = simulate(&mut simulation, steps, args.animate, recording)?;
     let report = simulation.report();
-    let json = args.common.json.as_deref();
-    output::publish(&report, DVec3::ZERO, |out| report.write_table(out), json)?;
+    output::publish(&report, DVec3::ZERO, args.common.json.as_deref())?;
     if !args.common.no_pictures {
         draw(&simulation, &snapshots, args)?;
     }
@@ -184,9 +173,8 @@ fn simulate(
         (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
         if let Some(recording) = &mut recording {
             let snapshot = simulation.snapshot();
-            let bodies: Vec<&PointCloud<'static>> = simulation.body_clouds().collect();
-            let entities = entities(&snapshot.runner, &bodies, &snapshot);
-            recording.show(step as f32 * DT, &entities, &snapshot.contacts)?;
+            let things = entities(simulation, &snapshot.runner, &snapshot);
+            recording.show(step as f32 * DT, &things, &snapshot.contacts)?;
             let camera = beside(&snapshot, simulation.size(), PICTURE_SIZE);
             if let Some(camera) = RecordedCamera::of_picture(&camera) {
                 recording.camera(&camera)?;
@@ -217,32 +205,27 @@ fn draw(
     snapshots: &[GallopSnapshot],
     args: &Args,
 ) -> anyhow::Result<()> {
-    let bodies: Vec<&PointCloud<'static>> = simulation.body_clouds().collect();
     let size = simulation.size();
-    let picture = |snapshot: &GallopSnapshot, camera: &VirtualCamera| -> anyhow::Result<Picture> {
+    // The camera goes along, always on the same side.
+    let picture = |snapshot: &GallopSnapshot, pixels: [u32; 2]| {
         let runner = tinted(snapshot, TINTED * size)?;
-        let scene = scene_of(&runner, &bodies, snapshot, size);
-        Ok(scene.draw(camera, &snapshot.contacts))
+        let things = entities(simulation, &runner, snapshot);
+        let scene = pictures::scene(things, Vec3::Y, 0.25 * size);
+        Ok(scene.draw(&beside(snapshot, size, pixels), &snapshot.contacts))
     };
     let count = snapshots.len();
     let middle = (count - 1) / 2;
-    output::make_folder(&args.out)?;
-    // The camera goes along, always on the same side.
-    for (index, name) in [
-        (0, "initial.png"),
-        (middle, "mid.png"),
-        (count - 1, "final.png"),
-    ] {
-        let snapshot = &snapshots[index];
-        let camera = beside(snapshot, size, PICTURE_SIZE);
-        let png = picture(snapshot, &camera)?.to_png()?;
-        output::write_file(&args.out.join(name), &png)?;
-    }
+    let stills = [
+        ("initial.png", 0),
+        ("mid.png", middle),
+        ("final.png", count - 1),
+    ];
+    let stills = stills.map(|(name, k)| (name, picture(&snapshots[k], PICTURE_SIZE)));
+    output::write_pictures(&args.out, stills)?;
     if args.animate {
         let moments = snapshots[..middle].iter().chain(&snapshots[middle + 1..]);
-        let pictures =
-            moments.map(|snapshot| picture(snapshot, &beside(snapshot, size, ANIMATION_SIZE)));
-        output::write_animation(&args.out, ANIMATION_STEPS as f32 * DT, pictures)?;
+        let pictures = moments.map(|snapshot| picture(snapshot, ANIMATION_SIZE));
+        output::write_animation(&args.out, ANIMATION_STEPS as f32 * DT, 0, pictures)?;
     }
     eprintln!("pictures are in {}", args.out.display());
     Ok(())
@@ -288,35 +271,19 @@ fn tinted(snapshot: &GallopSnapshot, reach: f32) -> anyhow::Result<PointCloud<'s
     })?)
 }
 
-/// All that is there, by name; `runner` is what runs, in its colours.
+/// All that is there; `runner` is what runs, in its colours.
 fn entities<'a>(
+    simulation: &'a GallopSimulation,
     runner: &'a PointCloud<'a>,
-    bodies: &[&'a PointCloud<'static>],
     snapshot: &'a GallopSnapshot,
-) -> Vec<(String, Item<'a>)> {
-    let colors = BODY_COLORS[1..].iter().cycle();
-    let loose = (bodies.iter().zip(&snapshot.world_from_body).zip(colors)).enumerate();
-    let loose = loose.map(|(k, ((cloud, pose), color))| {
-        let name = format!("bodies/{}", k + 1);
-        (name, Item::body(cloud, *pose, *color))
-    });
+) -> Vec<Entity<'a>> {
     let skin = SKIN.map(|c| c / 255.0);
     let runner = Item::body(runner, snapshot.world_from_runner, skin);
-    let ground = ("ground".to_owned(), Item::scan(&snapshot.ground));
-    let runner = ("runner".to_owned(), runner);
-    [ground, runner].into_iter().chain(loose).collect()
-}
-
-fn scene_of<'a>(
-    runner: &'a PointCloud<'a>,
-    bodies: &[&'a PointCloud<'static>],
-    snapshot: &'a GallopSnapshot,
-    size: f32,
-) -> Scene<'a> {
-    let items = entities(runner, bodies, snapshot).into_iter();
-    Scene {
-        items: items.map(|(_, item)| item).collect(),
-        up: Vec3::Y,
-        detail: 0.25 * size,
-    }
+    let ground = Item::scan(&snapshot.ground);
+    let clouds = simulation.body_clouds();
+    let bodies = pictures::bodies(clouds, &snapshot.world_from_body, &BODY_COLORS[1..]);
+    [("ground".to_owned(), ground), ("runner".to_owned(), runner)]
+        .into_iter()
+        .chain(bodies)
+        .collect()
 }

@@ -3,18 +3,18 @@
 use anyhow::{Context, bail, ensure};
 use clap::Parser;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use tldi::glamx::Vec3;
 use tldi::{KdTree, PointCloud};
-use tldi_examples::cli::{Common, UpChoice, ended};
+use tldi_examples::bodies::NamedCloud;
+use tldi_examples::cli::{Common, UpChoice, ended, positive};
 use tldi_examples::lidar::{LidarReport, LidarScene, LidarSimulation, Scanner, Sweep, SweepSource};
-use tldi_examples::scan::positive;
+use tldi_examples::pictures::{self, PICTURE_SIZE};
 use tldi_examples::scene::BodyShape;
-use tldi_examples::simulation::NamedCloud;
 use tldi_examples::spots::{Demand, find_spots};
 use tldi_examples::{load, output};
-use tldi_pictures::{BODY_COLORS, Item, Scene, viewpoint};
+use tldi_pictures::{BODY_COLORS, Item, viewpoint};
 
 /// Turns sweeps of a laser scanner into a collider that is new ten times a second, and drops bodies on it
 ///
@@ -57,7 +57,6 @@ struct Args {
 const BODY_SPACING: f32 = 0.03;
 /// Bodies are dropped where rings are close to each other, up to this part of the range.
 const NEAR: f32 = 0.6;
-const PICTURE_SIZE: [u32; 2] = [1280, 720];
 
 fn main() -> ExitCode {
     ended(run(&Args::parse()))
@@ -69,7 +68,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
         Some(folder) => SweepSource::open(folder)?,
         None => SweepSource::Generated(Scanner::new(args.count.get(), args.common.seed)),
     };
-    let count = source.len().min(args.count.get());
+    let count = source.count().min(args.count.get());
     let scene = scene(args, [&source.sweep(0)?, &source.sweep(count - 1)?])?;
     let mut simulation = LidarSimulation::new(scene, args.common.backend.open()?)?;
     let bar = output::progress_bar(count, "sweeps");
@@ -80,18 +79,12 @@ fn run(args: &Args) -> anyhow::Result<()> {
     }
     bar.finish_and_clear();
     let report = simulation.report();
-    let json = args.common.json.as_deref();
-    output::publish(
-        &report,
-        source.origin(),
-        |out| report.write_table(out),
-        json,
-    )?;
+    output::publish(&report, source.origin(), args.common.json.as_deref())?;
     if !args.common.no_pictures {
         draw(args, &simulation, &report)?;
     }
     let lost = report.bodies.iter().filter(|body| body.lost);
-    let lost: Vec<&str> = lost.map(|body| body.name.as_str()).collect();
+    let lost: Vec<&str> = lost.map(|lost| lost.placed.name.as_str()).collect();
     if !lost.is_empty() {
         bail!("fell through the sweeps: {}", lost.join(", "));
     }
@@ -101,12 +94,8 @@ fn run(args: &Args) -> anyhow::Result<()> {
 /// Bodies, and places for them that the first and the last sweep see: where the scanner drives, it loses
 /// sight of the ground.
 fn scene(args: &Args, [first, last]: [&Sweep; 2]) -> anyhow::Result<LidarScene> {
-    let up = match args.up {
-        UpChoice::Given(up) => up,
-        UpChoice::Auto => first.world_from_scanner.rotation * Vec3::Z,
-    };
-    let [first, last] = [first, last].map(|sweep| near(args, sweep));
-    let (first, last) = (first?, last?);
+    let up = (args.up).or_else(|| first.world_from_scanner.rotation * Vec3::Z);
+    let (first, last) = (near(args, first)?, near(args, last)?);
     let in_last = KdTree::new(&last);
     let stays = |i: &usize| {
         let nearest = in_last.nearest(first.point(*i), f32::INFINITY);
@@ -147,23 +136,14 @@ fn draw(args: &Args, simulation: &LidarSimulation, report: &LidarReport) -> anyh
     let Some(sweep) = simulation.cloud() else {
         return Ok(());
     };
-    let bodies = simulation.bodies().zip(BODY_COLORS.iter().cycle());
-    let bodies = bodies.map(|((cloud, pose), color)| Item::body(cloud, pose, *color));
-    let scene = Scene {
-        items: std::iter::once(Item::scan(sweep)).chain(bodies).collect(),
-        up: Vec3::from_array(report.up),
-        detail: args.size,
-    };
-    let places: Vec<Vec3> = report
-        .bodies
-        .iter()
-        .map(|body| body.translation.into())
-        .collect();
+    let poses = simulation.world_from_body();
+    let bodies = pictures::bodies(simulation.clouds(), &poses, &BODY_COLORS);
+    let things = std::iter::once(("sweep".to_owned(), Item::scan(sweep))).chain(bodies);
+    let scene = pictures::scene(things, Vec3::from_array(report.up), args.size);
+    let places: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
     let camera = viewpoint::choose(&scene, &places, PICTURE_SIZE);
-    let contacts: Vec<Vec3> = simulation.contacts().collect();
-    output::make_folder(&args.out)?;
-    let path: &Path = &args.out.join("final.png");
-    output::write_file(path, &scene.draw(&camera, &contacts).to_png()?)?;
-    eprintln!("the picture is {}", path.display());
+    let picture = scene.draw(&camera, &simulation.contacts());
+    output::write_pictures(&args.out, [("final.png", Ok(picture))])?;
+    eprintln!("the picture is {}", args.out.join("final.png").display());
     Ok(())
 }

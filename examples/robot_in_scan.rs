@@ -7,18 +7,19 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::glamx::{DVec3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
-use tldi_examples::cli::{Common, Triple, ended};
+use tldi_examples::cli::{Common, Triple, ended, within};
 use tldi_examples::load::Located;
+use tldi_examples::pictures::{self, ANIMATION_SIZE, Entity, PICTURE_SIZE};
 use tldi_examples::recording::{RecordedCamera, Recording, RecordingOption};
 use tldi_examples::robot::{
     BUILT_IN, Base, Description, MeshFolders, Motion, RobotScene, RobotSimulation, RobotSnapshot,
     Walk, quadruped,
 };
-use tldi_examples::scan::{ScanSource, choose_up, load_scan, within};
+use tldi_examples::scan::{ScanSource, choose_up, load_scan};
 use tldi_examples::terrain::{Ground, Terrain};
 use tldi_examples::world::DT;
 use tldi_examples::{load, output};
-use tldi_pictures::{BODY_COLORS, Item, Picture, Scene, thinned, viewpoint};
+use tldi_pictures::{BODY_COLORS, Item, Scene, viewpoint};
 
 /// A robot whose links are point clouds moves in a scan that is a point cloud
 ///
@@ -90,15 +91,11 @@ enum BuiltIn {
     Quadruped,
 }
 
-const PICTURE_SIZE: [u32; 2] = [1280, 720];
-const ANIMATION_SIZE: [u32; 2] = [640, 360];
 /// Steps from one picture of the animation to the next.
 const ANIMATION_STEPS: usize = 6;
 /// Seconds of a motion without an end, and at most of any.
 const LONGEST_SECONDS: f32 = 20.0;
 const ENDLESS_SECONDS: f32 = 8.0;
-/// Radius in mean radii up to which points of the scan are drawn: lone ones would hide the rest.
-const LARGEST_DRAWN_RADIUS: f32 = 3.0;
 /// Colours of links, and of links that touch something.
 const LINK_COLORS: [[f32; 3]; 2] = [[0.90, 0.90, 0.88], [0.30, 0.34, 0.40]];
 const TOUCHING_COLOR: [f32; 3] = [0.92, 0.30, 0.16];
@@ -150,8 +147,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
     }
     let (snapshots, hardest) = simulate(&mut simulation, args.steps, recording)?;
     let report = simulation.report();
-    let json = args.common.json.as_deref();
-    output::publish(&report, origin, |out| report.write_table(out), json)?;
+    output::publish(&report, origin, args.common.json.as_deref())?;
     if !args.common.no_pictures {
         draw(&simulation, up, &snapshots, &hardest, args)?;
     }
@@ -188,8 +184,8 @@ fn load_robot(args: &Args) -> anyhow::Result<Description> {
     Ok(robot)
 }
 
-/// Takes all steps, up to that in which a link is thrown out; a snapshot before the first, and after every [`ANIMATION_STEPS`], and one of the moment in which a
-/// link is pushed most.
+/// Takes all steps, up to that in which a link is thrown out. Gives snapshots before the first and after every
+/// [`ANIMATION_STEPS`], and one of the moment in which a link is pushed most.
 fn simulate(
     simulation: &mut RobotSimulation,
     steps: Option<usize>,
@@ -207,8 +203,8 @@ fn simulate(
         (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
         if let Some(recording) = &mut recording {
             let snapshot = simulation.snapshot();
-            let entities = entities(simulation, simulation.scan(), &snapshot);
-            recording.show(step as f32 * DT, &entities, &snapshot.contacts)?;
+            let things = entities(simulation, simulation.scan(), &snapshot);
+            recording.show(step as f32 * DT, &things, &snapshot.contacts)?;
         }
         if step % ANIMATION_STEPS == 0 || step == steps {
             snapshots.push(simulation.snapshot());
@@ -233,8 +229,8 @@ fn record_start(
     up: Vec3,
 ) -> anyhow::Result<()> {
     let (scan, snapshot) = (simulation.scan(), simulation.snapshot());
-    let entities = entities(simulation, scan, &snapshot);
-    recording.show(0.0, &entities, &snapshot.contacts)?;
+    let things = entities(simulation, scan, &snapshot);
+    recording.show(0.0, &things, &snapshot.contacts)?;
     let scene = scene_of(simulation, scan, up, &snapshot);
     let camera = viewpoint::choose(&scene, &[], PICTURE_SIZE);
     if let Some(camera) = RecordedCamera::of_picture(&camera) {
@@ -250,73 +246,54 @@ fn draw(
     hardest: &RobotSnapshot,
     args: &Args,
 ) -> anyhow::Result<()> {
-    let scan = simulation.scan();
-    let most = LARGEST_DRAWN_RADIUS * scan.mean_radius();
-    let drawn_scan = thinned(scan, 1, |radius| radius.min(most))?;
+    let drawn_scan = pictures::drawable(simulation.scan())?;
     let [initial, last] = [&snapshots[0], &snapshots[snapshots.len() - 1]];
     // The moment with the most contacts is the one worth a picture.
-    let mid = (snapshots
-        .iter()
-        .max_by_key(|snapshot| snapshot.contacts.len()))
-    .unwrap_or(last);
+    let most_contacts = (snapshots.iter()).max_by_key(|snapshot| snapshot.contacts.len());
+    let mid = most_contacts.unwrap_or(last);
     let places: Vec<Vec3> = (snapshots.iter().step_by(4))
         .flat_map(|snapshot| snapshot.scan_from_link.iter().map(|pose| pose.translation))
         .collect();
     let scene = |snapshot: &RobotSnapshot| scene_of(simulation, &drawn_scan, up, snapshot);
     let camera = |size| viewpoint::choose(&scene(initial), &places, size);
-    let picture = |snapshot: &RobotSnapshot, camera: &VirtualCamera| -> Picture {
-        scene(snapshot).draw(camera, &snapshot.contacts)
+    let picture = |snapshot: &RobotSnapshot, camera: &VirtualCamera| {
+        Ok(scene(snapshot).draw(camera, &snapshot.contacts))
     };
-    output::make_folder(&args.out)?;
     let large = camera(PICTURE_SIZE);
-    for (snapshot, name) in [
-        (initial, "initial.png"),
-        (mid, "mid.png"),
-        (hardest, "hardest.png"),
-        (last, "final.png"),
-    ] {
-        output::write_file(&args.out.join(name), &picture(snapshot, &large).to_png()?)?;
-    }
+    let stills = [
+        ("initial.png", picture(initial, &large)),
+        ("mid.png", picture(mid, &large)),
+        ("hardest.png", picture(hardest, &large)),
+        ("final.png", picture(last, &large)),
+    ];
+    output::write_pictures(&args.out, stills)?;
     if args.animate {
         let small = camera(ANIMATION_SIZE);
-        let pictures = snapshots
-            .iter()
-            .map(|snapshot| Ok(picture(snapshot, &small)));
-        output::write_animation(&args.out, ANIMATION_STEPS as f32 * DT, pictures)?;
+        let pictures = snapshots.iter().map(|snapshot| picture(snapshot, &small));
+        output::write_animation(&args.out, ANIMATION_STEPS as f32 * DT, 0, pictures)?;
     }
     eprintln!("pictures are in {}", args.out.display());
     Ok(())
 }
 
-/// All that is there, by name.
+/// All that is there.
 fn entities<'a>(
     simulation: &'a RobotSimulation,
     scan: &'a PointCloud<'a>,
     snapshot: &RobotSnapshot,
-) -> Vec<(String, Item<'a>)> {
+) -> Vec<Entity<'a>> {
     let links = simulation.links().iter().enumerate().map(|(k, link)| {
-        let color = if snapshot.link_touches[k] {
-            TOUCHING_COLOR
-        } else {
-            LINK_COLORS[k % 2]
+        let color = match snapshot.link_touches[k] {
+            true => TOUCHING_COLOR,
+            false => LINK_COLORS[k % 2],
         };
-        let name = format!("robot/{}", link.name);
         let item = Item::body(&link.cloud, snapshot.scan_from_link[k], color);
-        (name, item)
+        (format!("robot/{}", link.name), item)
     });
-    let colors = BODY_COLORS[1..].iter().cycle();
-    let bodies = (simulation.loose_clouds())
-        .zip(&snapshot.scan_from_body)
-        .zip(colors)
-        .enumerate()
-        .map(|(k, ((cloud, pose), color))| {
-            let name = format!("bodies/{}", k + 1);
-            (name, Item::body(cloud, *pose, *color))
-        });
-    std::iter::once(("scan".to_owned(), Item::scan(scan)))
-        .chain(links)
-        .chain(bodies)
-        .collect()
+    let clouds = simulation.loose_clouds();
+    let bodies = pictures::bodies(clouds, &snapshot.scan_from_body, &BODY_COLORS[1..]);
+    let scan = std::iter::once(("scan".to_owned(), Item::scan(scan)));
+    scan.chain(links).chain(bodies).collect()
 }
 
 fn scene_of<'a>(
@@ -325,14 +302,7 @@ fn scene_of<'a>(
     up: Vec3,
     snapshot: &RobotSnapshot,
 ) -> Scene<'a> {
-    let items = entities(simulation, drawn_scan, snapshot).into_iter();
-    let sizes = simulation
-        .links()
-        .iter()
-        .map(|link| link.cloud.bounds().extents().length());
-    Scene {
-        items: items.map(|(_, item)| item).collect(),
-        up,
-        detail: 0.3 * sizes.fold(0.0, f32::max),
-    }
+    let sizes = (simulation.links().iter()).map(|link| link.cloud.bounds().extents().length());
+    let detail = 0.3 * sizes.fold(0.0, f32::max);
+    pictures::scene(entities(simulation, drawn_scan, snapshot), up, detail)
 }

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use tldi::glamx::{DVec3, Pose3};
 use tldi_examples::cli::{Common, PoseArgument, Triple, ended};
 use tldi_examples::load::Located;
+use tldi_examples::pictures::{ANIMATION_SIZE, PICTURE_SIZE};
 use tldi_examples::query::{Answer, CloudQuery};
 use tldi_examples::scene::BodyShape;
 use tldi_examples::{load, output, query_pictures};
@@ -55,8 +56,6 @@ const UNLIKE_SIZES: f32 = 100.0;
 /// Pictures of a motion, and how long each is shown, in seconds.
 const MOTION_PICTURES: usize = 24;
 const MOTION_PICTURE_SECONDS: f32 = 0.06;
-const MOTION_PICTURE_SIZE: [u32; 2] = [640, 360];
-const PICTURE_SIZE: [u32; 2] = [1280, 720];
 
 fn main() -> ExitCode {
     ended(run(&Args::parse()))
@@ -70,8 +69,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
     let (query, origin) = load_query(args)?;
     let mut backend = args.common.backend.open()?;
     let answer = query.ask(&mut *backend)?;
-    let (report, json) = (&answer.report, args.common.json.as_deref());
-    output::publish(report, origin, |out| report.write_table(out), json)?;
+    output::publish(&answer.report, origin, args.common.json.as_deref())?;
     if !args.common.no_pictures {
         draw(&query, &answer, &args.out)?;
     }
@@ -120,17 +118,16 @@ fn generate(shape: BodyShape, size: f32, seed: u64) -> anyhow::Result<Located> {
 }
 
 fn draw(query: &CloudQuery, answer: &Answer, folder: &Path) -> anyhow::Result<()> {
-    output::make_folder(folder)?;
     let camera = query_pictures::camera(query, PICTURE_SIZE);
-    for (name, picture) in [
+    let zone = query_pictures::zone(query, answer, &camera)?;
+    let pictures = [
         ("scene.png", query_pictures::scene(query, answer, &camera)),
         ("layers.png", query_pictures::layers(query, answer)),
         ("section.png", query_pictures::section(query, answer)),
-        ("zone.png", query_pictures::zone(query, answer, &camera)?),
+        ("zone.png", zone),
         ("pixels.png", query_pictures::contact_pixels(query, answer)),
-    ] {
-        output::write_file(&folder.join(name), &picture.to_png()?)?;
-    }
+    ];
+    output::write_pictures(folder, pictures.map(|(name, picture)| (name, Ok(picture))))?;
     eprintln!("pictures are in {}", folder.display());
     Ok(())
 }
@@ -139,7 +136,7 @@ fn draw(query: &CloudQuery, answer: &Answer, folder: &Path) -> anyhow::Result<()
 fn animate(args: &Args, query: &CloudQuery) -> anyhow::Result<()> {
     let mut backend = args.common.backend.open()?;
     let end = (query.ask(&mut *backend)?.report.impact).map_or(1.0, |impact| impact.time_seconds);
-    let camera = query_pictures::camera(query, MOTION_PICTURE_SIZE);
+    let camera = query_pictures::camera(query, ANIMATION_SIZE);
     let pictures = (0..MOTION_PICTURES).map(|k| {
         let time = end * k as f32 / (MOTION_PICTURES - 1) as f32;
         let moved = Pose3::from_translation(query.velocity * time) * query.a_from_b;
@@ -152,5 +149,5 @@ fn animate(args: &Args, query: &CloudQuery) -> anyhow::Result<()> {
         let answer = later.ask(&mut *backend)?;
         Ok(query_pictures::scene(&later, &answer, &camera))
     });
-    output::write_animation(&args.out, MOTION_PICTURE_SECONDS, pictures)
+    output::write_animation(&args.out, MOTION_PICTURE_SECONDS, 0, pictures)
 }

@@ -47,41 +47,82 @@ impl Common {
     }
 }
 
-/// The up direction of a scan: given, or to be found in the scan.
+/// A finite number above 0.
+///
+/// # Errors
+/// What was expected.
+pub fn positive(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(number) if number > 0.0 && f32::is_finite(number) => Ok(number),
+        _ => Err("expected a number greater than 0".to_owned()),
+    }
+}
+
+/// A parser of numbers from `least` to `most`.
+pub fn within(least: f32, most: f32) -> impl Fn(&str) -> Result<f32, String> + Clone {
+    move |text| match text.parse() {
+        Ok(number) if least <= number && number <= most => Ok(number),
+        _ => Err(format!("expected a number from {least} to {most}")),
+    }
+}
+
+/// Numbers that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("`{text}` {fault}")]
+pub struct BadNumbers {
+    text: String,
+    /// What is wrong, and what to write.
+    fault: &'static str,
+}
+
+/// What `read` makes of the numbers of a list with commas, all finite as `f32` too.
+fn parsed<T>(
+    text: &str,
+    fault: &'static str,
+    read: impl FnOnce(&[f64]) -> Option<T>,
+) -> Result<T, BadNumbers> {
+    let number = |part: &str| {
+        let number: f64 = part.trim().parse().ok()?;
+        (number as f32).is_finite().then_some(number)
+    };
+    let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
+    (numbers.and_then(|numbers| read(&numbers))).ok_or_else(|| BadNumbers {
+        text: text.to_owned(),
+        fault,
+    })
+}
+
+/// The up direction: given, or to be found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum UpChoice {
-    /// Find it with [`detect_up`](crate::up::detect_up).
+    /// What the program takes for it, such as what [`detect_up`](crate::up::detect_up) finds.
     Auto,
     /// This direction (unit length).
     Given(Vec3),
 }
 
-/// An up direction that cannot be read.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error(
-    "`{0}` is not an up direction: write auto, or three numbers that are not all zero, as in 0,0,1"
-)]
-pub struct BadUp(String);
+impl UpChoice {
+    /// The direction that was given, or else another.
+    pub fn or_else(self, auto: impl FnOnce() -> Vec3) -> Vec3 {
+        match self {
+            Self::Auto => auto(),
+            Self::Given(up) => up,
+        }
+    }
+}
 
 impl FromStr for UpChoice {
-    type Err = BadUp;
+    type Err = BadNumbers;
 
-    fn from_str(text: &str) -> Result<Self, BadUp> {
+    fn from_str(text: &str) -> Result<Self, BadNumbers> {
         if text == "auto" {
             return Ok(Self::Auto);
         }
-        let bad = || BadUp(text.to_owned());
-        let numbers: Vec<f32> = text
-            .split(',')
-            .map(|part| part.trim().parse().map_err(|_| bad()))
-            .collect::<Result<_, _>>()?;
-        let [x, y, z] = numbers[..] else {
-            return Err(bad());
-        };
-        Vec3::new(x, y, z)
-            .try_normalize()
-            .map(Self::Given)
-            .ok_or_else(bad)
+        let fault = "is not an up direction: write auto, or three numbers that are not all zero, as in 0,0,1";
+        parsed(text, fault, |numbers| {
+            let up = DVec3::from_array(numbers.try_into().ok()?).as_vec3();
+            up.try_normalize().map(Self::Given)
+        })
     }
 }
 
@@ -123,46 +164,23 @@ impl FromStr for RangeArgument {
     type Err = BadNumbers;
 
     fn from_str(text: &str) -> Result<Self, BadNumbers> {
-        match numbers(text).as_deref() {
-            Some(&[near, far]) if 0.0 <= near && near < far => {
-                Ok(Self([near, far].map(|n| n as f32)))
-            }
-            _ => Err(BadNumbers {
-                text: text.to_owned(),
-                expected: "the nearest and the farthest range in metres, as in 0.3,8",
-            }),
-        }
+        let fault =
+            "cannot be read: write the nearest and the farthest range in metres, as in 0.3,8";
+        parsed(text, fault, |numbers| match *numbers {
+            [near, far] if 0.0 <= near && near < far => Some(Self([near as f32, far as f32])),
+            _ => None,
+        })
     }
-}
-
-/// Numbers that cannot be read.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("`{text}` cannot be read: write {expected}")]
-pub struct BadNumbers {
-    text: String,
-    expected: &'static str,
-}
-
-/// The numbers of a list with commas, all finite as `f32` too.
-fn numbers(text: &str) -> Option<Vec<f64>> {
-    let number = |part: &str| {
-        let number: f64 = part.trim().parse().ok()?;
-        (number as f32).is_finite().then_some(number)
-    };
-    text.split(',').map(number).collect()
 }
 
 impl FromStr for Triple {
     type Err = BadNumbers;
 
     fn from_str(text: &str) -> Result<Self, BadNumbers> {
-        match numbers(text).as_deref() {
-            Some(&[x, y, z]) => Ok(Self(DVec3::new(x, y, z))),
-            _ => Err(BadNumbers {
-                text: text.to_owned(),
-                expected: "three numbers, as in 0,0,-1.5",
-            }),
-        }
+        let fault = "cannot be read: write three numbers, as in 0,0,-1.5";
+        parsed(text, fault, |numbers| {
+            Some(Self(DVec3::from_array(numbers.try_into().ok()?)))
+        })
     }
 }
 
@@ -170,21 +188,20 @@ impl FromStr for PoseArgument {
     type Err = BadNumbers;
 
     fn from_str(text: &str) -> Result<Self, BadNumbers> {
-        let (place, turn) = match numbers(text).as_deref() {
-            Some(&[x, y, z]) => (DVec3::new(x, y, z), DQuat::IDENTITY),
-            Some(&[x, y, z, rx, ry, rz]) => {
-                let [rx, ry, rz] = [rx, ry, rz].map(f64::to_radians);
-                let turn = DQuat::from_euler(EulerRot::ZYX, rz, ry, rx);
-                (DVec3::new(x, y, z), turn)
-            }
-            _ => {
-                return Err(BadNumbers {
-                    text: text.to_owned(),
-                    expected: "three numbers of metres, as in 0,0,0.5, or these and three of degrees",
-                });
-            }
-        };
-        Ok(Self(DPose3::from_parts(place, turn)))
+        let fault = "cannot be read: write three numbers of metres, as in 0,0,0.5, or these and three of degrees";
+        parsed(text, fault, |numbers| {
+            let (place, turn) = numbers.split_at_checked(3)?;
+            let place = DVec3::from_array(place.try_into().ok()?);
+            let turn = match *turn {
+                [] => DQuat::IDENTITY,
+                [rx, ry, rz] => {
+                    let [rx, ry, rz] = [rx, ry, rz].map(f64::to_radians);
+                    DQuat::from_euler(EulerRot::ZYX, rz, ry, rx)
+                }
+                _ => return None,
+            };
+            Some(Self(DPose3::from_parts(place, turn)))
+        })
     }
 }
 

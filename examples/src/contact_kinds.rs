@@ -134,10 +134,7 @@ impl ContactKinds {
     }
 
     /// Writes a line for each kind, for people.
-    ///
-    /// # Errors
-    /// Those of writing.
-    pub fn write_lines(&self, out: &mut impl Write) -> io::Result<()> {
+    pub(crate) fn write_lines(&self, out: &mut dyn Write) -> io::Result<()> {
         let kinds = [
             ("scripted, neither gives way", self.deepest.scripted),
             ("squeezed between the two", self.deepest.squeezed),

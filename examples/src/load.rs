@@ -3,7 +3,8 @@
 use crate::faces;
 use crate::mesh::{self, Mesh};
 use crate::normal_signs;
-use crate::robot::Spacing;
+use crate::numbers::median;
+use crate::robot::link_spacing;
 use crate::surface_sampling::SampledSurface;
 use anyhow::Context;
 use rayon::prelude::*;
@@ -112,10 +113,7 @@ fn finish_scan(builder: CloudBuilder<'_>) -> Result<PointCloud<'static>, CloudEr
 /// # Errors
 /// Those of reading the file and of building the cloud, with the path.
 pub fn body_from_file(path: &Path) -> anyhow::Result<Located> {
-    let spacing = |extents: Vec3| {
-        let scan_radius = extents.max_element() / BODY_ACROSS;
-        Spacing { scan_radius }.of(extents)
-    };
+    let spacing = |extents: Vec3| link_spacing(extents, extents.max_element() / BODY_ACROSS);
     let raw =
         read(path, spacing).with_context(|| format!("cannot read the body {}", path.display()))?;
     let origin = raw.origin;
@@ -169,9 +167,8 @@ const NEIGHBORS: usize = 7;
 /// from everything has a radius many times that of others. A speck just over a surface is none of the seven nearest of
 /// its own seven nearest. Either would be a splat as large as its distance: a foot's way into it is no depth.
 pub fn on_surfaces(scan: &PointCloud<'_>) -> Vec<bool> {
-    let mut radii: Vec<f32> = (0..scan.len()).map(|i| scan.radius(i)).collect();
-    let middle = radii.len() / 2;
-    let most = ON_NO_SURFACE * *radii.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let radii = (0..scan.len()).map(|i| scan.radius(i));
+    let most = ON_NO_SURFACE * median(radii).unwrap_or_default();
     let tree = KdTree::new(scan);
     let neighbors_of = |i: usize| {
         let mut near = Vec::with_capacity(NEIGHBORS + 1);

@@ -4,7 +4,7 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fs::OpenOptions;
-use std::io::{self, IsTerminal, StdoutLock, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use tldi::glamx::DVec3;
 use tldi_pictures::{Picture, animation};
@@ -24,39 +24,48 @@ pub fn progress_bar(length: usize, things: &str) -> ProgressBar {
     bar
 }
 
-/// Makes a folder and those above it.
-///
-/// # Errors
-/// Those of the file system, with the path.
-pub fn make_folder(path: &Path) -> anyhow::Result<()> {
+fn make_folder(path: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(path)
         .with_context(|| format!("cannot make the folder {}", path.display()))
 }
 
-/// Writes a file.
-///
-/// # Errors
-/// Those of the file system, with the path.
-pub fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Draws pictures one after the other, and writes them to `motion.png` of a folder, each shown for so many seconds.
+/// Writes pictures to a folder, which is made.
+///
+/// # Errors
+/// Those of drawing, and of the file system, with the path.
+pub fn write_pictures<'a>(
+    folder: &Path,
+    pictures: impl IntoIterator<Item = (&'a str, anyhow::Result<Picture>)>,
+) -> anyhow::Result<()> {
+    make_folder(folder)?;
+    for (name, picture) in pictures {
+        write_file(&folder.join(name), &picture?.to_png()?)?;
+    }
+    Ok(())
+}
+
+/// Draws pictures one after the other, and writes them to `motion.png` of a folder, each shown for so many seconds; the
+/// last one stays for `held` pictures more.
 ///
 /// # Errors
 /// Those of drawing, and of the file system, with the path.
 pub fn write_animation(
     folder: &Path,
     seconds: f32,
+    held: usize,
     pictures: impl Iterator<Item = anyhow::Result<Picture>>,
 ) -> anyhow::Result<()> {
     let bar = progress_bar(pictures.size_hint().0, "pictures");
-    let pictures: Vec<Picture> = pictures.inspect(|_| bar.inc(1)).collect::<Result<_, _>>()?;
+    let mut pictures: Vec<Picture> = pictures.inspect(|_| bar.inc(1)).collect::<Result<_, _>>()?;
     bar.finish_and_clear();
-    write_file(
-        &folder.join("motion.png"),
-        &animation::to_apng(&pictures, seconds)?,
-    )
+    let last = pictures.last().cloned();
+    pictures.extend(std::iter::repeat_n(last, held).flatten());
+    let bytes = animation::to_apng(&pictures, seconds)?;
+    write_file(&folder.join("motion.png"), &bytes)
 }
 
 /// Makes sure that a file can be written later: makes its folder, and opens the file for writing. Its content stays, and
@@ -78,6 +87,15 @@ pub fn check_writable(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Results of a run; its fields are those of the JSON.
+pub trait Report: Serialize {
+    /// Writes the results as a table for people.
+    ///
+    /// # Errors
+    /// Those of writing.
+    fn write_table(&self, out: &mut dyn Write) -> io::Result<()>;
+}
+
 /// Results whose places are relative to an origin: that of the file.
 #[derive(Serialize)]
 struct WithOrigin<'a, R> {
@@ -93,21 +111,15 @@ struct WithOrigin<'a, R> {
 ///
 /// # Errors
 /// Those of writing, with the path.
-pub fn publish(
-    report: &impl Serialize,
-    origin: DVec3,
-    write_table: impl FnOnce(&mut StdoutLock<'_>) -> io::Result<()>,
-    json: Option<&Path>,
-) -> anyhow::Result<()> {
+pub fn publish(report: &impl Report, origin: DVec3, json: Option<&Path>) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
     let origin = Some(origin.to_array()).filter(|origin| *origin != [0.0; 3]);
-    let write_origin = |out: &mut StdoutLock<'_>| match origin {
-        Some([x, y, z]) => writeln!(out, "places are relative to {x} {y} {z} in the file"),
-        None => Ok(()),
-    };
-    let told = write_table(&mut out)
-        .and_then(|()| write_origin(&mut out))
-        .and_then(|()| out.flush());
+    let told = report.write_table(&mut out).and_then(|()| {
+        if let Some([x, y, z]) = origin {
+            writeln!(out, "places are relative to {x} {y} {z} in the file")?;
+        }
+        out.flush()
+    });
     if let Some(path) = json {
         let report = WithOrigin { report, origin };
         write_file(path, &serde_json::to_vec_pretty(&report)?)?;

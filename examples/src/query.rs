@@ -1,6 +1,7 @@
 //! One query about two clouds: do they collide, how far apart are they, where do they touch.
 
 use crate::devices::Devices;
+use crate::output::Report;
 use crate::world::DT;
 use anyhow::Context;
 use rapier3d::parry::query::QueryDispatcher;
@@ -187,12 +188,8 @@ fn contact_points(result: &PairResult) -> Vec<ContactReport> {
         .collect()
 }
 
-impl QueryReport {
-    /// Writes the answer as a table for people.
-    ///
-    /// # Errors
-    /// Those of writing.
-    pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
+impl Report for QueryReport {
+    fn write_table(&self, out: &mut dyn Write) -> io::Result<()> {
         let [a, b] = self.points;
         writeln!(
             out,

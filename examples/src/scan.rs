@@ -1,9 +1,9 @@
 //! The scan that a story takes place in: from a file or generated, with its up direction.
 
-use crate::cli::UpChoice;
+use crate::cli::{UpChoice, positive};
 use crate::load::{self, Located};
 use crate::scene::furnished_room;
-use crate::up::{Confidence, Up, detect_up};
+use crate::up::{Confidence, detect_up};
 use std::path::PathBuf;
 use tldi::PointCloud;
 use tldi::glamx::{DVec3, Vec3};
@@ -34,25 +34,6 @@ pub struct ScanSource {
     pub up: UpChoice,
 }
 
-/// A finite number above 0.
-///
-/// # Errors
-/// What was expected.
-pub fn positive(text: &str) -> Result<f32, String> {
-    match text.parse() {
-        Ok(number) if number > 0.0 && f32::is_finite(number) => Ok(number),
-        _ => Err("expected a number greater than 0".to_owned()),
-    }
-}
-
-/// A parser of numbers from `least` to `most`.
-pub fn within(least: f32, most: f32) -> impl Fn(&str) -> Result<f32, String> + Clone {
-    move |text| match text.parse() {
-        Ok(number) if least <= number && number <= most => Ok(number),
-        _ => Err(format!("expected a number from {least} to {most}")),
-    }
-}
-
 /// Loads the scan, or generates a room.
 ///
 /// # Errors
@@ -79,19 +60,15 @@ pub fn load_scan(source: &ScanSource, seed: u64) -> anyhow::Result<Located> {
 
 /// The up direction that was given or, with a remark, the one that the scan shows.
 pub fn choose_up(choice: UpChoice, scan: &PointCloud<'_>) -> Vec3 {
-    if let UpChoice::Given(up) = choice {
-        return up;
-    }
-    let Up {
-        direction,
-        confidence,
-    } = detect_up(scan.points(), scan.normals().unwrap_or_default());
-    let [x, y, z] = direction.to_array();
-    let remark = match confidence {
-        Confidence::Clear => "",
-        Confidence::AxisOnly => " (warning: perhaps upside down)",
-        Confidence::Assumed => " (warning: assumed, the scan has no level surfaces)",
-    };
-    eprintln!("up is {x:.3},{y:.3},{z:.3}{remark}; --up X,Y,Z sets it");
-    direction
+    choice.or_else(|| {
+        let up = detect_up(scan.points(), scan.normals().unwrap_or_default());
+        let [x, y, z] = up.direction.to_array();
+        let remark = match up.confidence {
+            Confidence::Clear => "",
+            Confidence::AxisOnly => " (warning: perhaps upside down)",
+            Confidence::Assumed => " (warning: assumed, the scan has no level surfaces)",
+        };
+        eprintln!("up is {x:.3},{y:.3},{z:.3}{remark}; --up X,Y,Z sets it");
+        up.direction
+    })
 }

@@ -6,8 +6,34 @@ use fastrand::Rng;
 use tldi::Aabb;
 use tldi::glamx::{Vec2, Vec3};
 
-/// A solid of the room: its signed distance in metres, and its colour at a point of its surface.
-type Solid = (Box<dyn Fn(Vec3) -> f32>, Box<dyn Fn(Vec3) -> [u8; 3]>);
+/// A solid of the room.
+struct Solid {
+    /// Signed distance in metres to its surface.
+    distance: Box<dyn Fn(Vec3) -> f32>,
+    /// Its colour at a point of its surface.
+    color: Box<dyn Fn(Vec3) -> [u8; 3]>,
+}
+
+impl Solid {
+    fn new(
+        distance: impl Fn(Vec3) -> f32 + 'static,
+        color: impl Fn(Vec3) -> [u8; 3] + 'static,
+    ) -> Self {
+        Self {
+            distance: Box::new(distance),
+            color: Box::new(color),
+        }
+    }
+
+    /// A block of one colour, with a grain where it is of wood.
+    fn block(center: [f32; 3], half: [f32; 3], color: [u8; 3], grain: f32) -> Self {
+        let (center, half) = (Vec3::from(center), Vec3::from(half));
+        Self::new(
+            move |p| rounded_block(p - center, half, 0.01),
+            move |p| grained(p, color, grain),
+        )
+    }
+}
 
 /// A corner of a furnished room as a coloured point cloud with noise, z up, 4.2 × 3.6 × 1.5 m:
 /// floor, two walls, a table with a bowl on it, steps, a bookcase, a stool, an open crate.
@@ -20,20 +46,15 @@ pub fn furnished_room(spacing: f32, noise: f32, seed: u64) -> SampledSurface {
         min: Vec3::splat(-0.01),
         max: Vec3::new(4.2, 3.6, 1.5),
     };
-    let nearest = |p: Vec3| {
-        let distances = solids.iter().map(|(distance, _)| distance(p));
-        distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
+    let distances = |p: Vec3| solids.iter().map(move |solid| (solid.distance)(p));
+    let distance = |p: Vec3| distances(p).fold(f32::MAX, f32::min);
+    let mut room = sample_surface(distance, bounds, spacing, seed);
+    let color = |p: &Vec3| {
+        let nearest = (solids.iter().zip(distances(*p))).min_by(|a, b| a.1.total_cmp(&b.1));
+        let [r, g, b] = nearest.map_or([0; 3], |(solid, _)| (solid.color)(*p));
+        [r, g, b, 255]
     };
-    let mut room = sample_surface(
-        |p| (solids.iter()).fold(f32::MAX, |least, (distance, _)| least.min(distance(p))),
-        |p| {
-            let [r, g, b] = nearest(p).map_or([0; 3], |(k, _)| solids[k].1(p));
-            [r, g, b, 255]
-        },
-        bounds,
-        spacing,
-        seed,
-    );
+    room.colors = room.points.iter().map(color).collect();
     let mut rng = Rng::with_seed(seed ^ 0x6e6f_6973);
     for (point, normal) in room.points.iter_mut().zip(&room.normals) {
         *point += noise * random::normal(&mut rng) * *normal;
@@ -42,77 +63,61 @@ pub fn furnished_room(spacing: f32, noise: f32, seed: u64) -> SampledSurface {
 }
 
 fn room_solids() -> Vec<Solid> {
-    let mut solids: Vec<Solid> = vec![
-        (Box::new(|p| p.z), Box::new(floor_color)),
-        (Box::new(|p| p.x), Box::new(|_| [214, 206, 190])),
-        (Box::new(|p| p.y), Box::new(|_| [198, 204, 206])),
-    ];
-    let mut block = |center: [f32; 3], half: [f32; 3], color: [u8; 3], grain: f32| {
-        let (center, half) = (Vec3::from(center), Vec3::from(half));
-        solids.push((
-            Box::new(move |p| rounded_block(p - center, half, 0.01)),
-            Box::new(move |p| grained(p, color, grain)),
-        ));
+    let crate_center = Vec3::new(0.75, 2.75, 0.0);
+    let stool = Vec3::new(2.75, 2.75, 0.23);
+    let bowl = Vec3::new(1.5, 1.5, 0.725);
+    let bowl_color = |p: Vec3| match p.z > 0.88 {
+        true => [235, 238, 240],
+        false => [72, 112, 160],
     };
-    let wood = [164, 116, 72];
-    // Table.
-    block([1.9, 1.5, 0.70], [0.75, 0.48, 0.025], wood, WOOD_GRAIN);
-    for (x, y) in [(1.22, 1.09), (2.58, 1.09), (1.22, 1.91), (2.58, 1.91)] {
-        block([x, y, 0.34], [0.03, 0.03, 0.34], [120, 84, 52], WOOD_GRAIN);
-    }
+    let mut solids = vec![
+        Solid::new(|p| p.z, floor_color),
+        Solid::new(|p| p.x, |_| [214, 206, 190]),
+        Solid::new(|p| p.y, |_| [198, 204, 206]),
+    ];
+    solids.extend(table());
     // Steps along the wall y = 0.
     for (k, height) in [0.2, 0.4, 0.6].into_iter().enumerate() {
-        let y = 1.05 - 0.35 * k as f32;
-        block(
-            [3.45, y - 0.35, 0.5 * height],
-            [0.42, 0.18, 0.5 * height],
-            [146, 148, 152],
-            0.0,
-        );
+        let (y, half) = (1.05 - 0.35 * k as f32 - 0.35, 0.5 * height);
+        let step = ([3.45, y, half], [0.42, 0.18, half]);
+        solids.push(Solid::block(step.0, step.1, [146, 148, 152], 0.0));
     }
-    // Bookcase along the wall x = 0.
-    for y in [0.5, 1.7] {
-        block([0.2, y, 0.5], [0.19, 0.02, 0.5], wood, WOOD_GRAIN);
-    }
-    for z in [0.1, 0.55, 1.0] {
-        block([0.2, 1.1, z], [0.19, 0.6, 0.02], wood, WOOD_GRAIN);
-    }
-    let book_colors = [[150, 52, 48], [52, 92, 130], [196, 160, 70], [70, 110, 74]];
-    for k in 0..9 {
-        let height = 0.11 + 0.012 * ((k * 5) % 4) as f32;
-        let y = 0.6 + 0.07 * k as f32;
-        block(
-            [0.17, y, 0.57 + height],
-            [0.12, 0.026, height],
-            book_colors[k % 4],
-            0.0,
-        );
-    }
-    // Crate without a lid.
-    let crate_center = Vec3::new(0.75, 2.75, 0.0);
-    solids.push((
-        Box::new(move |p| open_crate(yawed(p - crate_center, 0.4))),
-        Box::new(|p| grained(p, [186, 152, 98], WOOD_GRAIN)),
-    ));
-    // Stool.
-    let stool = Vec3::new(2.75, 2.75, 0.23);
-    solids.push((
-        Box::new(move |p| rounded_disc(p - stool, 0.27, 0.23, 0.03)),
-        Box::new(|_| [92, 128, 112]),
-    ));
-    // Bowl on the table.
-    let bowl = Vec3::new(1.5, 1.5, 0.725);
-    solids.push((
-        Box::new(move |p| bowl_distance(p - bowl)),
-        Box::new(|p| {
-            if p.z > 0.88 {
-                [235, 238, 240]
-            } else {
-                [72, 112, 160]
-            }
-        }),
-    ));
+    solids.extend(bookcase());
+    solids.extend([
+        Solid::new(
+            move |p| open_crate(yawed(p - crate_center, 0.4)),
+            |p| grained(p, [186, 152, 98], WOOD_GRAIN),
+        ),
+        Solid::new(
+            move |p| rounded_disc(p - stool, 0.27, 0.23, 0.03),
+            |_| [92, 128, 112],
+        ),
+        Solid::new(move |p| bowl_distance(p - bowl), bowl_color),
+    ]);
     solids
+}
+
+const WOOD: [u8; 3] = [164, 116, 72];
+
+fn table() -> impl Iterator<Item = Solid> {
+    let top = Solid::block([1.9, 1.5, 0.70], [0.75, 0.48, 0.025], WOOD, WOOD_GRAIN);
+    let legs = [(1.22, 1.09), (2.58, 1.09), (1.22, 1.91), (2.58, 1.91)];
+    let leg = |(x, y)| Solid::block([x, y, 0.34], [0.03, 0.03, 0.34], [120, 84, 52], WOOD_GRAIN);
+    std::iter::once(top).chain(legs.map(leg))
+}
+
+/// A bookcase with books along the wall x = 0.
+fn bookcase() -> impl Iterator<Item = Solid> {
+    const BOOK_COLORS: [[u8; 3]; 4] = [[150, 52, 48], [52, 92, 130], [196, 160, 70], [70, 110, 74]];
+    let side = |y| Solid::block([0.2, y, 0.5], [0.19, 0.02, 0.5], WOOD, WOOD_GRAIN);
+    let shelf = |z| Solid::block([0.2, 1.1, z], [0.19, 0.6, 0.02], WOOD, WOOD_GRAIN);
+    let book = |k: usize| {
+        let half = 0.11 + 0.012 * ((k * 5) % 4) as f32;
+        let center = [0.17, 0.6 + 0.07 * k as f32, 0.57 + half];
+        Solid::block(center, [0.12, 0.026, half], BOOK_COLORS[k % 4], 0.0)
+    };
+    let (sides, shelves) = ([0.5, 1.7].map(side), [0.1, 0.55, 1.0].map(shelf));
+    sides.into_iter().chain(shelves).chain((0..9).map(book))
 }
 
 fn floor_color(p: Vec3) -> [u8; 3] {
@@ -250,7 +255,7 @@ impl BodyShape {
             min: Vec3::splat(-0.6),
             max: Vec3::splat(0.6),
         };
-        sample_surface(|p| self.distance(p), |_| [255; 4], bounds, spacing, seed)
+        sample_surface(|p| self.distance(p), bounds, spacing, seed)
     }
 }
 

@@ -4,10 +4,13 @@
 //! are what a falling body meets. A spot is good where a disc as wide as the body is without
 //! holes and level.
 
+use crate::bodies::NamedCloud;
+use crate::load;
+use crate::numbers::range;
 use fastrand::Rng;
 use thiserror::Error;
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{Params, PointCloud, Tldi, VirtualCamera};
+use tldi::{Layer, Params, PointCloud, Tldi, VirtualCamera};
 
 /// A place to drop a body on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +31,18 @@ pub struct Demand {
     pub body_radius: f32,
     /// Seed of the choice.
     pub seed: u64,
+}
+
+impl Demand {
+    /// What bodies need that are centred on their origins.
+    pub fn of(bodies: &[NamedCloud], seed: u64) -> Self {
+        let radii = bodies.iter().map(|body| load::ball_radius(&body.cloud));
+        Self {
+            count: bodies.len(),
+            body_radius: radii.fold(0.0, f32::max),
+            seed,
+        }
+    }
 }
 
 /// There is nowhere to drop a body.
@@ -127,46 +142,37 @@ impl HeightMap {
         let image = tldi::build(scan, &Pose3::IDENTITY, &camera, &params);
         // Where the image would be too large, its pixels are larger than asked for.
         let pixel_size = image.camera.pixel_size_at(0.0);
-        let [width, height] = image.size;
         let mut map = Self {
             depth: Vec::new(),
             image,
             pixel_size,
         };
         let roof = map.roof_depth();
-        map.depth = (0..height)
-            .flat_map(|j| (0..width).map(move |i| (i, j)))
-            .map(|(i, j)| {
-                let mut layers = map.image.layers_at(i, j).iter().map(|layer| layer.depth);
-                layers.find(|depth| *depth > roof).unwrap_or(f32::NAN)
-            })
-            .collect();
+        let topmost = |layers: &[Layer]| {
+            let mut depths = layers.iter().map(|layer| layer.depth);
+            depths.find(|depth| *depth > roof).unwrap_or(f32::NAN)
+        };
+        map.depth = map.columns().map(topmost).collect();
         map
+    }
+
+    /// The layers of each pixel, row by row.
+    fn columns(&self) -> impl Iterator<Item = &[Layer]> {
+        let [width, height] = self.image.size;
+        let pixels = (0..height).flat_map(move |j| (0..width).map(move |i| (i, j)));
+        pixels.map(|(i, j)| self.image.layers_at(i, j))
     }
 
     /// Depth down to which there is a roof or a ceiling over most of the scan, with surfaces
     /// under it: nothing is dropped on top of that. `-∞` without one.
     fn roof_depth(&self) -> f32 {
-        let [width, height] = self.image.size;
-        let pixels = || (0..height).flat_map(|j| (0..width).map(move |i| (i, j)));
-        let columns: Vec<&[tldi::Layer]> = pixels()
-            .map(|(i, j)| self.image.layers_at(i, j))
-            .filter(|layers| !layers.is_empty())
-            .collect();
-        let depths = || {
-            columns
-                .iter()
-                .flat_map(|layers| layers.iter().map(|layer| layer.depth))
-        };
-        let (top, bottom) = depths().fold((f32::MAX, f32::MIN), |(a, b), d| (a.min(d), b.max(d)));
+        let seen = || self.columns().filter(|layers| !layers.is_empty());
+        let [top, bottom] = range(seen().flatten().map(|layer| layer.depth));
         let under_roof = top + 0.15 * (bottom - top);
-        let roofed = columns
-            .iter()
-            .filter(|layers| {
-                layers[0].depth < under_roof && layers[layers.len() - 1].depth > under_roof
-            })
-            .count();
-        if 2 * roofed > columns.len() {
+        let is_roofed = |layers: &&[Layer]| {
+            layers[0].depth < under_roof && layers[layers.len() - 1].depth > under_roof
+        };
+        if 2 * seen().filter(is_roofed).count() > seen().count() {
             under_roof
         } else {
             f32::NEG_INFINITY

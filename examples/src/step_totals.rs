@@ -60,10 +60,7 @@ impl StepTotals {
     }
 
     /// Writes a line for people.
-    ///
-    /// # Errors
-    /// Those of writing.
-    pub fn write_line(&self, out: &mut impl Write) -> io::Result<()> {
+    pub(crate) fn write_line(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(
             out,
             "{} steps of {:.4} s in {:.2} s ({:.1} x real time) on {}; contacts in {} steps; {} pairs \

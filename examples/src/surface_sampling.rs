@@ -12,7 +12,7 @@ pub struct SampledSurface {
     pub points: Vec<Vec3>,
     /// Outward unit normals, one for each point.
     pub normals: Vec<Vec3>,
-    /// Colours (red, green, blue, alpha), one for each point.
+    /// Colours (red, green, blue, alpha), one for each point; none where the scene gives none.
     pub colors: Vec<[u8; 4]>,
 }
 
@@ -26,12 +26,11 @@ pub struct SampledSurface {
 /// use tldi::{Aabb, glamx::Vec3};
 /// use tldi_examples::surface_sampling::sample_surface;
 /// let bounds = Aabb { min: Vec3::splat(-1.1), max: Vec3::splat(1.1) };
-/// let ball = sample_surface(|p| p.length() - 1.0, |_| [255; 4], bounds, 0.1, 7);
+/// let ball = sample_surface(|p| p.length() - 1.0, bounds, 0.1, 7);
 /// assert!(ball.points.iter().all(|p| (p.length() - 1.0).abs() < 1e-3));
 /// ```
 pub fn sample_surface(
     distance: impl Fn(Vec3) -> f32,
-    color: impl Fn(Vec3) -> [u8; 4],
     bounds: Aabb,
     spacing: f32,
     seed: u64,
@@ -48,9 +47,7 @@ pub fn sample_surface(
     let cells = (bounds.extents().max_element() / sampler.cell).max(1.0);
     let edge = sampler.cell * cells.log2().ceil().exp2();
     sampler.visit(bounds.min, edge);
-    let mut surface = sampler.surface;
-    surface.colors = surface.points.iter().map(|p| color(*p)).collect();
-    surface
+    sampler.surface
 }
 
 struct Sampler<D> {
@@ -149,7 +146,7 @@ mod tests {
             min: Vec3::new(0.0, 0.0, -0.5),
             max: Vec3::new(1.0, 1.0, 0.5),
         };
-        let plane = sample_surface(|p| p.z, |_| [0; 4], bounds, 0.05, 3);
+        let plane = sample_surface(|p| p.z, bounds, 0.05, 3);
         // Discs of radius 0.35 × spacing do not overlap: at most 0.907 of the area (hexagonal
         // packing); random sequential packing saturates at 0.547, and 60 % of that is enough
         // for a surface without gaps.

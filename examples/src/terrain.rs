@@ -127,13 +127,8 @@ impl Terrain {
     /// holes, points that are seen twice, and points that lie on nothing.
     pub fn scan(&self) -> SampledSurface {
         let mut rng = Rng::with_seed(self.seed ^ 0x7363_616e);
-        let exact = sample_surface(
-            |p| self.distance(p).min(walls(p)),
-            |p| color(p, walls(p) < 0.01),
-            ROOM,
-            SPACING,
-            self.seed,
-        );
+        let distance = |p: Vec3| self.distance(p).min(walls(p));
+        let exact = sample_surface(distance, ROOM, SPACING, self.seed);
         let holes: Vec<(Vec2, f32)> = (0..HOLES)
             .map(|_| {
                 let place = Vec2::new(
@@ -144,8 +139,7 @@ impl Terrain {
             })
             .collect();
         let mut seen = SampledSurface::default();
-        let all = (exact.points.iter().zip(&exact.normals)).zip(&exact.colors);
-        for ((point, normal), color) in all {
+        for (point, normal) in exact.points.iter().zip(&exact.normals) {
             let range = point.distance(SCANNER);
             let in_hole =
                 (holes.iter()).any(|(place, radius)| point.truncate().distance(*place) < *radius);
@@ -159,7 +153,7 @@ impl Terrain {
                 seen.points
                     .push(*point + error * ray + time as f32 * TWICE_APART * Vec3::X);
                 seen.normals.push(*normal);
-                seen.colors.push(*color);
+                seen.colors.push(color(*point));
             }
         }
         for _ in 0..(OUTLIERS * seen.points.len() as f32) as usize {
@@ -177,8 +171,8 @@ fn walls(point: Vec3) -> f32 {
     (point.x - ROOM.min.x - 0.01).min(ROOM.max.y - 0.01 - point.y)
 }
 
-fn color(point: Vec3, is_wall: bool) -> [u8; 4] {
-    if is_wall {
+fn color(point: Vec3) -> [u8; 4] {
+    if walls(point) < 0.01 {
         return [206, 200, 188, 255];
     }
     // The higher, the lighter: steps and stones can be told apart.

@@ -270,7 +270,7 @@ fn is_level(normal: Vec3, axis: Vec3) -> bool {
 mod tests {
     use super::*;
     use crate::scene::furnished_room;
-    use crate::surface_sampling::SampledSurface;
+    use crate::surface_sampling::{SampledSurface, sample_surface};
     use fastrand::Rng;
     use tldi::glamx::Quat;
 
@@ -358,13 +358,7 @@ mod tests {
             let hill = 3.0 * (-0.05 * ((p.x - 12.0).powi(2) + (p.y - 15.0).powi(2))).exp();
             hill + 0.3 * (p.x * 1.3).sin() * (p.y * 0.9).cos() + 0.04 * p.x
         };
-        let hill = crate::surface_sampling::sample_surface(
-            |p| 0.6 * (p.z - height(p)),
-            |_| [0; 4],
-            bounds,
-            0.3,
-            1,
-        );
+        let hill = sample_surface(|p| 0.6 * (p.z - height(p)), bounds, 0.3, 1);
         assert_eq!(turned(&hill, Quat::IDENTITY).direction, Vec3::Z);
     }
 
@@ -374,13 +368,7 @@ mod tests {
             min: Vec3::splat(-1.1),
             max: Vec3::splat(1.1),
         };
-        let ball = crate::surface_sampling::sample_surface(
-            |p| p.length() - 1.0,
-            |_| [0; 4],
-            bounds,
-            0.05,
-            1,
-        );
+        let ball = sample_surface(|p| p.length() - 1.0, bounds, 0.05, 1);
         let up = turned(&ball, Quat::from_rotation_x(1.0));
         assert_eq!(
             up,

@@ -3,8 +3,8 @@
 mod common;
 
 use common::{
-    PICTURES, TIMES, assert_keys, assert_pictures, assert_refused, data, folder, number,
-    seeded_report,
+    PICTURES, TIMES, assert_keys, assert_pictures, assert_refused, data, folder, list, number,
+    report, report_with_pictures, seeded_report, vector,
 };
 use serde_json::Value;
 use std::fs;
@@ -16,11 +16,7 @@ const BINARY: &str = env!("CARGO_BIN_EXE_depth_camera");
 /// plate of 50 cm across is 30 cm over the floor. The camera's y is the world's −y: z is up.
 fn write_frames(folder: &Path, plates: &[bool]) {
     fs::create_dir_all(folder).unwrap();
-    fs::write(
-        folder.join("intrinsics.txt"),
-        "160 120 140 140 79.5 59.5 0.001\n",
-    )
-    .unwrap();
+    write_intrinsics(folder, 0.001);
     let mut poses = String::new();
     for (k, plate) in plates.iter().enumerate() {
         let name = format!("{k:03}.png");
@@ -31,6 +27,12 @@ fn write_frames(folder: &Path, plates: &[bool]) {
         });
     }
     fs::write(folder.join("poses.txt"), poses).unwrap();
+}
+
+/// Writes the geometry of the camera, with this unit of depth in metres.
+fn write_intrinsics(folder: &Path, unit: f32) {
+    let text = format!("160 120 140 140 79.5 59.5 {unit}\n");
+    fs::write(folder.join("intrinsics.txt"), text).unwrap();
 }
 
 /// Writes the depths of the columns and rows of an image.
@@ -50,6 +52,15 @@ fn write_image(path: &Path, depth: impl Fn(usize, usize) -> u16) {
         .unwrap();
 }
 
+/// One body of 20 cm: a box that is 10 cm high. Its middle rests 5 cm over what carries it, with half a centimetre for
+/// the sensor's radii.
+const ONE_BODY: &str = "--up 0,0,1 --count 1 --size 0.2 --hold 1 --frames";
+
+fn assert_height(report: &Value, expected: f64) {
+    let height = number(&report["bodies"][0]["translation"][2]);
+    assert!((height - expected).abs() < 0.005, "{report}");
+}
+
 /// A frame in which nothing was measured is passed over: what lies on the surface of the frame before stays.
 #[test]
 fn a_frame_without_points_is_passed_over() {
@@ -58,20 +69,12 @@ fn a_frame_without_points_is_passed_over() {
     for name in ["007.png", "029.png"] {
         write_image(&folder.join("frames").join(name), |_, _| 0);
     }
-    let options = [
-        "--frames", "frames", "--up", "0,0,1", "--count", "1", "--size", "0.2", "--hold", "1",
-    ];
-    let report = report(&folder, &options);
-    let frames = report["frames"].as_array().unwrap();
+    let report = report(BINARY, &folder, &format!("{ONE_BODY} frames"));
+    let frames = list(&report["frames"]);
     assert_eq!(frames.len(), 60);
     let empty = frames.iter().filter(|frame| frame["points"] == 0);
     assert!(empty.eq([&frames[37], &frames[59]]));
-    let height = number(&report["bodies"][0]["translation"][2]);
-    assert!((height - 0.35).abs() < 0.005, "{height}");
-}
-
-fn report(folder: &Path, options: &[&str]) -> Value {
-    common::report(BINARY, folder, options)
+    assert_height(&report, 0.35);
 }
 
 /// A body lies on the plate; the plate leaves the view, and the body falls to the floor.
@@ -80,18 +83,12 @@ fn what_is_gone_from_the_frame_does_not_hold() {
     let folder = folder("depth_gone");
     let plates: Vec<bool> = (0..60).map(|k| k < 30).collect();
     write_frames(&folder.join("frames"), &plates);
-    // A box 20 cm long is 10 cm high: its middle rests 5 cm over what carries it, with half a
-    // centimetre for the sensor's radii.
-    let options = [
-        "--frames", "frames", "--up", "0,0,1", "--count", "1", "--size", "0.2", "--hold", "1",
-    ];
-    let height = |report: &Value| number(&report["bodies"][0]["translation"][2]);
     write_frames(&folder.join("still"), &[true; 30]);
-    let still = report(&folder, &[&["--frames", "still"], &options[2..]].concat());
-    assert!((height(&still) - 0.35).abs() < 0.005, "{still}");
-    let gone = report(&folder, &options);
-    assert!((height(&gone) - 0.05).abs() < 0.005, "{gone}");
-    for frame in gone["frames"].as_array().unwrap() {
+    let [still, gone] =
+        ["still", "frames"].map(|name| report(BINARY, &folder, &format!("{ONE_BODY} {name}")));
+    assert_height(&still, 0.35);
+    assert_height(&gone, 0.05);
+    for frame in list(&gone["frames"]) {
         // Rims of the plate fly; nothing is remembered.
         assert_eq!(frame["remembered_points"], 0);
         let flying = number(&frame["flying_pixels"]);
@@ -106,11 +103,9 @@ fn what_is_gone_from_the_frame_does_not_hold() {
     // With a memory, the floor under the plate is known once it was seen, the plate is not kept.
     let plates: Vec<bool> = (0..20).map(|k| k >= 10).collect();
     write_frames(&folder.join("covered"), &plates);
-    let options = [
-        "--frames", "covered", "--up", "0,0,1", "--count", "0", "--hold", "0", "--memory", "30",
-    ];
-    let covered = report(&folder, &options);
-    let frames = covered["frames"].as_array().unwrap();
+    let options = "--frames covered --up 0,0,1 --count 0 --hold 0 --memory 30";
+    let covered = report(BINARY, &folder, options);
+    let frames = list(&covered["frames"]);
     assert_eq!(frames[9]["remembered_points"], 0);
     // 136 × 96 pixels of the floor, once: what a frame sees again is not kept twice.
     let remembered = number(&frames[19]["remembered_points"]);
@@ -120,23 +115,15 @@ fn what_is_gone_from_the_frame_does_not_hold() {
 #[test]
 fn the_generated_ball_pushes_and_equal_seeds_give_equal_reports() {
     let folder = folder("depth_generated");
-    let times = [&TIMES[..], &["median_latency_ms", "max_latency_ms"]].concat();
-    let frame_times = ["unproject_ms", "update_ms", "step_ms", "latency_ms"];
-    let first = seeded_report(BINARY, &folder, &["--hold", "0"], &times, &frame_times);
+    let times = format!("{TIMES} median_latency_ms max_latency_ms");
+    let frame_times = "unproject_ms update_ms step_ms latency_ms";
+    let first = seeded_report(BINARY, &folder, "--hold 0", &times, frame_times);
     assert_keys(
         &first,
-        &[
-            "backend",
-            "adapter",
-            "steps",
-            "frames",
-            "bodies",
-            "contact_steps",
-            "pairs_missed",
-        ],
+        "backend adapter steps frames bodies contact_steps pairs_missed",
     );
     assert_eq!(first["pairs_missed"], 0);
-    let bodies = first["bodies"].as_array().unwrap();
+    let bodies = list(&first["bodies"]);
     // They rest on the table, the pebble after some rolling, and the ball, 22 cm wide, moves what is
     // in its way by more than a frame's noise.
     let has_rested = |body: &Value| !body["first_rested_at_seconds"].is_null();
@@ -147,7 +134,7 @@ fn the_generated_ball_pushes_and_equal_seeds_give_equal_reports() {
             .any(|body| number(&body["displacement"]) > 0.05),
         "{bodies:?}"
     );
-    assert_pictures(&folder.join("out/depth_camera"), &PICTURES);
+    assert_pictures(&folder.join("out/depth_camera"), PICTURES);
 }
 
 #[test]
@@ -155,51 +142,26 @@ fn what_is_wrong_is_said() {
     let folder = folder("depth_errors");
     write_frames(&folder.join("frames"), &[false; 3]);
     fs::create_dir_all(folder.join("empty")).unwrap();
-    let cases: [(&[&str], i32, &str); 7] = [
+    let cases = [
         // The floor is straight ahead: nothing in view tells how the camera is held.
-        (
-            &["--frames", "frames"][..],
-            1,
-            "pass it by hand (--up X,Y,Z",
-        ),
-        (&["--frames", "empty"], 1, "holds intrinsics.txt"),
-        (&["--frames", "missing"], 1, "missing"),
-        (&["--backend", "fast"], 2, "is no backend"),
-        (&["--sensor-noise", "-1"], 2, "greater than 0"),
-        (
-            &["--frames", "frames", "--size", "9", "--up", "0,0,1"],
-            1,
-            "no level surface",
-        ),
-        (&["--hold", "-1"], 2, "from 0 to 3600"),
+        ("--frames frames", 1, "pass it by hand (--up X,Y,Z"),
+        ("--frames empty", 1, "holds intrinsics.txt"),
+        ("--frames missing", 1, "missing"),
+        ("--backend fast", 2, "is no backend"),
+        ("--sensor-noise -1", 2, "greater than 0"),
+        ("--frames frames --size 9 --up 0,0,1", 1, "no level surface"),
+        ("--hold -1", 2, "from 0 to 3600"),
     ];
     assert_refused(BINARY, &folder, &cases);
     // A frame that is missing is named, and passed over.
     fs::remove_file(folder.join("frames/001.png")).unwrap();
-    let report = common::report_with_pictures(
-        BINARY,
-        &folder,
-        &[
-            "--frames",
-            "frames",
-            "--count",
-            "0",
-            "--hold",
-            "0",
-            "--animate",
-            "--up",
-            "0,0,1",
-        ],
-    );
+    let options = "--frames frames --count 0 --hold 0 --animate --up 0,0,1";
+    let report = report_with_pictures(BINARY, &folder, options);
     assert_eq!(report["missing_frames"][0], "001.png");
-    assert_eq!(report["frames"].as_array().unwrap().len(), 2);
+    assert_eq!(list(&report["frames"]).len(), 2);
     // In metres, as a unit of millimetres makes them: nothing is in range.
-    fs::write(
-        folder.join("frames/intrinsics.txt"),
-        "160 120 140 140 79.5 59.5 1\n",
-    )
-    .unwrap();
-    let case: (&[&str], i32, &str) = (&["--frames", "frames"], 1, "is the depth unit right?");
+    write_intrinsics(&folder.join("frames"), 1.0);
+    let case = ("--frames frames", 1, "is the depth unit right?");
     assert_refused(BINARY, &folder, &[case]);
 }
 
@@ -208,19 +170,16 @@ fn what_is_wrong_is_said() {
 fn the_range_can_be_set() {
     let folder = folder("depth_range");
     write_frames(&folder.join("frames"), &[false; 2]);
-    let intrinsics = "160 120 140 140 79.5 59.5 0.01\n";
-    fs::write(folder.join("frames/intrinsics.txt"), intrinsics).unwrap();
-    let options = [
-        "--frames", "frames", "--count", "0", "--hold", "0", "--up", "0,0,1",
-    ];
-    let ranged = |range| [&options[..], &["--range", range]].concat();
-    let cases: [(&[&str], i32, &str); 3] = [
-        (&options, 1, "between 0.3 and 8 m"),
+    write_intrinsics(&folder.join("frames"), 0.01);
+    let options = "--frames frames --count 0 --hold 0 --up 0,0,1";
+    let ranged = |range| format!("{options} --range {range}");
+    let cases = [
+        (options, 1, "between 0.3 and 8 m"),
         (&ranged("1,14"), 1, "between 1 and 14 m"),
         (&ranged("14,1"), 2, "the nearest and the farthest"),
     ];
     assert_refused(BINARY, &folder, &cases);
-    let report = report(&folder, &ranged("1,16"));
+    let report = report(BINARY, &folder, &ranged("1,16"));
     assert!(
         number(&report["frames"][0]["points"]) > 10_000.0,
         "{report}"
@@ -229,23 +188,18 @@ fn the_range_can_be_set() {
 
 #[test]
 fn bodies_rest_on_real_frames() {
-    let Some(frames) = data("kitchen_depth") else {
+    if data("kitchen_depth").is_none() {
         return;
-    };
+    }
     let folder = folder("depth_kitchen");
-    let report = report(&folder, &["--frames", frames.to_str().unwrap()]);
-    assert_eq!(report["missing_frames"].as_array().unwrap().len(), 0);
+    let report = report(BINARY, &folder, "--frames $TLDI_DATA/kitchen_depth");
+    assert!(list(&report["missing_frames"]).is_empty());
     // The data's notes give gravity as (-0.009, 0.904, 0.427); one frame tells it within 8°.
-    let up = [0, 1, 2].map(|k| number(&report["up"][k]));
-    let cos = -(-0.009 * up[0] + 0.904 * up[1] + 0.427 * up[2]);
-    assert!(cos > 0.99, "{up:?}");
-    let rested = report["bodies"].as_array().unwrap().iter();
-    assert!(
-        rested
-            .filter(|body| !body["first_rested_at_seconds"].is_null())
-            .count()
-            >= 2,
-        "{report}"
-    );
+    let [x, y, z] = vector(&report["up"]);
+    let cos = -(-0.009 * x + 0.904 * y + 0.427 * z);
+    assert!(cos > 0.99, "{x} {y} {z}");
+    let has_rested = |body: &&Value| !body["first_rested_at_seconds"].is_null();
+    let rested = list(&report["bodies"]).iter().filter(has_rested);
+    assert!(rested.count() >= 2, "{report}");
     eprintln!("median latency {} ms", report["median_latency_ms"]);
 }

@@ -3,18 +3,13 @@
 mod common;
 
 use common::{
-    PICTURES, TIMES, assert_keys, assert_pictures, assert_refused, data, folder, number,
-    seeded_report,
+    PICTURES, TIMES, assert_keys, assert_pictures, assert_refused, ball, data, folder, list,
+    number, ply, report, seeded_report,
 };
-use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_gallop");
-
-fn report(folder: &Path, options: &[&str]) -> Value {
-    common::report(BINARY, folder, options)
-}
 
 /// A ball of 400 points that hops: z up, frames × points × 3 as numpy.save writes them.
 fn write_hopping_ball(path: &Path) {
@@ -22,11 +17,8 @@ fn write_hopping_ball(path: &Path) {
     let mut data = Vec::new();
     for frame in 0..frames {
         let height = 0.5 * (frame as f64 / frames as f64 * std::f64::consts::TAU).sin();
-        for k in 0..points {
-            let z = 1.0 - (2 * k + 1) as f64 / points as f64;
-            let angle = k as f64 * 2.399963;
-            let ring = (1.0 - z * z).sqrt();
-            for c in [ring * angle.cos(), ring * angle.sin(), z + height] {
+        for [x, y, z] in ball(points) {
+            for c in [x, y, z + height] {
                 data.extend((c as f32).to_le_bytes());
             }
         }
@@ -43,21 +35,13 @@ fn write_hopping_ball(path: &Path) {
 #[test]
 fn the_creature_kicks_and_equal_seeds_give_equal_reports() {
     let folder = folder("gallop_generated");
-    let frame_times = ["deform_ms", "step_ms"];
-    let first = seeded_report(BINARY, &folder, &["--steps", "120"], &TIMES, &frame_times);
+    let frame_times = "deform_ms step_ms";
+    let first = seeded_report(BINARY, &folder, "--steps 120", TIMES, frame_times);
     assert_keys(
         &first,
-        &[
-            "backend",
-            "adapter",
-            "steps",
-            "dt",
-            "frames",
-            "contact_steps",
-            "max_penetration",
-        ],
+        "backend adapter steps dt frames contact_steps max_penetration",
     );
-    assert_eq!(first["frames"].as_array().unwrap().len(), 120);
+    assert_eq!(list(&first["frames"]).len(), 120);
     assert_eq!(first["pairs_missed"], 0);
     // Hooves, waves and bodies have known shapes. Depths are told within a radius, and hooves that move into bodies no
     // less deep than their deepest point is, but for that: the way out of a body may be longer.
@@ -80,7 +64,7 @@ fn the_creature_kicks_and_equal_seeds_give_equal_reports() {
     // Feet are down for a good part of every cycle, and off the ground in others.
     let contact_steps = number(&first["contact_steps"]);
     assert!((20.0..120.0).contains(&contact_steps), "{contact_steps}");
-    let bodies = first["bodies"].as_array().unwrap();
+    let bodies = list(&first["bodies"]);
     assert_eq!(bodies.len(), 8);
     assert!(
         bodies
@@ -92,7 +76,7 @@ fn the_creature_kicks_and_equal_seeds_give_equal_reports() {
         let height = number(&body["translation"][1]);
         assert!((-0.05..0.25).contains(&height), "{body}");
     }
-    assert_pictures(&folder.join("out/gallop"), &PICTURES);
+    assert_pictures(&folder.join("out/gallop"), PICTURES);
 }
 
 /// It touches where the ground, whose waves are known, is higher than its lowest point.
@@ -100,18 +84,13 @@ fn the_creature_kicks_and_equal_seeds_give_equal_reports() {
 fn a_hopping_ball_touches_where_it_is_low() {
     let folder = folder("gallop_ball");
     write_hopping_ball(&folder.join("ball.npy"));
-    let options = [
-        "--frames", "ball.npy", "--up", "0,0,1", "--size", "1", "--cycle", "0.8", "--bodies", "0",
-        "--speed", "1", "--steps", "160",
-    ];
-    let report = report(&folder, &options);
-    assert_eq!(
-        (&report["points"], &report["cycle_frames"]),
-        (&Value::from(400), &Value::from(8))
-    );
+    let options =
+        "--frames ball.npy --up 0,0,1 --size 1 --cycle 0.8 --bodies 0 --speed 1 --steps 160";
+    let report = report(BINARY, &folder, options);
+    assert_eq!([&report["points"], &report["cycle_frames"]], [400, 8]);
     let tau = std::f64::consts::TAU;
     let mut certain = [0, 0];
-    for frame in report["frames"].as_array().unwrap() {
+    for frame in list(&report["frames"]) {
         let time = number(&frame["time"]);
         // Three metres high in its file, one metre here: it hops by a sixth of a metre.
         let bottom = (1.0 + (tau * time / 0.8).sin()) / 6.0;
@@ -139,52 +118,38 @@ fn what_is_wrong_is_said() {
     let bytes = fs::read(folder.join("ball.npy")).unwrap();
     fs::write(folder.join("short.npy"), &bytes[..bytes.len() / 2]).unwrap();
     fs::create_dir_all(folder.join("empty")).unwrap();
-    let ply = |face: &str| {
-        format!(
-            "ply\nformat ascii 1.0\nelement vertex 500\nproperty float x\nproperty float y\nproperty float z\n\
-             element face 1\nproperty list uchar int vertex_indices\nend_header\n{}{face}\n",
-            "0 0 0\n".repeat(500)
-        )
-    };
-    fs::write(folder.join("other.ply"), ply("3 0 1 450")).unwrap();
-    let cases: [(&[&str], i32, &str); 7] = [
-        (&["--frames", "short.npy"][..], 1, "frame 3 of 8 ends early"),
-        (&["--frames", "empty"], 1, "no cloud in empty"),
-        (&["--frames", "lost.npy"], 1, "lost.npy"),
+    let other = ply("x y z", &"0 0 0\n".repeat(500), "3 0 1 450\n");
+    fs::write(folder.join("other.ply"), other).unwrap();
+    let cases = [
+        ("--frames short.npy", 1, "frame 3 of 8 ends early"),
+        ("--frames empty", 1, "no cloud in empty"),
+        ("--frames lost.npy", 1, "lost.npy"),
         (
-            &["--frames", "ball.npy", "--faces", "other.ply"],
+            "--frames ball.npy --faces other.ply",
             1,
             "other.ply has 500 points and the frames have 400",
         ),
-        (&["--faces", "other.ply"], 2, "--frames"),
-        (&["--size", "-1"], 2, "greater than 0"),
-        (&["--backend", "fast"], 2, "is no backend"),
+        ("--faces other.ply", 2, "--frames"),
+        ("--size -1", 2, "greater than 0"),
+        ("--backend fast", 2, "is no backend"),
     ];
     assert_refused(BINARY, &folder, &cases);
 }
 
 #[test]
 fn the_horse_gallops() {
-    let (Some(frames), Some(faces)) = (
-        data("horse_gallop/positions_24x8431x3_f32.npy.gz"),
-        data("horse_gallop/frame01.ply.gz"),
-    ) else {
+    let (frames, faces) = ("positions_24x8431x3_f32.npy.gz", "frame01.ply.gz");
+    if [frames, faces]
+        .map(|name| data(&format!("horse_gallop/{name}")))
+        .contains(&None)
+    {
         return;
-    };
+    }
     let folder = folder("gallop_horse");
-    let options = [
-        "--frames",
-        frames.to_str().unwrap(),
-        "--faces",
-        faces.to_str().unwrap(),
-        "--steps",
-        "70",
-    ];
-    let report = report(&folder, &options);
-    assert_eq!(
-        (&report["points"], &report["cycle_frames"]),
-        (&Value::from(8431), &Value::from(24))
-    );
+    let horse = "$TLDI_DATA/horse_gallop";
+    let options = format!("--frames {horse}/{frames} --faces {horse}/{faces} --steps 70");
+    let report = report(BINARY, &folder, &options);
+    assert_eq!([&report["points"], &report["cycle_frames"]], [8431, 24]);
     // Its hooves go back by some 3 m in a cycle of 0.8 s.
     assert!(
         (2.0..6.0).contains(&number(&report["speed"])),

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{assert_refused, folder, number, report, report_with_pictures, run};
+use common::{assert_refused, folder, list, number, report, report_with_pictures, vector};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,7 @@ const BINARY: &str = env!("CARGO_BIN_EXE_lidar_stream");
 
 /// Asserts that the bodies lie on the ground, up to `slack` metres.
 fn assert_on_ground(report: &Value, slack: f64) {
-    for body in report["bodies"].as_array().unwrap() {
+    for body in list(&report["bodies"]) {
         assert_eq!(body["lost"], false, "{body}");
         assert!(number(&body["height"]).abs() < slack, "{body}");
         assert!(number(&body["linear_speed"]) < 0.2, "{body}");
@@ -23,17 +23,11 @@ fn assert_on_ground(report: &Value, slack: f64) {
 #[test]
 fn bodies_rest_on_a_generated_street() {
     let folder = folder("lidar_generated");
-    let report = report_with_pictures(
-        BINARY,
-        &folder,
-        &["--count", "15", "--seed", "4", "--bodies", "3"],
-    );
+    let options = "--count 15 --seed 4 --bodies 3";
+    let report = report_with_pictures(BINARY, &folder, options);
     assert_eq!(report["up"], serde_json::json!([0.0, 0.0, 1.0]));
-    assert_eq!(
-        (report["steps"].clone(), report["pairs_missed"].clone()),
-        (90.into(), 0.into())
-    );
-    let sweeps = report["sweeps"].as_array().unwrap();
+    assert_eq!([&report["steps"], &report["pairs_missed"]], [90, 0]);
+    let sweeps = list(&report["sweeps"]);
     assert_eq!(sweeps.len(), 15);
     assert!(
         sweeps
@@ -77,19 +71,24 @@ fn write_sweeps(folder: &Path, count: usize) {
 fn a_folder_of_sweeps_is_read_with_its_poses() {
     let folder = folder("lidar_folder");
     write_sweeps(&folder, 12);
-    let options = ["--sweeps", ".", "--bodies", "2", "--size", "0.6"];
-    let report = report(BINARY, &folder, &options);
+    let report = report(BINARY, &folder, "--sweeps . --bodies 2 --size 0.6");
     assert_eq!(report["up"], serde_json::json!([0.0, -1.0, 0.0]));
-    let sweeps = report["sweeps"].as_array().unwrap();
+    let sweeps = list(&report["sweeps"]);
     assert_eq!(sweeps.len(), 12);
     for sweep in sweeps {
-        assert_eq!(
-            (&sweep["points"], &sweep["dropped"]),
-            (&(121 * 121).into(), &2.into())
-        );
+        assert_eq!([&sweep["points"], &sweep["dropped"]], [121 * 121, 2]);
     }
     // The grid is exact; contacts scatter by a tenth of its radius.
     assert_on_ground(&report, 0.02);
+}
+
+/// Asserts that the first point of every sweep, the grid's, is one place in the world.
+fn assert_first_points(source: &SweepSource, place: Vec3) {
+    for k in 0..source.count() {
+        let sweep = source.sweep(k).unwrap();
+        let first = sweep.world_from_scanner * sweep.points[0];
+        assert!(first.distance(place) < 1e-5, "{k}: {first}");
+    }
 }
 
 /// Files that are numbered without zeros in front have the poses of their numbers, packed ones among them.
@@ -112,17 +111,11 @@ fn numbered_sweeps_have_their_poses() {
     )
     .unwrap();
     let source = SweepSource::open(&folder).unwrap();
-    assert_eq!(source.len(), 12);
+    assert_eq!(source.count(), 12);
     for k in 0..12 {
-        let sweep = source.sweep(k).unwrap();
-        assert_eq!(sweep.name, k.to_string());
-        // The grid's first point is the same place in the world.
-        let first = sweep.world_from_scanner * sweep.points[0];
-        assert!(
-            first.distance(Vec3::new(3.0, 1.5, -3.0)) < 1e-5,
-            "{k}: {first}"
-        );
+        assert_eq!(source.sweep(k).unwrap().name, k.to_string());
     }
+    assert_first_points(&source, Vec3::new(3.0, 1.5, -3.0));
 }
 
 /// The same sweeps in coordinates of a map, where a step of `f32` is half a metre: they have the same places, relative to an
@@ -132,37 +125,17 @@ fn poses_may_be_those_of_a_map() {
     let map = [691_000.0_f64, 5_336_000.0, 8520.0];
     let folder = folder("lidar_map");
     write_sweeps(&folder, 3);
+    let [x, y, z] = [map[0] + 0.25, map[1] + 0.125, map[2]];
     let poses: String = (0..3)
-        .map(|k| {
-            let [x, y, z] = map;
-            format!(
-                "1 0 0 {}  0 1 0 {}  0 0 1 {}\n",
-                x + 0.25,
-                y + 0.125,
-                z + 0.1 * f64::from(k)
-            )
-        })
+        .map(|k| format!("1 0 0 {x}  0 1 0 {y}  0 0 1 {}\n", z + 0.1 * f64::from(k)))
         .collect();
     fs::write(folder.join("poses.txt"), poses).unwrap();
     let source = SweepSource::open(&folder).unwrap();
     assert_eq!(source.origin().to_array(), map);
-    for k in 0..3 {
-        let sweep = source.sweep(k).unwrap();
-        let first = sweep.world_from_scanner * sweep.points[0];
-        assert!(
-            first.distance(Vec3::new(3.25, 1.625, -3.0)) < 1e-5,
-            "{k}: {first}"
-        );
-    }
-    let options = ["--sweeps", ".", "--bodies", "1", "--size", "0.6"];
-    let report = report(BINARY, &folder, &options);
+    assert_first_points(&source, Vec3::new(3.25, 1.625, -3.0));
+    let report = report(BINARY, &folder, "--sweeps . --bodies 1 --size 0.6");
     assert_eq!(report["origin"], serde_json::json!(map));
-    let place: Vec<f64> = (report["bodies"][0]["translation"]
-        .as_array()
-        .unwrap()
-        .iter())
-    .map(number)
-    .collect();
+    let place = vector(&report["bodies"][0]["translation"]);
     assert!(place.iter().all(|c| c.abs() < 10.0), "{place:?}");
 }
 
@@ -170,7 +143,7 @@ fn poses_may_be_those_of_a_map() {
 fn what_is_missing_is_named() {
     let folder = folder("lidar_refused");
     let refused = |message: &str| {
-        assert_refused(BINARY, &folder, &[(&["--sweeps", "data"], 1, message)]);
+        assert_refused(BINARY, &folder, &[("--sweeps data", 1, message)]);
     };
     refused("data");
     let data = folder.join("data");
@@ -185,6 +158,5 @@ fn what_is_missing_is_named() {
     refused("poses.txt, line 1: the matrix is no pose");
     fs::write(data.join("calib.txt"), "P0: 1\n").unwrap();
     refused("no line `Tr:`");
-    let output = run(BINARY, &folder, &["--count", "0"]);
-    assert_eq!(output.status.code(), Some(2));
+    assert_refused(BINARY, &folder, &[("--count 0", 2, "--count")]);
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{CORNERS, SIDES, cube_as_stl};
+use common::{CORNERS, SIDES, ball, cube_as_stl, lines, ply};
 use std::fs;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
@@ -53,18 +53,13 @@ fn only_normals_with_a_side_count_as_such() {
 fn normals_of_a_file_have_a_side_only_if_they_agree() {
     let folder = common::folder("load_normals");
     let write = |name: &str, sign: fn(f32) -> f32| {
-        let header = "ply\nformat ascii 1.0\nelement vertex 2000\nproperty float x\nproperty float y\n\
-            property float z\nproperty float nx\nproperty float ny\nproperty float nz\nend_header\n";
-        let mut text = header.to_owned();
-        for k in 0..2000 {
-            let z = 1.0 - (2 * k + 1) as f32 / 2000.0;
-            let (y, x) = (2.399_963 * k as f32).sin_cos();
-            let p = Vec3::new(x, y, 0.0) * (1.0 - z * z).sqrt() + Vec3::new(0.0, 0.0, z);
-            let n = p * sign(p.z);
-            text += &format!("{} {} {} {} {} {}\n", p.x, p.y, p.z, n.x, n.y, n.z);
-        }
+        let points = ball(2000).into_iter().map(|p| p.map(|c| c as f32));
+        let vertices = points.map(|[x, y, z]| {
+            let [nx, ny, nz] = [x, y, z].map(|c| c * sign(z));
+            [x, y, z, nx, ny, nz]
+        });
         let path = folder.join(name);
-        fs::write(&path, text).unwrap();
+        fs::write(&path, ply("x y z nx ny nz", &lines(vertices), "")).unwrap();
         path
     };
     let outward = write("outward.ply", |_| 1.0);
@@ -81,22 +76,16 @@ fn normals_of_a_file_have_a_side_only_if_they_agree() {
 }
 
 fn cube_as_ply() -> String {
-    let mut text = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n\
-        property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
-        element face 6\nproperty list uchar uint vertex_indices\nend_header\n"
-        .to_owned();
-    for [x, y, z] in CORNERS {
-        let green = if z > 0.0 { 255 } else { 0 };
-        text += &format!("{x} {y} {z} 0 {green} 0\n");
-    }
-    for [a, b, c, d] in SIDES {
-        text += &format!("4 {a} {b} {c} {d}\n");
-    }
-    text
+    let green = |z: f32| if z > 0.0 { 255.0 } else { 0.0 };
+    let vertices = CORNERS.map(|[x, y, z]| [x, y, z, 0.0, green(z), 0.0]);
+    let faces = SIDES.map(|[a, b, c, d]| format!("4 {a} {b} {c} {d}\n"));
+    ply("x y z red green blue", &lines(vertices), &faces.concat())
 }
 
 fn cube_as_obj() -> String {
-    let corners = CORNERS.map(|[x, y, z]| format!("v {x} {y} {z}\n")).concat();
+    let corners = CORNERS
+        .map(|corner| "v ".to_owned() + &lines([corner]))
+        .concat();
     let side = |side: &[usize; 4]| format!("f {}\n", side.map(|k| (k + 1).to_string()).join(" "));
     corners + &SIDES.iter().map(side).collect::<String>()
 }
@@ -139,36 +128,23 @@ fn a_mesh_of_large_faces_becomes_points_on_them() {
 #[test]
 fn a_cloud_with_a_face_is_a_cloud() {
     let path = common::folder("load_one_face").join("cloud.ply");
-    let mut text = "ply\nformat ascii 1.0\nelement vertex 1000\nproperty float x\nproperty float y\nproperty float z\n\
-        element face 1\nproperty list uchar uint vertex_indices\nend_header\n"
-        .to_owned();
-    for k in 0..1000 {
-        text += &format!("{} {} {}\n", k % 10, k / 10 % 10, k / 100);
-    }
-    fs::write(&path, text + "3 0 9 990\n").unwrap();
+    let vertices = (0..1000).map(|k| [k % 10, k / 10 % 10, k / 100].map(|c| c as f32));
+    fs::write(&path, ply("x y z", &lines(vertices), "3 0 9 990\n")).unwrap();
     assert_eq!(load::body_from_file(&path).unwrap().cloud.len(), 1000);
 }
 
 /// A sheet of 100 × 100 small squares keeps its corners: they show what it is.
 #[test]
 fn a_mesh_of_small_faces_keeps_its_corners() {
-    let folder = common::folder("load_sheet");
-    let mut text = format!(
-        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
-         property float z\nelement face {}\nproperty list uchar uint vertex_indices\nend_header\n",
-        101 * 101,
-        100 * 100
-    );
-    for k in 0..101 * 101 {
-        text += &format!("{} {} 0\n", k % 101, k / 101);
-    }
-    for k in 0..100 * 100 {
+    let path = common::folder("load_sheet").join("sheet.ply");
+    let vertices = (0..101 * 101).map(|k| [(k % 101) as f32, (k / 101) as f32, 0.0]);
+    let face = |k: usize| {
         let corner = k / 100 * 101 + k % 100;
         let (right, above) = (corner + 1, corner + 101);
-        text += &format!("4 {corner} {right} {} {above}\n", above + 1);
-    }
-    let path = folder.join("sheet.ply");
-    fs::write(&path, text).unwrap();
+        format!("4 {corner} {right} {} {above}\n", above + 1)
+    };
+    let faces: String = (0..100 * 100).map(face).collect();
+    fs::write(&path, ply("x y z", &lines(vertices), &faces)).unwrap();
     for loaded in [
         load::body_from_file(&path),
         load::scan_from_file(&path, 1.0),

@@ -15,7 +15,7 @@ fn without_the_feature_it_is_said_how_to_get_it() {
         env!("CARGO_BIN_EXE_robot_in_scan"),
         env!("CARGO_BIN_EXE_depth_camera"),
     ];
-    let case: (&[&str], i32, &str) = (&["--rerun", "run.rrd"], 2, "--features tldi-examples/rerun");
+    let case = ("--rerun run.rrd", 2, "--features tldi-examples/rerun");
     for binary in binaries {
         assert_refused(binary, &folder, &[case]);
     }
@@ -26,22 +26,20 @@ fn without_the_feature_it_is_said_how_to_get_it() {
 #[test]
 fn a_recording_holds_the_points_of_every_step() {
     let folder = folder("recording");
-    let record = |steps: &str, file: &str| {
-        let options = ["--steps", steps, "--bodies", "1", "--rerun", file];
+    let record = |steps: usize, file: &str| {
+        let options = format!("--steps {steps} --bodies 1 --rerun {file}");
         let report = common::report(GALLOP, &folder, &options);
         let bytes = std::fs::read(folder.join(file)).unwrap();
         assert_eq!(&bytes[..3], b"RRF");
-        (
-            bytes.len(),
-            report["ground_points"].as_u64().unwrap() as usize,
-        )
+        let points = common::number(&report["ground_points"]);
+        (bytes.len(), points as usize)
     };
-    let ((few, points), (many, _)) = (record("2", "few.rrd"), record("6", "many.rrd"));
+    let ((few, points), (many, _)) = (record(2, "few.rrd"), record(6, "many.rrd"));
     // Heights of a smooth wave are compressed, but not to less than a byte each.
     assert!(
         few > 2 * points && many - few > 4 * points,
         "{few} {many} {points}"
     );
-    let bad: (&[&str], i32, &str) = (&["--rerun", "run.txt"], 2, "neither live nor a file");
+    let bad = ("--rerun run.txt", 2, "neither live nor a file");
     assert_refused(GALLOP, &folder, &[bad]);
 }

@@ -4,7 +4,7 @@ mod common;
 
 use common::{
     PICTURES, TIMES, assert_keys, assert_pictures, assert_refused, cube_as_stl, data, folder, json,
-    number, run, seeded_report, stderr, write_ply,
+    list, number, report, report_with_pictures, run, seeded_report, stderr, vector, write_ply,
 };
 use serde_json::Value;
 use std::fs;
@@ -25,6 +25,9 @@ fn write_floor(folder: &Path) {
     }
     write_ply(&folder.join("floor.ply"), &points);
 }
+
+/// A robot in the middle of that floor.
+const ON_FLOOR: &str = "--scan floor.ply --up 0,0,1 --place 1.5,1.5,0";
 
 /// A box on four wheels of 8 cm radius, axles along y.
 fn car() -> String {
@@ -74,30 +77,14 @@ fn walker() -> String {
     )
 }
 
-fn report(folder: &Path, options: &[&str]) -> Value {
-    common::report(BINARY, folder, options)
-}
-
 #[test]
 fn the_built_in_arm_touches_and_equal_seeds_give_equal_reports() {
     let folder = folder("robot_built_in");
-    let first = seeded_report(BINARY, &folder, &["--steps", "300"], &TIMES, &[]);
+    let first = seeded_report(BINARY, &folder, "--steps 300", TIMES, "");
     assert_keys(
         &first,
-        &[
-            "backend",
-            "adapter",
-            "steps",
-            "dt",
-            "wall_seconds",
-            "real_time_factor",
-            "scan_points",
-            "links",
-            "contact_steps",
-            "max_penetration",
-            "pairs_batched",
-            "pairs_missed",
-        ],
+        "backend adapter steps dt wall_seconds real_time_factor scan_points links contact_steps max_penetration \
+         pairs_batched pairs_missed",
     );
     assert_eq!(first["base_fixed"], true);
     // Six joints; the seventh mimics the sixth.
@@ -105,30 +92,24 @@ fn the_built_in_arm_touches_and_equal_seeds_give_equal_reports() {
     assert_eq!(first["link_count"], 8);
     assert_eq!(first["pairs_missed"], 0);
     assert!(number(&first["contact_steps"]) > 20.0);
-    let bodies = first["bodies"].as_array().unwrap();
-    assert!(
-        bodies
-            .iter()
-            .any(|b| b["touched"] == true && number(&b["displacement"]) > 0.05)
-    );
-    for link in first["links"].as_array().unwrap() {
+    let is_pushed = |b: &Value| b["touched"] == true && number(&b["displacement"]) > 0.05;
+    assert!(list(&first["bodies"]).iter().any(is_pushed), "{first}");
+    for link in list(&first["links"]) {
         // Its strongest motor has 80 N·m; at 20 cm that is 400 N. Contacts of a light body that is
         // pinned to the floor, and blows, may double it.
         assert!(number(&link["max_force"]) < 1000.0, "{link}");
         assert!(number(&link["points"]) > 100.0, "{link}");
-    }
-    assert_pictures(&folder.join("out/robot_in_scan"), &PICTURES);
-    assert_pictures(&folder.join("out/robot_in_scan"), &["hardest.png"]);
-    // What pushed most is in the step that is named, and only of links that were touched.
-    for link in first["links"].as_array().unwrap() {
+        // What pushed most is in the step that is named, and only of links that were touched.
         let hardest = &link["hardest"];
         assert_eq!(hardest.is_null(), link["contact_steps"] == 0, "{link}");
         if !hardest.is_null() {
             assert!((1.0..=300.0).contains(&number(&hardest["step"])), "{link}");
         }
     }
+    let pictures = folder.join("out/robot_in_scan");
+    assert_pictures(&pictures, &format!("{PICTURES} hardest.png"));
     let by_body = |link: &Value| link["hardest"]["against"] == "rounded box 1";
-    assert!(first["links"].as_array().unwrap().iter().any(by_body));
+    assert!(list(&first["links"]).iter().any(by_body));
 }
 
 /// Wheels of 8 cm that roll at 0.25 m/s over ground: 1.5 m in 6 s, less the start. They stand on
@@ -138,23 +119,14 @@ fn a_car_drives() {
     let folder = folder("robot_car");
     write_floor(&folder);
     fs::write(folder.join("car.urdf"), car()).unwrap();
-    let options = [
-        "--urdf",
-        "car.urdf",
-        "--scan",
-        "floor.ply",
-        "--up",
-        "0,0,1",
-        "--place",
-        "1.5,1.5,0",
-        "--steps",
-    ];
-    let drive = |steps: &str| report(&folder, &[&options[..], &[steps]].concat());
-    let (start, end) = (drive("30"), drive("150"));
+    let drive = |steps: usize| {
+        let options = format!("{ON_FLOOR} --urdf car.urdf --steps {steps}");
+        report(BINARY, &folder, &options)
+    };
+    let (start, end) = (drive(30), drive(150));
     assert_eq!(end["base_fixed"], false);
     assert_eq!(end["driven_joints"], 4);
-    let place = |report: &Value| [0, 1, 2].map(|k| number(&report["base"][k]));
-    let (a, b) = (place(&start), place(&end));
+    let [a, b] = [start, end].map(|report| vector(&report["base"]));
     let way = (a[0] - b[0]).hypot(a[1] - b[1]);
     assert!((way - 0.5).abs() < 0.15, "{a:?} {b:?}");
     // The chassis' origin is at the axles.
@@ -186,22 +158,11 @@ fn an_arm_without_a_base_stands_on_the_floor() {
         joint("a", "b"),
     );
     fs::write(folder.join("arm.urdf"), arm).unwrap();
-    let options = [
-        "--urdf",
-        "arm.urdf",
-        "--scan",
-        "floor.ply",
-        "--up",
-        "0,0,1",
-        "--place",
-        "1.5,1.5,0",
-        "--steps",
-        "60",
-    ];
-    let report = report(&folder, &options);
+    let options = format!("{ON_FLOOR} --urdf arm.urdf --steps 60");
+    let report = report(BINARY, &folder, &options);
     assert_eq!(report["base_fixed"], true);
     assert!(number(&report["base"][2]).abs() < 0.01, "{report}");
-    let links = report["links"].as_array().unwrap();
+    let links = list(&report["links"]);
     assert!(
         links.iter().all(|link| link["contact_steps"] == 0),
         "{links:?}"
@@ -217,11 +178,8 @@ fn a_place_counts_from_the_zero_of_the_file() {
     let lines = rows.map(|[x, y]| format!("{} {} {height}\n", east + x, north + y));
     fs::write(folder.join("map.xyz"), lines.collect::<String>()).unwrap();
     fs::write(folder.join("car.urdf"), car()).unwrap();
-    let options = [
-        "--urdf", "car.urdf", "--scan", "map.xyz", "--up", "0,0,1", "--steps", "1",
-    ];
-    let place = ["--place", "500124,4649001,120"];
-    let report = report(&folder, &[&options[..], &place].concat());
+    let options = "--urdf car.urdf --scan map.xyz --up 0,0,1 --steps 1 --place 500124,4649001,120";
+    let report = report(BINARY, &folder, options);
     let base = |k: usize| number(&report["origin"][k]) + number(&report["base"][k]);
     assert!((base(0) - east - 1.0).abs() < 0.05, "{report}");
     assert!((base(1) - north - 1.0).abs() < 0.05, "{report}");
@@ -235,18 +193,11 @@ fn a_walker_does_not_explode() {
     let folder = folder("robot_walker");
     write_floor(&folder);
     fs::write(folder.join("walker.urdf"), walker()).unwrap();
-    let options = [
-        "--urdf",
-        "walker.urdf",
-        "--scan",
-        "floor.ply",
-        "--steps",
-        "120",
-    ];
-    let report = report(&folder, &options);
+    let options = "--urdf walker.urdf --scan floor.ply --steps 120";
+    let report = report(BINARY, &folder, options);
     assert_eq!(report["base_fixed"], false);
     assert_eq!(report["driven_joints"], 8);
-    let base = [0, 1, 2].map(|k| number(&report["base"][k]));
+    let base = vector(&report["base"]);
     // The torso stands 0.43 m over the floor; the legs bend by up to 0.3 rad.
     assert!((0.3..0.46).contains(&base[2]), "{base:?}");
     assert!(number(&report["max_penetration"]) < 0.03, "{report}");
@@ -257,38 +208,20 @@ fn a_walker_does_not_explode() {
 fn the_self_filter_frees_the_robot_from_its_own_image() {
     let folder = folder("robot_own_camera");
     write_floor(&folder);
-    let options = [
-        "--scan",
-        "floor.ply",
-        "--place",
-        "1.5,1.5,0",
-        "--bodies",
-        "0",
-        "--own-camera",
-        "--steps",
-        "60",
-    ];
-    let with = report(&folder, &options);
-    let robot_points: f64 = (with["links"].as_array().unwrap().iter())
+    let options = "--scan floor.ply --place 1.5,1.5,0 --bodies 0 --own-camera --steps 60";
+    let with = report(BINARY, &folder, options);
+    let robot_points: f64 = (list(&with["links"]).iter())
         .map(|link| number(&link["points"]))
         .sum();
     let filtered = number(&with["self_filtered_points"]);
     // All of the robot's points, and those of the floor under it.
     assert!(
-        filtered > 0.995 * robot_points,
-        "{filtered} of {robot_points}"
-    );
-    assert!(
-        filtered < 1.1 * robot_points,
+        (0.995..1.1).contains(&(filtered / robot_points)),
         "{filtered} of {robot_points}"
     );
     assert_eq!(with["contact_steps"], 0, "{with}");
     // In the middle of its own image, it is held or thrown out.
-    let unfiltered = [
-        &options[..],
-        &["--no-self-filter", "--json", "without.json"],
-    ]
-    .concat();
+    let unfiltered = format!("{options} --no-self-filter --json without.json --no-pictures");
     let output = run(BINARY, &folder, &unfiltered);
     let without = json(folder.join("without.json"));
     if output.status.success() {
@@ -320,21 +253,14 @@ fn what_is_missing_is_named_and_the_rest_is_used() {
     fs::create_dir_all(folder.join("my_robot/meshes")).unwrap();
     fs::create_dir_all(folder.join("my_robot/urdf")).unwrap();
     fs::write(folder.join("my_robot/meshes/cube.stl"), cube_as_stl()).unwrap();
-    let options = [
-        "--urdf",
-        "my_robot/urdf/arm.urdf",
-        "--scan",
-        "floor.ply",
-        "--steps",
-        "30",
-    ];
+    let options = "--urdf my_robot/urdf/arm.urdf --scan floor.ply --steps 30";
     for (mesh, links) in [
         ("package://my_robot/meshes/cube.stl", 2),
         ("../meshes/cube.stl", 2),
         ("package://my_robot/meshes/lost.dae", 1),
     ] {
         fs::write(folder.join("my_robot/urdf/arm.urdf"), arm(mesh)).unwrap();
-        let report = report(&folder, &options);
+        let report = report(BINARY, &folder, options);
         assert_eq!(report["link_count"], links, "{mesh}");
         let warnings = report["warnings"].to_string();
         assert!(warnings.contains("odd cannot mimic none"), "{warnings}");
@@ -373,67 +299,42 @@ fn what_is_wrong_is_said() {
         ),
     ] {
         fs::write(folder.join("robot.urdf"), urdf).unwrap();
-        let options: &[&str] = &["--urdf", "robot.urdf", "--scan", "floor.ply"];
+        let options = "--urdf robot.urdf --scan floor.ply";
         assert_refused(BINARY, &folder, &[(options, 1, message)]);
     }
     // A single link without joints just stands there.
     fs::write(folder.join("robot.urdf"), format!("{one_link}</robot>")).unwrap();
-    let options = [
-        "--urdf",
-        "robot.urdf",
-        "--scan",
-        "floor.ply",
-        "--steps",
-        "10",
-        "--animate",
-    ];
-    let report = common::report_with_pictures(BINARY, &folder, &options);
+    let options = "--urdf robot.urdf --scan floor.ply --steps 10 --animate";
+    let report = report_with_pictures(BINARY, &folder, options);
     assert_eq!(report["driven_joints"], 0);
-    assert_pictures(&folder.join("out/robot_in_scan"), &["motion.png"]);
-    let cases: [(&[&str], i32, &str); 7] = [
-        (&["--backend", "fast"], 2, "is no backend"),
-        (
-            &["--terrain", "ramp", "--up", "0,1,0"],
-            2,
-            "cannot be used with",
-        ),
-        (&["--scan-scale", "0"], 2, "greater than 0"),
-        (&["--scan-scale", "0.001"], 2, "--scan <FILE>"),
-        (&["--packages", "."], 2, "--urdf <FILE>"),
-        (&["--urdf", "missing.urdf"], 1, "missing.urdf"),
-        (
-            &["--scan", "floor.ply", "--scan-scale", "0.001"],
-            1,
-            "--scan-scale",
-        ),
+    assert_pictures(&folder.join("out/robot_in_scan"), "motion.png");
+    let cases = [
+        ("--backend fast", 2, "is no backend"),
+        ("--terrain ramp --up 0,1,0", 2, "cannot be used with"),
+        ("--scan-scale 0", 2, "greater than 0"),
+        ("--scan-scale 0.001", 2, "--scan <FILE>"),
+        ("--packages .", 2, "--urdf <FILE>"),
+        ("--urdf missing.urdf", 1, "missing.urdf"),
+        ("--scan floor.ply --scan-scale 0.001", 1, "--scan-scale"),
     ];
     assert_refused(BINARY, &folder, &cases);
 }
 
 #[test]
 fn the_panda_reaches_into_the_kitchen() {
-    let (Some(urdf), Some(scan)) = (
-        data("robot_panda/panda.urdf"),
-        data("kitchen_scan_300k.ply.gz"),
-    ) else {
+    let (urdf, scan) = ("robot_panda/panda.urdf", "kitchen_scan_300k.ply.gz");
+    if [urdf, scan].map(data).contains(&None) {
         return;
-    };
+    }
     let folder = folder("robot_panda");
-    let options = [
-        "--urdf",
-        urdf.to_str().unwrap(),
-        "--scan",
-        scan.to_str().unwrap(),
-        "--steps",
-        "400",
-    ];
-    let report = report(&folder, &options);
+    let options = format!("--urdf $TLDI_DATA/{urdf} --scan $TLDI_DATA/{scan} --steps 400");
+    let report = report(BINARY, &folder, &options);
     // Seven joints and one finger; the other finger mimics it.
     assert_eq!(report["driven_joints"], 8);
     assert_eq!(report["link_count"], 11);
     assert!(number(&report["contact_steps"]) > 0.0);
     assert_eq!(report["pairs_missed"], 0);
-    for link in report["links"].as_array().unwrap() {
+    for link in list(&report["links"]) {
         // Its strongest motors have 87 N·m: 1450 N at 6 cm, half of its thinnest arm, where a wedge between
         // two walls may hold it; and a blow may double it.
         assert!(number(&link["max_force"]) < 2900.0, "{link}");

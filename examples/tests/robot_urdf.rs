@@ -2,12 +2,12 @@
 
 mod common;
 
-use common::{folder, stderr};
+use common::{folder, lines, ply, stderr};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tldi::glamx::Vec3;
-use tldi_examples::robot::{Description, MeshFolders, Spacing, clouds_of_links};
+use tldi_examples::robot::{Description, MeshFolders, clouds_of_links};
 
 const BASE: &str = r#"<link name="base"><collision><geometry><box size="0.2 0.2 0.1"/></geometry></collision></link>"#;
 
@@ -23,14 +23,15 @@ fn robot(meshes: &[&str]) -> String {
     format!(r#"<robot name="r">{BASE}{links}</robot>"#)
 }
 
-/// A PLY file of one triangle.
-fn triangle(corners: [[f32; 3]; 3]) -> String {
-    let lines = corners.map(|[x, y, z]| format!("{x} {y} {z}\n")).concat();
-    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
-     element face 1\nproperty list uchar int vertex_indices\nend_header\n"
-        .to_owned()
-        + &lines
-        + "3 0 1 2\n"
+/// Writes a PLY file of one triangle.
+fn write_triangle(path: &Path, corners: [[f32; 3]; 3]) {
+    fs::write(path, ply("x y z", &lines(corners), "3 0 1 2\n")).unwrap();
+}
+
+/// Reads a URDF; its meshes lie in a folder.
+fn read(text: &str, folder: &Path) -> Result<Description, String> {
+    let robot = Description::from_text(text, &MeshFolders::new(folder, &[]));
+    robot.map_err(|error| error.to_string())
 }
 
 const CORNERS: [[f32; 3]; 3] = [[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]];
@@ -40,7 +41,7 @@ fn write_package(folder: &Path, mesh: &str) -> PathBuf {
     let package = folder.join("ws/share/my_arm");
     fs::create_dir_all(package.join("meshes")).unwrap();
     fs::create_dir_all(folder.join("robots")).unwrap();
-    fs::write(package.join("meshes/part.ply"), triangle(CORNERS)).unwrap();
+    write_triangle(&package.join("meshes/part.ply"), CORNERS);
     let urdf = folder.join("robots/arm.urdf");
     fs::write(&urdf, robot(&[mesh])).unwrap();
     urdf
@@ -89,8 +90,7 @@ fn packages_are_found_where_they_are_said_to_be() {
 #[test]
 fn three_of_many_missing_meshes_are_named() {
     let names = ["a.stl", "b.stl", "c.stl", "d.stl", "a.stl"];
-    let folders = MeshFolders::new(Path::new(""), &[]);
-    let robot = Description::from_text(&robot(&names), &folders).unwrap();
+    let robot = read(&robot(&names), Path::new("")).unwrap();
     assert_eq!(robot.warnings.len(), 1, "{:?}", robot.warnings);
     let warning = &robot.warnings[0];
     assert!(
@@ -113,8 +113,7 @@ fn what_a_urdf_leaves_out_does_not_end_it() {
             <limit lower="1" upper="-2" effort="5"/></joint>
         </robot>"#
     );
-    let folders = MeshFolders::new(Path::new(""), &[]);
-    let robot = Description::from_text(&text, &folders).unwrap();
+    let robot = read(&text, Path::new("")).unwrap();
     let joint = &robot.kinematics.joints[0];
     assert_eq!((joint.limits, joint.max_speed), ([-2.0, 1.0], None));
     // What the engine reads, too.
@@ -145,8 +144,7 @@ fn joints_without_room_are_told() {
             r#"<robot name="r">{BASE}<link name="arm"/><joint name="elbow" type="{kind}"><parent link="base"/>
                <child link="arm"/><axis xyz="0 0 1"/>{limit}</joint></robot>"#
         );
-        let folders = MeshFolders::new(Path::new(""), &[]);
-        Description::from_text(&text, &folders).unwrap().warnings
+        read(&text, Path::new("")).unwrap().warnings
     };
     for kind in ["revolute", "prismatic"] {
         for limit in ["", r#"<limit effort="5" velocity="1"/>"#] {
@@ -165,11 +163,7 @@ fn joints_without_room_are_told() {
 
 #[test]
 fn xacro_is_named_only_where_it_is() {
-    let folders = MeshFolders::new(Path::new(""), &[]);
-    let error = |text: &str| match Description::from_text(text, &folders) {
-        Err(error) => error.to_string(),
-        Ok(_) => panic!("{text} is no URDF"),
-    };
+    let error = |text: &str| read(text, Path::new("")).err().expect("it is no URDF");
     let sized = |size: &str| {
         format!(
             r#"<robot name="r"><link name="a"><visual><geometry><box size="{size}"/></geometry></visual></link></robot>"#
@@ -187,7 +181,7 @@ fn xacro_is_named_only_where_it_is() {
     let heavy = sized("1 1 1").replace(r#"<link name="a">"#, inertia);
     assert!(error(&heavy).contains("link a has a number that is not finite"));
     let commented = sized("1 1 1").replace("<link", "<!-- ${w} <xacro:leg/> --><link");
-    assert!(Description::from_text(&commented, &folders).is_ok());
+    assert!(read(&commented, Path::new("")).is_ok());
     for plain in [sized("1 1"), "<robot".to_owned()] {
         let said = error(&plain);
         assert!(
@@ -201,22 +195,14 @@ fn xacro_is_named_only_where_it_is() {
 #[test]
 fn a_link_that_cannot_be_sampled_is_left_out() {
     let folder = folder("urdf_flat");
-    fs::write(folder.join("good.ply"), triangle(CORNERS)).unwrap();
-    fs::write(folder.join("flat.ply"), triangle([[0.1; 3]; 3])).unwrap();
-    let folders = MeshFolders::new(&folder, &[]);
-    let robot = Description::from_text(&robot(&["flat.ply", "good.ply"]), &folders).unwrap();
-    let spacing = Spacing { scan_radius: 0.01 };
-    let (clouds, warnings) = clouds_of_links(&robot, spacing).unwrap();
+    write_triangle(&folder.join("good.ply"), CORNERS);
+    write_triangle(&folder.join("flat.ply"), [[0.1; 3]; 3]);
+    let robot = read(&robot(&["flat.ply", "good.ply"]), &folder).unwrap();
+    let (clouds, warnings) = clouds_of_links(&robot, 0.01).unwrap();
     let names: Vec<&str> = clouds.iter().map(|link| link.name.as_str()).collect();
     assert_eq!(names, ["base", "l1"]);
-    assert!(
-        clouds[1]
-            .cloud
-            .bounds()
-            .extents()
-            .distance(Vec3::new(0.1, 0.1, 0.0))
-            < 0.01
-    );
+    let extents = clouds[1].cloud.bounds().extents();
+    assert!(extents.distance(Vec3::new(0.1, 0.1, 0.0)) < 0.01);
     assert!(
         warnings[0].contains("link l0 cannot be made a cloud"),
         "{warnings:?}"

@@ -2,8 +2,9 @@
 
 use tldi::glamx::Vec3;
 use tldi::{Backend, CpuBackend, PointCloud};
+use tldi_examples::bodies::NamedCloud;
+use tldi_examples::drop::DropSimulation;
 use tldi_examples::load;
-use tldi_examples::simulation::{DropSimulation, NamedCloud};
 use tldi_examples::spots::Spot;
 use tldi_examples::surface_sampling::sample_surface;
 use tldi_wgpu::{AdapterChoice, Gpu, WgpuBackend};
@@ -20,7 +21,7 @@ fn cube() -> NamedCloud {
         let outside = p.abs() - 0.5 * EDGE;
         outside.max(Vec3::ZERO).length() + outside.max_element().min(0.0)
     };
-    let surface = sample_surface(distance, |_| [255; 4], bounds, 0.02, 1);
+    let surface = sample_surface(distance, bounds, 0.02, 1);
     NamedCloud {
         name: "cube".to_owned(),
         cloud: load::body_from_surface(surface).unwrap(),
@@ -53,7 +54,7 @@ fn simulation_on(backend: Box<dyn Backend>, places: &[(Vec3, usize)]) -> DropSim
 /// Heights of the lowest and the highest point of each body.
 fn height_ranges(simulation: &DropSimulation) -> Vec<[f32; 2]> {
     let poses = simulation.snapshot().scan_from_body;
-    (simulation.clouds().iter().zip(poses))
+    (simulation.clouds().zip(poses))
         .map(|(cloud, pose)| {
             let heights = cloud.points().iter().map(|&p| (pose * p).z);
             heights.fold([f32::MAX, f32::MIN], |[min, max], h| {
@@ -112,7 +113,10 @@ fn the_report_says_when_a_body_fell_asleep() {
     let body = &report.bodies[0];
     let slept_at = body.slept_at_seconds.expect("it sleeps");
     assert!((slept_at - first as f32 / 60.0).abs() < 1e-4, "{slept_at}");
-    assert!((body.translation[2] - 0.5 * EDGE).abs() < 0.005, "{body:?}");
+    assert!(
+        (body.placed.translation[2] - 0.5 * EDGE).abs() < 0.005,
+        "{body:?}"
+    );
     assert_eq!(report.totals.steps, first + 5);
     // The scan has the larger radii.
     assert_eq!(report.mean_radius, 0.02);

@@ -3,8 +3,8 @@
 mod common;
 
 use common::{
-    assert_keys, assert_pictures, assert_refused, folder, json, run, seeded_report, stderr,
-    write_ply,
+    assert_keys, assert_pictures, assert_refused, ball, folder, json, list, number, report,
+    report_with_pictures, run, seeded_report, stderr, vector, write_ply,
 };
 use serde_json::Value;
 use std::fs;
@@ -12,34 +12,14 @@ use std::path::Path;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_two_clouds");
 
-/// A sphere of radius 0.1 around the origin, its points on a golden spiral some 4 mm apart.
-fn sphere() -> Vec<[f32; 3]> {
-    let count = 8000;
-    (0..count)
-        .map(|k| {
-            let z = 1.0 - (2 * k + 1) as f64 / count as f64;
-            let angle = k as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt());
-            let ring = (1.0 - z * z).sqrt();
-            [ring * angle.cos(), ring * angle.sin(), z].map(|c| (0.1 * c) as f32)
-        })
-        .collect()
-}
-
+/// Two spheres of radius 0.1 around the origin, their points some 4 mm apart.
 fn write_spheres(folder: &Path) {
-    write_ply(&folder.join("a.ply"), &sphere());
-    write_ply(&folder.join("b.ply"), &sphere());
-}
-
-fn answer(folder: &Path, options: &[&str]) -> Value {
-    write_spheres(folder);
-    let files = ["a.ply", "b.ply", "--json", "answer.json"];
-    let output = run(BINARY, folder, &[&files, options].concat());
-    assert!(output.status.success(), "{}", stderr(&output));
-    json(folder.join("answer.json"))
-}
-
-fn vector(value: &Value) -> [f64; 3] {
-    [0, 1, 2].map(|k| value[k].as_f64().unwrap())
+    let sphere: Vec<[f32; 3]> = (ball(8000).into_iter())
+        .map(|p| p.map(|c| (0.1 * c) as f32))
+        .collect();
+    for name in ["a.ply", "b.ply"] {
+        write_ply(&folder.join(name), &sphere);
+    }
 }
 
 /// Spheres whose surfaces are 2 mm deep in each other, 3 mm apart, and far apart. 0.4 mm: the
@@ -47,20 +27,23 @@ fn vector(value: &Value) -> [f64; 3] {
 #[test]
 fn spheres_answer_as_geometry_says() {
     let folder = folder("two_clouds_spheres");
-    let drawn = ["--out", "pictures"];
+    write_spheres(&folder);
     for (distance, depth, pictures) in [
-        (0.198, 0.002, &drawn[..]),
-        (0.203, -0.003, &["--no-pictures"]),
-        (0.7, -0.5, &["--no-pictures"]),
+        (0.198, 0.002, "--out pictures"),
+        (0.203, -0.003, "--no-pictures"),
+        (0.7, -0.5, "--no-pictures"),
     ] {
-        let pose = format!("0,{distance},0");
-        let answer = answer(&folder, &[&["--pose", &pose], pictures].concat());
+        let options = format!("a.ply b.ply --pose 0,{distance},0 {pictures}");
+        let answer = report_with_pictures(BINARY, &folder, &options);
         assert_eq!(answer["collides"], depth > 0.0, "{answer}");
-        let gap = answer["gap"].as_f64().unwrap();
+        let gap = number(&answer["gap"]);
         assert!((gap + depth).abs() < 4e-4, "{distance}: {gap}");
-        for contact in answer["contacts"].as_array().unwrap() {
-            let found = contact["depth"].as_f64().unwrap();
-            assert!((found - depth).abs() < 4e-4, "{contact}");
+        let contacts = list(&answer["contacts"]);
+        for contact in contacts {
+            assert!(
+                (number(&contact["depth"]) - depth).abs() < 4e-4,
+                "{contact}"
+            );
             let [x, y, z] = vector(&contact["point"]);
             assert!(
                 (y - 0.5 * distance).abs() < 4e-4 && x.hypot(z) < 0.005,
@@ -68,37 +51,25 @@ fn spheres_answer_as_geometry_says() {
             );
             assert!(vector(&contact["normal"])[1] > 0.995, "{contact}");
         }
-        let contacts = answer["contacts"].as_array().unwrap().len();
-        assert_eq!(contacts > 0, depth > -0.01, "{answer}");
+        assert_eq!(!contacts.is_empty(), depth > -0.01, "{answer}");
     }
-    let names = [
-        "scene.png",
-        "zone.png",
-        "layers.png",
-        "section.png",
-        "pixels.png",
-    ];
-    assert_pictures(&folder.join("pictures"), &names);
+    let names = "scene.png zone.png layers.png section.png pixels.png";
+    assert_pictures(&folder.join("pictures"), names);
 }
 
 /// B comes from 0.7 m above at 2 m/s and meets A after 0.5 m.
 #[test]
 fn a_velocity_tells_when_they_meet() {
     let folder = folder("two_clouds_velocity");
-    let thrown = ["--pose", "0,0.7,0", "--velocity"];
-    let options = ["0,-2,0", "--animate", "--out", "pictures"];
-    let impact = &answer(&folder, &[&thrown[..], &options].concat())["impact"];
-    assert!(
-        (impact["time_seconds"].as_f64().unwrap() - 0.25).abs() < 4e-4,
-        "{impact}"
-    );
-    assert!(
-        (impact["distance"].as_f64().unwrap() - 0.5).abs() < 4e-4,
-        "{impact}"
-    );
+    write_spheres(&folder);
+    let thrown = "a.ply b.ply --pose 0,0.7,0 --velocity";
+    let options = format!("{thrown} 0,-2,0 --animate --out pictures");
+    let impact = &report_with_pictures(BINARY, &folder, &options)["impact"];
+    for (key, expected) in [("time_seconds", 0.25), ("distance", 0.5)] {
+        assert!((number(&impact[key]) - expected).abs() < 4e-4, "{impact}");
+    }
     assert!(folder.join("pictures/motion.png").exists());
-    let options = ["0,2,0", "--no-pictures"];
-    let away = answer(&folder, &[&thrown[..], &options].concat());
+    let away = report(BINARY, &folder, &format!("{thrown} 0,2,0"));
     assert_eq!(away["impact"], Value::Null);
 }
 
@@ -122,22 +93,18 @@ fn write_box(path: &Path, [x, y, z]: [f64; 3]) {
 #[test]
 fn coordinates_of_two_files_count_from_one_zero() {
     let folder = folder("two_clouds_origins");
-    let far = [500_123.25, 4_649_000.0, 120.0];
+    let along = |axis: usize, way: f64| [0, 1, 2].map(|k| if k == axis { way } else { 0.0 });
+    let map = [500_123.25, 4_649_000.0, 120.0];
     for (a, b, pose, origin) in [
+        (along(0, 5e3), along(0, 5.3e3), "0,0,0", along(0, 5e3)),
         (
-            [5000.0, 0.0, 0.0],
-            [5300.0, 0.0, 0.0],
-            "0,0,0",
-            [5000.0, 0.0, 0.0],
-        ),
-        (
-            [0.0, 5000.0, 0.0],
-            [5300.0, 0.0, 0.0],
+            along(1, 5e3),
+            along(0, 5.3e3),
             "0,0,0,0,0,90",
-            [0.0, 5000.0, 0.0],
+            along(1, 5e3),
         ),
         (
-            far,
+            map,
             [0.0; 3],
             "500123.25,4649300,120",
             [500_123.0, 4_649_000.0, 0.0],
@@ -145,21 +112,13 @@ fn coordinates_of_two_files_count_from_one_zero() {
     ] {
         write_box(&folder.join("a.xyz"), a);
         write_box(&folder.join("b.xyz"), b);
-        let options = [
-            "a.xyz",
-            "b.xyz",
-            "--no-pictures",
-            "--json",
-            "answer.json",
-            "--pose",
-            pose,
-        ];
+        let options = format!("a.xyz b.xyz --no-pictures --json answer.json --pose {pose}");
         let output = run(BINARY, &folder, &options);
         assert!(output.status.success(), "{}", stderr(&output));
         let answer = json(folder.join("answer.json"));
         assert_eq!(answer["collides"], false, "{pose}: {answer}");
         // A tenth of the points' spacing.
-        let gap = answer["gap"].as_f64().unwrap();
+        let gap = number(&answer["gap"]);
         assert!((gap - 100.0).abs() < 1.0, "{pose}: {gap}");
         // What was subtracted is the median, which is a coordinate near the middle of A.
         for (said, middle) in vector(&answer["origin"]).iter().zip(origin) {
@@ -174,18 +133,18 @@ fn coordinates_of_two_files_count_from_one_zero() {
 fn results_are_not_lost() {
     let folder = folder("two_clouds_results");
     write_spheres(&folder);
-    let ask = |options: &[&str]| run(BINARY, &folder, &[&["a.ply", "b.ply"], options].concat());
-    let output = ask(&["--no-pictures", "--json", "not/there/answer.json"]);
+    let ask = |options: &str| run(BINARY, &folder, &format!("a.ply b.ply {options}"));
+    let output = ask("--no-pictures --json not/there/answer.json");
     assert!(output.status.success(), "{}", stderr(&output));
     assert_eq!(json(folder.join("not/there/answer.json"))["collides"], true);
     // Pictures that cannot be written leave the results.
-    let output = ask(&["--out", "a.ply/pictures", "--json", "second.json"]);
+    let output = ask("--out a.ply/pictures --json second.json");
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     assert!(String::from_utf8_lossy(&output.stdout).contains("contact pixels"));
     assert_eq!(json(folder.join("second.json"))["collides"], true);
     // What cannot be written is refused before anything is read.
     for name in [".", "a.ply/answer.json"] {
-        let output = ask(&["--no-pictures", "--json", name]);
+        let output = ask(&format!("--no-pictures --json {name}"));
         let said = stderr(&output);
         assert_eq!(output.status.code(), Some(1), "{name}: {said}");
         assert!(
@@ -198,13 +157,10 @@ fn results_are_not_lost() {
 #[test]
 fn without_files_there_is_something_to_see_and_it_is_the_same_twice() {
     let folder = folder("two_clouds_generated");
-    let first = seeded_report(BINARY, &folder, &[], &["wall_seconds"], &[]);
+    let first = seeded_report(BINARY, &folder, "", "wall_seconds", "");
     assert_eq!(first["collides"], true);
-    assert!(first["contacts"].as_array().unwrap().len() >= 3);
-    assert_keys(
-        &first,
-        &["collides", "gap", "contacts", "backend", "adapter"],
-    );
+    assert!(list(&first["contacts"]).len() >= 3);
+    assert_keys(&first, "collides gap contacts backend adapter");
 }
 
 #[test]
@@ -212,23 +168,15 @@ fn what_is_wrong_is_said() {
     let folder = folder("two_clouds_errors");
     write_spheres(&folder);
     write_ply(&folder.join("point.ply"), &[[1.0, 2.0, 3.0]; 4]);
-    let cases: [(&[&str], i32, &str); 8] = [
-        (&["a.ply", "b.ply", "--pose", "1,2"], 2, "three of degrees"),
-        (
-            &["a.ply", "b.ply", "--velocity", "fast"],
-            2,
-            "three numbers",
-        ),
-        (&["a.ply", "b.ply", "--backend", "fast"], 2, "is no backend"),
-        (&["a.ply", "b.ply", "--animate"], 2, "--velocity <X,Y,Z>"),
-        (
-            &["--animate", "--velocity", "0,0,0"],
-            1,
-            "give a --velocity",
-        ),
-        (&["a.ply"], 2, "<B>"),
-        (&["a.ply", "missing.ply"], 1, "missing.ply"),
-        (&["a.ply", "point.ply"], 1, "at one position"),
+    let cases = [
+        ("a.ply b.ply --pose 1,2", 2, "three of degrees"),
+        ("a.ply b.ply --velocity fast", 2, "three numbers"),
+        ("a.ply b.ply --backend fast", 2, "is no backend"),
+        ("a.ply b.ply --animate", 2, "--velocity <X,Y,Z>"),
+        ("--animate --velocity 0,0,0", 1, "give a --velocity"),
+        ("a.ply", 2, "<B>"),
+        ("a.ply missing.ply", 1, "missing.ply"),
+        ("a.ply point.ply", 1, "at one position"),
     ];
     assert_refused(BINARY, &folder, &cases);
 }

@@ -1,11 +1,12 @@
 //! A generated depth sequence: a camera over a low table, across which a ball is moved.
 
 use crate::random;
+use crate::rays::{distance_to_box, distance_to_ground};
 use crate::spots::Spot;
 use fastrand::Rng;
 use rayon::prelude::*;
-use tldi::VirtualCamera;
 use tldi::glamx::{Pose3, Vec3};
+use tldi::{Aabb, VirtualCamera};
 use tldi_sources::depth::{Intrinsics, SensorModel};
 
 /// Where the camera is and what it looks at, metres; z is up.
@@ -85,10 +86,8 @@ impl GeneratedCamera {
             let mut rng = Rng::with_seed(self.seed ^ ((frame * SIZE[1] + v) as u64) << 8);
             (0..SIZE[0])
                 .map(|u| {
-                    let [x, y] = [
-                        (u as f32 - intrinsics.center[0]) / FOCAL,
-                        (v as f32 - intrinsics.center[1]) / FOCAL,
-                    ];
+                    let [x, y] = [(u, 0), (v, 1)]
+                        .map(|(pixel, axis)| (pixel as f32 - intrinsics.center[axis]) / FOCAL);
                     let direction = pose.rotation * Vec3::new(x, y, 1.0);
                     // The ray's parameter is the depth: its direction is 1 along the camera's z.
                     let depth = nearest(pose.translation, direction, ball);
@@ -107,25 +106,20 @@ impl GeneratedCamera {
 
 /// Where a ray first meets floor, table or ball.
 fn nearest(origin: Vec3, direction: Vec3, ball: Vec3) -> f32 {
-    let mut best = f32::INFINITY;
-    if direction.z < 0.0 {
-        best = -origin.z / direction.z;
-    }
-    let center = Vec3::new(0.0, 0.0, TABLE.z);
-    let (near, far) = (0..3).fold((0.0_f32, f32::INFINITY), |(near, far), k| {
-        let [a, b] = [-1.0, 1.0].map(|s| (center[k] + s * TABLE[k] - origin[k]) / direction[k]);
-        (near.max(a.min(b)), far.min(a.max(b)))
-    });
-    if near <= far && near > 0.0 {
-        best = best.min(near);
-    }
+    let table = Aabb {
+        min: TABLE * Vec3::new(-1.0, -1.0, 0.0),
+        max: TABLE * Vec3::new(1.0, 1.0, 2.0),
+    };
+    let to_table = distance_to_box(&table, origin, direction);
+    let best = distance_to_ground(origin, direction).min(to_table);
     let to = origin - ball;
     let (a, b) = (direction.length_squared(), to.dot(direction));
     let under_root = b * b - a * (to.length_squared() - BALL_RADIUS * BALL_RADIUS);
     if under_root > 0.0 {
-        best = best.min((-b - under_root.sqrt()) / a);
+        best.min((-b - under_root.sqrt()) / a)
+    } else {
+        best
     }
-    best
 }
 
 #[cfg(test)]

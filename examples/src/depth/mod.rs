@@ -2,6 +2,7 @@
 
 mod camera_up;
 mod generated;
+mod placing;
 mod registered;
 mod report;
 mod simulation;
@@ -9,6 +10,7 @@ mod source;
 
 pub use camera_up::{CameraUp, UnclearUp, camera_up};
 pub use generated::GeneratedCamera;
+pub use placing::WantedBodies;
 pub use registered::{RegisteredFrames, TruePixel};
 pub use report::{DepthReport, FrameReport};
 pub use simulation::{DepthScene, DepthSimulation, DepthSnapshot, FRAME_SECONDS};

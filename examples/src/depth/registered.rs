@@ -2,9 +2,10 @@
 //! boxes, seen by a camera whose frames are registered to another one.
 
 use crate::random::between;
+use crate::rays::crossing;
 use fastrand::Rng;
-use tldi::VirtualCamera;
 use tldi::glamx::{Pose3, Vec3};
+use tldi::{Aabb, VirtualCamera};
 use tldi_sources::depth::{Intrinsics, SensorModel};
 
 /// Columns and rows, focal length in pixels.
@@ -17,13 +18,6 @@ const JUMP: f32 = 0.05;
 /// Radius of a hole, pixels, and how many there are.
 const HOLE: i32 = 12;
 const HOLES: usize = 60;
-
-/// A box along the axes.
-#[derive(Clone, Copy, Debug)]
-struct Block {
-    min: Vec3,
-    max: Vec3,
-}
 
 /// What a pixel really sees.
 #[derive(Clone, Copy, Debug)]
@@ -53,50 +47,14 @@ impl RegisteredFrames {
     /// A scene of its own for every seed.
     pub fn new(seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
-        let mut within = |low: f32, high: f32| between(&mut rng, [low, high]);
-        let table = {
-            let middle = Vec3::new(within(-0.3, 0.3), within(0.1, 0.6), 0.0);
-            let half = Vec3::new(within(0.5, 0.8), within(0.35, 0.5), 0.0);
-            let height = within(0.4, 0.75);
-            Block {
-                min: middle - half,
-                max: middle + half + height * Vec3::Z,
-            }
-        };
-        let mut blocks = vec![table];
-        for (x, floor) in [(-1.6, 0.0), (1.6, 0.0), (-0.3, table.max.z)] {
-            let half = Vec3::new(within(0.08, 0.2), within(0.08, 0.2), 0.0);
-            let base = if floor > 0.0 {
-                let place = within(0.1, 0.35);
-                Vec3::new(table.max.x - place, table.max.y - half.y, floor)
-            } else {
-                Vec3::new(x, within(-0.2, 0.8), floor)
-            };
-            blocks.push(Block {
-                min: base - half,
-                max: base + half + within(0.1, 0.4) * Vec3::Z,
-            });
-        }
-        let eye = Vec3::new(
-            within(-0.6, 0.6),
-            within(-1.7, -1.2),
-            table.max.z + within(0.5, 0.9),
-        );
-        let target = Vec3::new(0.0, table.min.y + 0.3, table.max.z - within(0.0, 0.2));
-        // Held by hand: a few degrees of roll.
-        let roll = within(-0.08, 0.08);
-        let upper = (Vec3::Z + roll * Vec3::X).normalize();
-        let size = SIZE.map(|n| n as u32);
-        let camera = VirtualCamera::perspective(eye, target, upper, 1.0, size, 0.1, 10.0);
-        let world_from_camera = camera.view_from_frame.inverse();
+        let blocks = table_and_boxes(&mut rng);
+        let (eye, world_from_camera) = before(&blocks[0], &mut rng);
         let periods = [rng.usize(4..9), rng.usize(4..9)];
         let dropped = 0.3 * rng.f32();
         let truth = (0..SIZE[0] * SIZE[1])
             .map(|k| {
-                let [x, y] = [0, 1].map(|axis| {
-                    let at = if axis == 0 { k % SIZE[0] } else { k / SIZE[0] };
-                    (at as f32 - (0.5 * SIZE[axis] as f32 - 0.5)) / FOCAL
-                });
+                let [x, y] = [(k % SIZE[0], 0), (k / SIZE[0], 1)]
+                    .map(|(at, axis)| (at as f32 - (0.5 * SIZE[axis] as f32 - 0.5)) / FOCAL);
                 // The ray's parameter is the depth: its direction is 1 along the camera's z.
                 let direction = world_from_camera.rotation * Vec3::new(x, y, 1.0);
                 nearest(&blocks, eye, direction)
@@ -180,38 +138,62 @@ impl RegisteredFrames {
     }
 }
 
+/// A table, a box to each side of it, and one on it.
+fn table_and_boxes(rng: &mut Rng) -> Vec<Aabb> {
+    let mut within = |low: f32, high: f32| between(rng, [low, high]);
+    let block = |base: Vec3, half: Vec3, height: f32| Aabb {
+        min: base - half,
+        max: base + half + height * Vec3::Z,
+    };
+    let middle = Vec3::new(within(-0.3, 0.3), within(0.1, 0.6), 0.0);
+    let half = Vec3::new(within(0.5, 0.8), within(0.35, 0.5), 0.0);
+    let table = block(middle, half, within(0.4, 0.75));
+    let mut blocks = vec![table];
+    for (x, floor) in [(-1.6, 0.0), (1.6, 0.0), (-0.3, table.max.z)] {
+        let half = Vec3::new(within(0.08, 0.2), within(0.08, 0.2), 0.0);
+        let base = if floor > 0.0 {
+            let place = within(0.1, 0.35);
+            Vec3::new(table.max.x - place, table.max.y - half.y, floor)
+        } else {
+            Vec3::new(x, within(-0.2, 0.8), floor)
+        };
+        blocks.push(block(base, half, within(0.1, 0.4)));
+    }
+    blocks
+}
+
+/// The place and the pose of a camera before a table, held by hand: with a few degrees of roll.
+fn before(table: &Aabb, rng: &mut Rng) -> (Vec3, Pose3) {
+    let mut within = |low: f32, high: f32| between(rng, [low, high]);
+    let eye = Vec3::new(
+        within(-0.6, 0.6),
+        within(-1.7, -1.2),
+        table.max.z + within(0.5, 0.9),
+    );
+    let target = Vec3::new(0.0, table.min.y + 0.3, table.max.z - within(0.0, 0.2));
+    let upper = (Vec3::Z + within(-0.08, 0.08) * Vec3::X).normalize();
+    let size = SIZE.map(|n| n as u32);
+    let camera = VirtualCamera::perspective(eye, target, upper, 1.0, size, 0.1, 10.0);
+    (eye, camera.view_from_frame.inverse())
+}
+
 /// Where a ray first meets a block or the room from within.
-fn nearest(blocks: &[Block], origin: Vec3, direction: Vec3) -> TruePixel {
-    let room = Block {
+fn nearest(blocks: &[Aabb], origin: Vec3, direction: Vec3) -> TruePixel {
+    let room = Aabb {
         min: ROOM.with_z(0.0) * Vec3::new(-1.0, -1.0, 0.0),
         max: ROOM,
     };
-    let (_, depth, axis) = crossings(&room, origin, direction);
-    let mut best = (depth, axis[1]);
+    let wall = crossing(&room, origin, direction);
+    let mut best = (wall.leaves, wall.axes[1]);
     for block in blocks {
-        let (near, far, axis) = crossings(block, origin, direction);
-        if near <= far && near > 0.0 && near < best.0 {
-            best = (near, axis[0]);
+        let found = crossing(block, origin, direction);
+        if found.enters <= found.leaves && found.enters > 0.0 && found.enters < best.0 {
+            best = (found.enters, found.axes[0]);
         }
     }
-    let axis = [Vec3::X, Vec3::Y, Vec3::Z][best.1];
+    let axis = Vec3::AXES[best.1];
     TruePixel {
         depth: best.0,
         normal: -axis * axis.dot(direction).signum(),
     }
-}
-
-/// Where a ray's line enters a box and leaves it, and through sides across which axes.
-fn crossings(block: &Block, origin: Vec3, direction: Vec3) -> (f32, f32, [usize; 2]) {
-    let (mut near, mut far, mut axes) = (f32::NEG_INFINITY, f32::INFINITY, [0; 2]);
-    for k in 0..3 {
-        let [a, b] = [block.min[k], block.max[k]].map(|side| (side - origin[k]) / direction[k]);
-        if a.min(b) > near {
-            (near, axes[0]) = (a.min(b), k);
-        }
-        if a.max(b) < far {
-            (far, axes[1]) = (a.max(b), k);
-        }
-    }
-    (near, far, axes)
 }

@@ -1,7 +1,9 @@
 //! What a run of `depth_camera` found.
 
+use crate::bodies::PlacedBody;
 use crate::contact_kinds::ContactKinds;
-use crate::median::median_and_most;
+use crate::numbers::median_and_most;
+use crate::output::Report;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -29,11 +31,11 @@ pub struct DepthReport {
     /// The frames, in the order in which they came.
     pub frames: Vec<FrameReport>,
     /// The bodies.
-    pub bodies: Vec<DepthBodyReport>,
+    pub bodies: Vec<DepthBody>,
 }
 
 /// One frame. Times are milliseconds of wall-clock time.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct FrameReport {
     /// Name of the file.
     pub name: String,
@@ -61,13 +63,10 @@ pub struct FrameReport {
 
 /// One body after the last step.
 #[derive(Clone, Debug, Serialize)]
-pub struct DepthBodyReport {
-    /// What it is, and its number.
-    pub name: String,
-    /// Number of points.
-    pub points: usize,
-    /// Position in the frame of the world, metres.
-    pub translation: [f32; 3],
+pub struct DepthBody {
+    /// Its name, its points and where it is.
+    #[serde(flatten)]
+    pub placed: PlacedBody,
     /// How far it is from where it first came to rest or, if it never did, from its start, metres: its
     /// height is that over the surface below, which drifts with the poses of the frames. Null where no
     /// surface is below.
@@ -87,12 +86,8 @@ pub struct DepthBodyReport {
 /// A number of a frame.
 type Column<'a> = &'a dyn Fn(&FrameReport) -> f64;
 
-impl DepthReport {
-    /// Writes the results as tables for people.
-    ///
-    /// # Errors
-    /// Those of writing.
-    pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
+impl Report for DepthReport {
+    fn write_table(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{:<22} {:>10} {:>10}", "of a frame", "median", "most")?;
         let rows: [(&str, Column<'_>); 7] = [
             ("points", &|f| f.points as f64),
@@ -121,7 +116,7 @@ impl DepthReport {
             writeln!(
                 out,
                 "{:<22} {rested:>10} {:>10} {:>12}",
-                body.name,
+                body.placed.name,
                 number(body.speed_over_surface),
                 number(body.displacement)
             )?;

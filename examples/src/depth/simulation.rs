@@ -1,19 +1,19 @@
 //! Bodies on a surface that a depth camera sees anew in every frame.
 
-use super::report::{DepthBodyReport, DepthReport, FrameReport};
+use super::report::{DepthBody, DepthReport, FrameReport};
 use super::source::TimedFrame;
+use crate::bodies::{Body, Material, NamedCloud};
 use crate::contact_kinds::ContactKinds;
 use crate::load;
-use crate::median::median_and_most;
-use crate::simulation::NamedCloud;
+use crate::numbers::{median, median_and_most};
 use crate::spots::Spot;
-use crate::step_totals::StepTotals;
-use crate::world::{self, DT, TOUCHING_GAP};
+use crate::world::{DT, Stage};
 use anyhow::Context;
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 use std::collections::VecDeque;
+use std::f32::consts::TAU;
 use std::time::Instant;
 use tldi::Backend;
 use tldi::glamx::{Pose3, Quat, Vec3};
@@ -23,8 +23,10 @@ use tldi_sources::depth::{DepthCamera, DepthMemory};
 const STEPS_PER_FRAME: usize = 2;
 /// Seconds from one frame to the next: 30 frames a second.
 pub const FRAME_SECONDS: f32 = STEPS_PER_FRAME as f32 * DT;
-/// Mass per volume of the bodies in kg/m³.
-const DENSITY: f32 = 300.0;
+const MATERIAL: Material = Material {
+    density: 300.0,
+    rolling_resistance: 1.0,
+};
 /// Height of a body over its spot at the start, metres.
 const DROP: f32 = 0.08;
 
@@ -66,24 +68,21 @@ pub struct DepthSnapshot {
 
 /// The simulation.
 pub struct DepthSimulation {
-    world: PhysicsWorld,
-    tldi: TldiPipeline,
+    stage: Stage,
     camera: DepthCamera,
     up: Vec3,
     surface: ColliderHandle,
-    bodies: Vec<Body>,
+    bodies: Vec<Followed>,
     memory: DepthMemory,
     /// What the last frames saw, and from where, the newest last.
     former: VecDeque<(DepthCamera, Pose3)>,
     frames: Vec<FrameReport>,
-    totals: StepTotals,
-    max_penetration: f32,
     deepest: ContactKinds,
 }
 
-struct Body {
-    named: NamedCloud,
-    handle: RigidBodyHandle,
+/// A body, and where it was.
+struct Followed {
+    body: Body,
     /// Radius in metres of a ball around it.
     radius: f32,
     /// Where it started or, once it has come to rest, where it first did; see `places`.
@@ -103,50 +102,42 @@ impl DepthSimulation {
         first: &TimedFrame,
         backend: Box<dyn Backend>,
     ) -> anyhow::Result<Self> {
-        let mut camera = scene.camera;
+        let DepthScene { mut camera, up, .. } = scene;
         let points = camera.points(&first.depths, &first.world_from_camera);
         let seen = points.points.clone();
         let cloud = points.into_builder().build()?.into_owned();
-        let (mut world, tldi) = world::attached(scene.up, backend)?;
+        let mut stage = Stage::new(up, backend)?;
         // Its mass is never asked for: it is fixed.
-        let collider = tldi.collider(cloud).density(0.0);
-        let (_, surface) = world.insert(RigidBodyBuilder::fixed(), collider);
+        let collider = stage.tldi.collider(cloud).density(0.0);
+        let (_, surface) = stage.world.insert(RigidBodyBuilder::fixed(), collider);
         let mut rng = Rng::with_seed(scene.seed);
-        let upright = Quat::from_rotation_arc(Vec3::Y, scene.up);
+        let upright = Quat::from_rotation_arc(Vec3::Y, up);
         let bodies = (scene.bodies.into_iter().zip(&scene.spots))
             .map(|(named, spot)| {
-                let turn = Quat::from_rotation_y(rng.f32() * std::f32::consts::TAU);
+                let turn = Quat::from_rotation_y(rng.f32() * TAU);
                 let height = 0.5 * named.cloud.bounds().extents().y + DROP;
                 let lift = height * (1.0 + 2.0 * spot.level as f32);
-                let pose = Pose3::from_parts(spot.surface + lift * scene.up, upright * turn);
-                let (handle, _) = world.insert(
-                    RigidBodyBuilder::dynamic().pose(pose).angular_damping(1.0),
-                    tldi.collider(named.cloud.clone()).density(DENSITY),
-                );
+                let pose = Pose3::from_parts(spot.surface + lift * up, upright * turn);
                 let radius = load::ball_radius(&named.cloud);
-                let below = height_below(&seen, pose.translation, radius, scene.up);
-                Body {
-                    named,
-                    handle,
+                let below = height_below(&seen, pose.translation, radius, up);
+                Followed {
+                    body: Body::insert(&mut stage, named, pose, MATERIAL),
                     radius,
-                    home: pose.translation - below.unwrap_or(0.0) * scene.up,
+                    home: pose.translation - below.unwrap_or(0.0) * up,
                     places: VecDeque::new(),
                     first_rested_at_step: None,
                 }
             })
             .collect();
         Ok(Self {
-            world,
-            tldi,
+            stage,
             camera,
-            up: scene.up,
+            up,
             surface,
             bodies,
             memory: DepthMemory::new(scene.memory),
             former: VecDeque::new(),
             frames: Vec::new(),
-            totals: StepTotals::new(DT),
-            max_penetration: 0.0,
             deepest: ContactKinds::default(),
         })
     }
@@ -165,20 +156,17 @@ impl DepthSimulation {
             points: points.points.len(),
             empty_pixels: points.empty,
             flying_pixels: points.flying,
-            remembered_points: 0,
             decode_ms: 1e3 * frame.decode_seconds,
             unproject_ms: 1e3 * unprojected.as_secs_f64(),
-            update_ms: 0.0,
-            step_ms: 0.0,
-            latency_ms: 0.0,
-            contacts: 0,
+            ..FrameReport::default()
         };
         let whole = (self.memory).complete(points, &self.camera, &frame.world_from_camera);
         report.remembered_points = whole.points.len() - report.points;
         let seen = whole.points.clone();
         if !seen.is_empty() {
             let cloud = whole.into_builder().build()?.into_owned();
-            (self.tldi).set_cloud(&mut self.world, self.surface, cloud)?;
+            let Stage { world, tldi, .. } = &mut self.stage;
+            tldi.set_cloud(world, self.surface, cloud)?;
         }
         let updated = start.elapsed();
         report.contacts = self.step()?;
@@ -190,7 +178,8 @@ impl DepthSimulation {
         for _ in 1..STEPS_PER_FRAME {
             self.step()?;
         }
-        self.totals.add_wall_seconds(start.elapsed().as_secs_f64());
+        let seconds = start.elapsed().as_secs_f64();
+        self.stage.totals.add_wall_seconds(seconds);
         self.follow(&seen);
         if self.former.len() == MOVED_FRAMES {
             self.former.pop_front();
@@ -205,7 +194,7 @@ impl DepthSimulation {
     /// frames, and which of them rest.
     fn follow(&mut self, surface: &[Vec3]) {
         for body in &mut self.bodies {
-            let place = self.world.bodies[body.handle].translation();
+            let place = self.stage.pose(body.body.handle).translation;
             let Some(below) = height_below(surface, place, body.radius, self.up) else {
                 body.places.clear();
                 continue;
@@ -218,7 +207,7 @@ impl DepthSimulation {
                 body.places.pop_front();
             }
             if body.first_rested_at_step.is_none() && body.speed() < REST_SPEED {
-                body.first_rested_at_step = Some(self.totals.steps);
+                body.first_rested_at_step = Some(self.stage.totals.steps);
                 body.home = place - below * self.up;
             }
         }
@@ -226,11 +215,10 @@ impl DepthSimulation {
 
     /// One step; gives the pairs in contact.
     fn step(&mut self) -> Result<usize, TldiError> {
-        let report = self.tldi.step(&mut self.world)?;
-        self.totals.count(&report, report.pairs_in_contact > 0);
-        self.max_penetration = self.max_penetration.max(report.max_penetration);
-        let contacts = (self.tldi).contacts(&self.world.narrow_phase, &self.world.colliders);
-        let contacts: Vec<_> = contacts.collect();
+        let report = self.stage.step()?;
+        let has_contacts = report.pairs_in_contact > 0;
+        self.stage.totals.count(&report, has_contacts);
+        let contacts: Vec<_> = self.stage.contacts().collect();
         let moved_in = |contact: &CloudContact| {
             // Where the surface is: up to half the depth beyond the middle between the two.
             let into_body = if contact.collider1 == self.surface {
@@ -242,14 +230,14 @@ impl DepthSimulation {
             let mut former = self.former.iter();
             former.any(|(camera, from_world)| camera.sees_through(place, from_world))
         };
-        self.deepest
-            .count(self.totals.steps, &contacts, &self.world, moved_in);
+        let (step, world) = (self.stage.totals.steps, &self.stage.world);
+        self.deepest.count(step, &contacts, world, moved_in);
         Ok(report.pairs_in_contact)
     }
 
     /// The clouds of the bodies, each in its own frame.
     pub fn clouds(&self) -> impl Iterator<Item = &PointCloud<'static>> {
-        self.bodies.iter().map(|body| &body.named.cloud)
+        self.bodies.iter().map(|body| &body.body.cloud)
     }
 
     /// Where everything is now, with every `step`-th point of the frame.
@@ -257,22 +245,18 @@ impl DepthSimulation {
     /// # Errors
     /// None that a frame gives which was taken.
     pub fn snapshot(&self, step: usize) -> anyhow::Result<DepthSnapshot> {
-        let surface = self.world.colliders[self.surface].shape();
-        let frame = (surface.as_shape::<PointCloudShape>()).context("the frame is a cloud")?;
+        let surface = self
+            .stage
+            .cloud(self.surface)
+            .context("the frame is a cloud")?;
         // The fewer points, the larger their discs, so that they cover as much.
         let grown = |radius| radius * (step as f32).sqrt();
-        let frame = tldi_pictures::thinned(frame.cloud(), step, grown)?;
-        let contacts = self
-            .tldi
-            .contacts(&self.world.narrow_phase, &self.world.colliders);
+        let frame = tldi_pictures::thinned(surface, step, grown)?;
+        let bodies = self.bodies.iter();
+        let contacts = self.stage.touching(frame.mean_radius());
         Ok(DepthSnapshot {
-            world_from_body: (self.bodies.iter())
-                .map(|body| *self.world.bodies[body.handle].position())
-                .collect(),
-            contacts: contacts
-                .filter(|contact| contact.depth > -TOUCHING_GAP * frame.mean_radius())
-                .map(|contact| contact.point)
-                .collect(),
+            world_from_body: bodies.map(|b| self.stage.pose(b.body.handle)).collect(),
+            contacts: contacts.map(|contact| contact.point).collect(),
             frame,
         })
     }
@@ -282,39 +266,34 @@ impl DepthSimulation {
         let latencies = self.frames.iter().map(|frame| frame.latency_ms);
         let [median_latency_ms, max_latency_ms] = median_and_most(latencies);
         DepthReport {
-            totals: self.totals.clone(),
+            totals: self.stage.totals.clone(),
             frame_rate: 1.0 / FRAME_SECONDS,
             up: self.up.to_array(),
-            max_penetration: self.max_penetration,
+            max_penetration: self.stage.max_penetration,
             deepest: self.deepest.clone(),
             missing_frames,
             median_latency_ms,
             max_latency_ms,
             frames: self.frames.clone(),
-            bodies: self
-                .bodies
-                .iter()
-                .map(|body| self.body_report(body))
-                .collect(),
+            bodies: self.bodies.iter().map(|b| self.body_report(b)).collect(),
         }
     }
 
-    fn body_report(&self, body: &Body) -> DepthBodyReport {
-        let rigid_body = &self.world.bodies[body.handle];
-        DepthBodyReport {
-            name: body.named.name.clone(),
-            points: body.named.cloud.len(),
-            translation: rigid_body.translation().to_array(),
-            displacement: (body.places.back()).map(|place| place.distance(body.home)),
+    fn body_report(&self, followed: &Followed) -> DepthBody {
+        let Followed { body, places, .. } = followed;
+        let rigid_body = &self.stage.world.bodies[body.handle];
+        DepthBody {
+            placed: body.report(&self.stage),
+            displacement: (places.back()).map(|place| place.distance(followed.home)),
             linear_speed: rigid_body.linvel().length(),
-            speed_over_surface: (!body.places.is_empty()).then(|| body.speed()),
+            speed_over_surface: (!places.is_empty()).then(|| followed.speed()),
             sleeping: rigid_body.is_sleeping(),
-            first_rested_at_seconds: body.first_rested_at_step.map(|step| step as f32 * DT),
+            first_rested_at_seconds: followed.first_rested_at_step.map(|step| step as f32 * DT),
         }
     }
 }
 
-impl Body {
+impl Followed {
     /// Mean speed, m/s, over the last frames, relative to the surface below.
     fn speed(&self) -> f32 {
         let ways = self.places.front().zip(self.places.back());
@@ -326,19 +305,10 @@ impl Body {
 
 /// Median height along `up`, metres, of the surface in a column below a body; `None` where there is none.
 fn height_below(surface: &[Vec3], body: Vec3, radius: f32, up: Vec3) -> Option<f32> {
-    let mut heights: Vec<f32> = (surface.iter())
-        .map(|point| *point - body)
-        .filter(|from| {
-            let height = from.dot(up);
-            (-2.0 * radius..0.0).contains(&height)
-                && from.length_squared() - height * height < 0.25 * radius * radius
-        })
-        .map(|from| from.dot(up))
-        .collect();
-    if heights.is_empty() {
-        return None;
-    }
-    let middle = heights.len() / 2;
-    let median = *(heights.select_nth_unstable_by(middle, f32::total_cmp).1);
-    Some(body.dot(up) + median)
+    let near = (surface.iter().map(|point| *point - body)).filter(|from| {
+        let height = from.dot(up);
+        (-2.0 * radius..0.0).contains(&height)
+            && from.length_squared() - height * height < 0.25 * radius * radius
+    });
+    Some(body.dot(up) + median(near.map(|from| from.dot(up)))?)
 }

@@ -28,16 +28,11 @@ pub struct TimedFrame {
 
 impl FrameSource {
     /// Number of frames.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         match self {
             Self::Folder(sequence) => sequence.frames.len(),
             Self::Generated(camera) => camera.frames,
         }
-    }
-
-    /// Whether there are no frames.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Where all places count from in the world, metres.

@@ -40,13 +40,7 @@ pub fn creature(seed: u64) -> Result<Runner, MovingError> {
             min: a.min(b) - reach,
             max: a.max(b) + reach,
         };
-        let skin = sample_surface(
-            |p| capsule(p, limb),
-            |_| [255; 4],
-            bounds,
-            SPACING,
-            seed ^ k as u64,
-        );
+        let skin = sample_surface(|p| capsule(p, limb), bounds, SPACING, seed ^ k as u64);
         points.extend((skin.points.iter().zip(&skin.normals)).map(|(p, n)| (k, *p, *n)));
     }
     // What lies within another limb in every frame is not skin.

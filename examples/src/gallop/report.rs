@@ -1,8 +1,10 @@
 //! What a run of `gallop` found.
 
 use super::truth::Comparisons;
+use crate::bodies::PlacedBody;
 use crate::contact_kinds::{ByKind, ContactKinds};
-use crate::median::median_and_most;
+use crate::numbers::median_and_most;
+use crate::output::Report;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -53,24 +55,17 @@ pub struct GallopFrame {
 /// One loose body.
 #[derive(Clone, Debug, Serialize)]
 pub struct GallopBody {
-    /// What it is, and its number.
-    pub name: String,
-    /// Number of points.
-    pub points: usize,
-    /// Position after the last step, metres.
-    pub translation: [f32; 3],
+    /// Its name, its points and where it is.
+    #[serde(flatten)]
+    pub placed: PlacedBody,
     /// How far it was moved, metres.
     pub displacement: f32,
     /// Whether what runs touched it.
     pub kicked: bool,
 }
 
-impl GallopReport {
-    /// Writes the results as a table for people.
-    ///
-    /// # Errors
-    /// Those of writing.
-    pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
+impl Report for GallopReport {
+    fn write_table(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(
             out,
             "{} points in {} frames of a cycle run at {:.2} m/s over {} points of ground",
@@ -81,7 +76,7 @@ impl GallopReport {
             writeln!(
                 out,
                 "{:<22} moved {:.3} m{kicked}",
-                body.name, body.displacement
+                body.placed.name, body.displacement
             )?;
         }
         let median =

@@ -1,5 +1,6 @@
 //! A street as a laser scanner on a car sees it.
 
+use crate::rays::{distance_to_box, distance_to_ground};
 use fastrand::Rng;
 use std::f32::consts::TAU;
 use tldi::Aabb;
@@ -55,13 +56,8 @@ impl Scanner {
     }
 
     /// Number of sweeps.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.sweeps
-    }
-
-    /// Whether there are no sweeps.
-    pub fn is_empty(&self) -> bool {
-        self.sweeps == 0
     }
 
     /// From the frame of the scanner into that of the world.
@@ -100,21 +96,9 @@ impl Scanner {
 
     /// Distance to the ground or a box, metres; infinite if there is neither.
     fn range(&self, origin: Vec3, direction: Vec3) -> f32 {
-        let ground = if direction.z < 0.0 {
-            -origin.z / direction.z
-        } else {
-            f32::INFINITY
-        };
-        let boxes = self.boxes.iter().map(|bounds| {
-            let [a, b] = [bounds.min, bounds.max].map(|corner| (corner - origin) / direction);
-            let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
-            if enter > 0.0 && enter <= leave {
-                enter
-            } else {
-                f32::INFINITY
-            }
-        });
-        boxes.fold(ground, f32::min)
+        let boxes = self.boxes.iter();
+        let to_boxes = boxes.map(|bounds| distance_to_box(bounds, origin, direction));
+        to_boxes.fold(distance_to_ground(origin, direction), f32::min)
     }
 }
 

@@ -6,6 +6,6 @@ mod simulation;
 mod source;
 
 pub use generated::Scanner;
-pub use report::{LidarBodyReport, LidarReport, SweepReport};
+pub use report::{LidarBody, LidarReport, SweepReport};
 pub use simulation::{LidarScene, LidarSimulation};
 pub use source::{SeenSweep, Sweep, SweepSource, recipe};

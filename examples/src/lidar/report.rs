@@ -1,10 +1,12 @@
-//! Results of a stream of sweeps.
+//! What a run of `lidar_stream` found.
 
+use crate::bodies::PlacedBody;
+use crate::output::Report;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// What a run of `lidar_stream` found, as written to `--json`.
+/// As written to `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct LidarReport {
     /// Counts over all steps; contacts are those of bodies with the sweeps or each other.
@@ -19,7 +21,7 @@ pub struct LidarReport {
     /// The sweeps.
     pub sweeps: Vec<SweepReport>,
     /// The bodies.
-    pub bodies: Vec<LidarBodyReport>,
+    pub bodies: Vec<LidarBody>,
 }
 
 /// One sweep.
@@ -45,13 +47,10 @@ pub struct SweepReport {
 
 /// One body after the last step.
 #[derive(Clone, Debug, Serialize)]
-pub struct LidarBodyReport {
-    /// What it is.
-    pub name: String,
-    /// Number of points.
-    pub points: usize,
-    /// Position in the frame of the world, less the origin, metres.
-    pub translation: [f32; 3],
+pub struct LidarBody {
+    /// Its name, its points and where it is.
+    #[serde(flatten)]
+    pub placed: PlacedBody,
     /// Height of its lowest point above the place that it was dropped on, metres.
     pub height: f32,
     /// Speed in m/s.
@@ -60,24 +59,20 @@ pub struct LidarBodyReport {
     pub lost: bool,
 }
 
-impl LidarReport {
-    /// Writes the results as a table for people.
-    ///
-    /// # Errors
-    /// Those of writing.
-    pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
+impl Report for LidarReport {
+    fn write_table(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(
             out,
             "{:<16} {:>10} {:>10}  place",
             "body", "height mm", "speed m/s"
         )?;
         for body in &self.bodies {
-            let [x, y, z] = body.translation;
+            let [x, y, z] = body.placed.translation;
             let lost = if body.lost { "  LOST" } else { "" };
             writeln!(
                 out,
                 "{:<16} {:>10.1} {:>10.3}  {x:.2} {y:.2} {z:.2}{lost}",
-                body.name,
+                body.placed.name,
                 1e3 * body.height,
                 body.linear_speed
             )?;

@@ -1,13 +1,11 @@
 //! Bodies on the sweeps of a scanner.
 
-use super::report::{LidarBodyReport, LidarReport, SweepReport};
+use super::report::{LidarBody, LidarReport, SweepReport};
 use super::source::{Sweep, recipe};
-use crate::median::median_and_most;
-use crate::simulation::NamedCloud;
+use crate::bodies::{Body, Material, NamedCloud};
+use crate::numbers::{median_and_most, range};
 use crate::spots::Spot;
-use crate::step_totals::StepTotals;
-use crate::world::{self, DT};
-use rapier3d::prelude::*;
+use crate::world::Stage;
 use rapier3d_tldi::prelude::*;
 use std::time::Instant;
 use tldi::Backend;
@@ -15,10 +13,11 @@ use tldi::glamx::{Pose3, Quat, Vec3};
 
 /// Steps from one sweep to the next, at ten sweeps a second.
 const STEPS_PER_SWEEP: usize = 6;
-/// Mass per volume of the bodies in kg/m³: wood.
-const DENSITY: f32 = 500.0;
-/// Angular damping, per second: what rolling costs on a real surface.
-const ROLLING_RESISTANCE: f32 = 1.0;
+/// Wood.
+const MATERIAL: Material = Material {
+    density: 500.0,
+    rolling_resistance: 1.0,
+};
 /// Height over the surface at the start, metres.
 const DROP: f32 = 0.2;
 
@@ -36,12 +35,13 @@ pub struct LidarScene {
 
 /// A world with a stream of sweeps and bodies.
 pub struct LidarSimulation {
-    scene: LidarScene,
-    world: PhysicsWorld,
-    tldi: TldiPipeline,
+    stage: Stage,
     stream: CloudStream,
-    bodies: Vec<RigidBodyHandle>,
-    totals: StepTotals,
+    up: Vec3,
+    /// Points farther from the scanner are left out, metres.
+    range: f32,
+    /// Each with the place that it was dropped on.
+    bodies: Vec<(Body, Vec3)>,
     sweeps: Vec<SweepReport>,
 }
 
@@ -51,27 +51,24 @@ impl LidarSimulation {
     /// # Errors
     /// Those of [`TldiPipeline::with_backend`].
     pub fn new(scene: LidarScene, backend: Box<dyn Backend>) -> anyhow::Result<Self> {
-        let (mut world, tldi) = world::attached(scene.up, backend)?;
-        let stream = CloudStream::new(&mut world.colliders, recipe())?;
-        let upright = Quat::from_rotation_arc(Vec3::Y, scene.up);
-        let bodies = (scene.bodies.iter().zip(&scene.spots))
-            .map(|(body, spot)| {
-                let lift = DROP - body.cloud.bounds().min.y + spot.level as f32;
-                let pose = Pose3::from_parts(spot.surface + lift * scene.up, upright);
-                let rigid_body = RigidBodyBuilder::dynamic()
-                    .pose(pose)
-                    .angular_damping(ROLLING_RESISTANCE);
-                let collider = tldi.collider(body.cloud.clone()).density(DENSITY);
-                world.insert(rigid_body, collider).0
+        let LidarScene { up, range, .. } = scene;
+        let mut stage = Stage::new(up, backend)?;
+        let stream = CloudStream::new(&mut stage.world.colliders, recipe())?;
+        let upright = Quat::from_rotation_arc(Vec3::Y, up);
+        let bodies = (scene.bodies.into_iter().zip(&scene.spots))
+            .map(|(named, spot)| {
+                let lift = DROP - named.cloud.bounds().min.y + spot.level as f32;
+                let pose = Pose3::from_parts(spot.surface + lift * up, upright);
+                let body = Body::insert(&mut stage, named, pose, MATERIAL);
+                (body, spot.surface)
             })
             .collect();
         Ok(Self {
-            scene,
-            world,
-            tldi,
+            stage,
             stream,
+            up,
+            range,
             bodies,
-            totals: StepTotals::new(DT),
             sweeps: Vec::new(),
         })
     }
@@ -82,11 +79,11 @@ impl LidarSimulation {
     /// Those of the stream and of the steps.
     pub fn take(&mut self, sweep: &Sweep) -> Result<(), TldiError> {
         let start = Instant::now();
-        let seen = sweep.within(self.scene.range);
+        let seen = sweep.within(self.range);
         let taken = self.stream.frame(
-            &mut self.tldi,
-            &self.world.bodies,
-            &mut self.world.colliders,
+            &mut self.stage.tldi,
+            &self.stage.world.bodies,
+            &mut self.stage.world.colliders,
             seen.as_points(),
             &sweep.world_from_scanner,
         )?;
@@ -104,42 +101,43 @@ impl LidarSimulation {
         };
         for step in 0..STEPS_PER_SWEEP {
             let start = Instant::now();
-            let stepped = self.tldi.step(&mut self.world)?;
-            self.totals.count(&stepped, stepped.pairs_in_contact > 0);
+            let stepped = self.stage.step()?;
+            let has_contacts = stepped.pairs_in_contact > 0;
+            self.stage.totals.count(&stepped, has_contacts);
             if step == 0 {
                 report.step_ms = milliseconds(start);
-                report.contacts = self.contacts().count();
+                report.contacts = self.stage.contacts().count();
             }
-            self.totals.add_wall_seconds(start.elapsed().as_secs_f64());
+            let seconds = start.elapsed().as_secs_f64();
+            self.stage.totals.add_wall_seconds(seconds);
         }
-        self.totals.add_wall_seconds(1e-3 * update_ms);
+        self.stage.totals.add_wall_seconds(1e-3 * update_ms);
         self.sweeps.push(report);
         Ok(())
     }
 
     /// The cloud of the last sweep, in the frame of the world.
     pub fn cloud(&self) -> Option<&PointCloud<'static>> {
-        let shape = self.world.colliders[self.stream.collider()].shape();
-        shape
-            .as_shape::<PointCloudShape>()
-            .map(PointCloudShape::cloud)
+        self.stage.cloud(self.stream.collider())
     }
 
-    /// The clouds of the bodies, and where they are.
-    pub fn bodies(&self) -> impl Iterator<Item = (&PointCloud<'static>, Pose3)> {
-        let poses = self
-            .bodies
-            .iter()
-            .map(|body| *self.world.bodies[*body].position());
-        self.scene.bodies.iter().map(|body| &body.cloud).zip(poses)
+    /// The clouds of the bodies, each in its own frame.
+    pub fn clouds(&self) -> impl Iterator<Item = &PointCloud<'static>> {
+        self.bodies.iter().map(|(body, _)| &body.cloud)
+    }
+
+    /// From the frames of the bodies into that of the world.
+    pub fn world_from_body(&self) -> Vec<Pose3> {
+        let bodies = self.bodies.iter();
+        bodies
+            .map(|(body, _)| self.stage.pose(body.handle))
+            .collect()
     }
 
     /// Contact points in the frame of the world, metres.
-    pub fn contacts(&self) -> impl Iterator<Item = Vec3> {
-        let contacts = self
-            .tldi
-            .contacts(&self.world.narrow_phase, &self.world.colliders);
-        contacts.map(|contact| contact.point)
+    pub fn contacts(&self) -> Vec<Vec3> {
+        let contacts = self.stage.contacts();
+        contacts.map(|contact| contact.point).collect()
     }
 
     /// What happened so far.
@@ -148,34 +146,28 @@ impl LidarSimulation {
         let latencies = latencies.map(|sweep| sweep.update_ms + sweep.step_ms);
         let [median_latency_ms, max_latency_ms] = median_and_most(latencies);
         LidarReport {
-            totals: self.totals.clone(),
-            up: self.scene.up.to_array(),
+            totals: self.stage.totals.clone(),
+            up: self.up.to_array(),
             median_latency_ms,
             max_latency_ms,
             sweeps: self.sweeps.clone(),
-            bodies: (0..self.bodies.len())
-                .map(|k| self.body_report(k))
+            bodies: (self.bodies.iter())
+                .map(|(body, place)| self.body_report(body, *place))
                 .collect(),
         }
     }
 
-    fn body_report(&self, index: usize) -> LidarBodyReport {
-        let (named, spot) = (&self.scene.bodies[index], &self.scene.spots[index]);
-        let body = &self.world.bodies[self.bodies[index]];
-        let heights = named
-            .cloud
-            .points()
-            .iter()
-            .map(|&p| (*body.position() * p).dot(self.scene.up));
-        let height = heights.fold(f32::MAX, f32::min) - spot.surface.dot(self.scene.up);
-        LidarBodyReport {
-            name: named.name.clone(),
-            points: named.cloud.len(),
-            translation: body.translation().to_array(),
+    fn body_report(&self, body: &Body, place: Vec3) -> LidarBody {
+        let world_from_body = self.stage.pose(body.handle);
+        let points = body.cloud.points().iter();
+        let [lowest, _] = range(points.map(|&p| (world_from_body * p).dot(self.up)));
+        let height = lowest - place.dot(self.up);
+        LidarBody {
+            placed: body.report(&self.stage),
             height,
-            linear_speed: body.linvel().length(),
+            linear_speed: self.stage.world.bodies[body.handle].linvel().length(),
             // Deeper than it is large.
-            lost: height < -named.cloud.bounds().extents().max_element(),
+            lost: height < -body.cloud.bounds().extents().max_element(),
         }
     }
 }

@@ -189,16 +189,11 @@ impl SweepSource {
     }
 
     /// Number of sweeps.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         match self {
             Self::Folder(sweeps, _) => sweeps.len(),
-            Self::Generated(scanner) => scanner.len(),
+            Self::Generated(scanner) => scanner.count(),
         }
-    }
-
-    /// Whether there are no sweeps.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Gets a sweep.

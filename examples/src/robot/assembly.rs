@@ -5,9 +5,8 @@ use super::kinematics::{JointKind, Kinematics};
 use super::links::{collision_groups, silent_pairs};
 use super::model::Model;
 use super::placing::Placement;
-use crate::world::GRAVITY;
+use crate::world::{GRAVITY, Stage};
 use rapier3d::prelude::*;
-use rapier3d_tldi::prelude::*;
 use rapier3d_urdf::{UrdfLoaderOptions, UrdfMultibodyOptions, UrdfRobot};
 use std::collections::HashMap;
 use std::path::Path;
@@ -48,20 +47,13 @@ pub(super) struct Assembled {
 }
 
 /// Puts the robot into the world: multibody joints, motors, mimic joints, start pose.
-pub(super) fn assemble(
-    world: &mut PhysicsWorld,
-    tldi: &TldiPipeline,
-    model: &Model,
-    placement: &Placement,
-) -> anyhow::Result<Assembled> {
+pub(super) fn assemble(stage: &mut Stage, model: &Model, placement: &Placement) -> Assembled {
     let Model {
         description: robot,
-        clouds,
         build,
-        start,
-        root_from_link,
+        ..
     } = model;
-    let kinematics = &robot.kinematics;
+    let world = &mut stage.world;
     let options = UrdfLoaderOptions {
         create_colliders_from_collision_shapes: false,
         create_colliders_from_visual_shapes: false,
@@ -83,20 +75,47 @@ pub(super) fn assemble(
         UrdfMultibodyOptions::empty(),
     );
     let links: Vec<RigidBodyHandle> = handles.links.iter().map(|link| link.body).collect();
-    let silent = silent_pairs(kinematics, clouds, root_from_link);
+    let cloud_of_collider = attach_clouds(stage, model, &links);
+    let bodies = &stage.world.bodies;
+    let mass: f32 = links.iter().map(|body| bodies[*body].mass()).sum();
+    let mut assembled = Assembled {
+        links,
+        cloud_of_collider,
+        driven: Vec::new(),
+        mass,
+        stands: !build.is_fixed,
+        default_effort: mass * GRAVITY * build.size,
+    };
+    let joints: Vec<_> = handles.joints.iter().map(|joint| joint.joint).collect();
+    assembled.set_up_joints(&mut stage.world, &robot.kinematics, &joints, &model.start);
+    assembled
+}
+
+/// Gives the bodies of the links their clouds as colliders, and masses. Gives the index of each collider's cloud.
+fn attach_clouds(
+    stage: &mut Stage,
+    model: &Model,
+    links: &[RigidBodyHandle],
+) -> HashMap<ColliderHandle, usize> {
+    let Model {
+        description: robot,
+        clouds,
+        ..
+    } = model;
+    let world = &mut stage.world;
+    let silent = silent_pairs(&robot.kinematics, clouds, &model.root_from_link);
     let groups = collision_groups(clouds.len(), &silent);
     let mut cloud_of_collider = HashMap::new();
     for (k, (link, groups)) in clouds.iter().zip(groups).enumerate() {
         let own_mass = robot.urdf.links[link.link].inertial.mass.value > 0.0;
-        let collider = tldi
-            .collider(link.cloud.clone())
+        let collider = (stage.tldi.collider(link.cloud.clone()))
             .density(if own_mass { 0.0 } else { LINK_DENSITY })
             .collision_groups(groups);
         let body = links[link.link];
         let handle = (world.colliders).insert_with_parent(collider, body, &mut world.bodies);
         cloud_of_collider.insert(handle, k);
     }
-    for body in &links {
+    for body in links {
         let body = &mut world.bodies[*body];
         body.recompute_mass_properties_from_colliders(&world.colliders);
         if body.mass() <= 0.0 && body.is_dynamic() {
@@ -106,19 +125,7 @@ pub(super) fn assemble(
             body.recompute_mass_properties_from_colliders(&world.colliders);
         }
     }
-    let joints: Vec<Option<MultibodyJointHandle>> =
-        handles.joints.iter().map(|joint| joint.joint).collect();
-    let mass: f32 = links.iter().map(|body| world.bodies[*body].mass()).sum();
-    let mut assembled = Assembled {
-        links,
-        cloud_of_collider,
-        driven: Vec::new(),
-        mass,
-        stands: !build.is_fixed,
-        default_effort: mass * GRAVITY * build.size,
-    };
-    assembled.set_up_joints(world, kinematics, &joints, start);
-    Ok(assembled)
+    cloud_of_collider
 }
 
 impl Assembled {
@@ -188,25 +195,19 @@ impl Assembled {
             multibody.forward_kinematics(&world.bodies, true);
             multibody.update_rigid_bodies(&mut world.bodies, true);
             let root_freedom = multibody.root().joint().ndofs();
-            for value in multibody
-                .armature_mut()
-                .as_mut_slice()
-                .iter_mut()
-                .skip(root_freedom)
-            {
-                *value = ARMATURE;
-            }
+            multibody.armature_mut().as_mut_slice()[root_freedom..].fill(ARMATURE);
         }
     }
 
-    /// Tells the motors where the joints should be, or how fast they should roll.
+    /// Tells the motors where the joints should be at a time, or how fast they should roll.
     pub(super) fn drive(
         &self,
         world: &mut PhysicsWorld,
         kinematics: &Kinematics,
-        targets: &[f32],
         motion: &Motion,
+        time: f32,
     ) {
+        let targets = motion.positions(time);
         for (k, handle) in &self.driven {
             let Some((multibody, id)) = world.multibody_joints.get_mut(*handle) else {
                 continue;

@@ -1,71 +1,64 @@
 //! Fills in what URDF files may leave out, but their reader insists on.
 
+use roxmltree::{Document, Node};
+use std::ops::Range;
+
 /// Stands for an empty geometry: no surface.
 const NO_GEOMETRY: &str = r#"<box size="0 0 0"/>"#;
 const NO_SPEED: &str = r#" velocity="0""#;
 const NO_MASS: &str = r#"<mass value="0"/>"#;
 const NO_INERTIA: &str = r#"<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>"#;
 
-/// The same URDF with a placeholder in each empty `<geometry>`, a `velocity` in each `<limit>`, and `<mass>` and
+/// The text of a URDF with a placeholder in each empty `<geometry>`, a `velocity` in each `<limit>`, and `<mass>` and
 /// `<inertia>` in each `<inertial>`: zero, where the text does not say it.
-pub(super) fn completed(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut rest = text;
-    // Where the present <inertial> began in `out`.
-    let mut inertial = None;
-    while let Some(start) = rest.find('<') {
-        out.push_str(&rest[..start]);
-        rest = &rest[start..];
-        let end = if rest.starts_with("<!--") { "-->" } else { ">" };
-        let Some(length) = rest.find(end).map(|at| at + end.len()) else {
-            break;
-        };
-        let (tag, after) = rest.split_at(length);
-        rest = after;
-        let name = |c: char| c.is_whitespace() || c == '/' || c == '>';
-        let is_empty = tag.ends_with("/>");
-        let (head, tail) = tag.split_at(tag.len() - if is_empty { 2 } else { 1 });
-        match tag[1..].split(name).next() {
-            Some("geometry") if is_empty => {
-                out.extend([head, ">", NO_GEOMETRY, "</geometry>"]);
+pub(super) fn completed(document: &Document<'_>) -> String {
+    let text = document.input_text();
+    let mut edits: Vec<(Range<usize>, String)> = Vec::new();
+    for node in document.descendants().filter(Node::is_element) {
+        let has = |name: &str| node.children().any(|part| part.tag_name().name() == name);
+        match node.tag_name().name() {
+            "geometry" if !node.children().any(|part| part.is_element()) => {
+                edits.push(inside(text, node, NO_GEOMETRY));
             }
-            Some("geometry") if rest.trim_start().starts_with("</geometry") => {
-                out.extend([tag, NO_GEOMETRY]);
+            "limit" if !node.has_attribute("velocity") => {
+                let name_end = node.range().start + 1 + name_of(text, node).len();
+                edits.push((name_end..name_end, NO_SPEED.to_owned()));
             }
-            Some("limit") if !has_attribute(tag, "velocity") => out.extend([head, NO_SPEED, tail]),
-            Some("inertial") if is_empty => {
-                out.extend([head, ">", NO_MASS, NO_INERTIA, "</inertial>"]);
+            "inertial" => {
+                let parts = [("mass", NO_MASS), ("inertia", NO_INERTIA)];
+                let missing = parts.into_iter().filter(|(name, _)| !has(name));
+                let missing: String = missing.map(|(_, placeholder)| placeholder).collect();
+                edits.push(inside(text, node, &missing));
             }
-            Some("inertial") => {
-                inertial = Some(out.len());
-                out.push_str(tag);
-            }
-            _ => {
-                if tag.starts_with("</inertial")
-                    && let Some(start) = inertial.take()
-                {
-                    let inside = out[start..].to_owned();
-                    for (element, placeholder) in [("<mass", NO_MASS), ("<inertia", NO_INERTIA)] {
-                        let is_element = |part: &str| part.starts_with(name);
-                        if !inside.split(element).skip(1).any(is_element) {
-                            out.push_str(placeholder);
-                        }
-                    }
-                }
-                out.push_str(tag);
-            }
+            _ => {}
         }
     }
-    out.push_str(rest);
+    // From the end: what is before an edit stays where it is.
+    edits.sort_by_key(|(range, _)| range.start);
+    let mut out = text.to_owned();
+    for (range, replacement) in edits.into_iter().rev() {
+        out.replace_range(range, &replacement);
+    }
     out
 }
 
-fn has_attribute(tag: &str, name: &str) -> bool {
-    let starts = tag.match_indices(name).map(|(at, _)| at);
-    starts.into_iter().any(|at| {
-        tag[..at].ends_with(char::is_whitespace)
-            && tag[at + name.len()..].trim_start().starts_with('=')
-    })
+/// What to write where, so that an element has `more` at its end.
+fn inside(text: &str, node: Node<'_, '_>, more: &str) -> (Range<usize>, String) {
+    let all = node.range();
+    match text[all.clone()].rfind("</") {
+        Some(end) => (all.start + end..all.start + end, more.to_owned()),
+        None => {
+            let name = name_of(text, node);
+            (all.end - "/>".len()..all.end, format!(">{more}</{name}>"))
+        }
+    }
+}
+
+/// The name of an element as it is written, with its prefix.
+fn name_of<'a>(text: &'a str, node: Node<'_, '_>) -> &'a str {
+    let tag = &text[node.range()][1..];
+    let is_past_name = |c: char| c.is_whitespace() || c == '/' || c == '>';
+    tag.split(is_past_name).next().unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -74,40 +67,49 @@ mod tests {
 
     #[test]
     fn what_is_left_out_is_filled_in_and_the_rest_stays() {
+        let zero = r#"<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>"#;
+        let no_box = r#"<box size="0 0 0"/>"#;
         for (text, expected) in [
             (
                 "<geometry></geometry>",
-                r#"<geometry><box size="0 0 0"/></geometry>"#,
+                format!("<geometry>{no_box}</geometry>"),
             ),
             (
                 "<geometry>\n </geometry>",
-                "<geometry><box size=\"0 0 0\"/>\n </geometry>",
+                format!("<geometry>\n {no_box}</geometry>"),
             ),
-            ("<geometry/>", r#"<geometry><box size="0 0 0"/></geometry>"#),
+            ("<geometry/>", format!("<geometry>{no_box}</geometry>")),
             (
                 r#"<limit effort="1"/>"#,
-                r#"<limit effort="1" velocity="0"/>"#,
+                r#"<limit velocity="0" effort="1"/>"#.to_owned(),
             ),
             (
                 r#"<limit lower="0"></limit>"#,
-                r#"<limit lower="0" velocity="0"></limit>"#,
+                r#"<limit velocity="0" lower="0"></limit>"#.to_owned(),
+            ),
+            (
+                "<inertial/><limit/>",
+                format!(r#"<inertial><mass value="0"/>{zero}</inertial><limit velocity="0"/>"#),
             ),
             (
                 r#"<inertial><mass value="2"/></inertial>"#,
-                r#"<inertial><mass value="2"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial>"#,
+                format!(r#"<inertial><mass value="2"/>{zero}</inertial>"#),
             ),
         ] {
-            assert_eq!(completed(text), expected);
+            assert_completed(text, &expected);
         }
         for whole in [
             r#"<geometry><sphere radius="1"/></geometry>"#,
             r#"<!-- <geometry></geometry> --><limit velocity = "1"/>"#,
             r#"<inertial><mass value="2"/><inertia ixx="1"/></inertial>"#,
-            "<robot",
-            "a < b > ü",
-            "",
+            "a &lt; b &gt; ü",
         ] {
-            assert_eq!(completed(whole), whole);
+            assert_completed(whole, whole);
         }
+    }
+
+    fn assert_completed(text: &str, expected: &str) {
+        let [text, expected] = [text, expected].map(|inner| format!("<robot>{inner}</robot>"));
+        assert_eq!(completed(&Document::parse(&text).unwrap()), expected);
     }
 }

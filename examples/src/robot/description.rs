@@ -6,6 +6,7 @@ use super::kinematics::{JointKind, JointModel, Kinematics};
 use super::packages::MeshFolders;
 use crate::mesh::Mesh;
 use rapier3d_urdf::urdf_rs;
+use roxmltree::Document;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -88,8 +89,7 @@ impl Description {
     /// # Errors
     /// [`DescriptionError`].
     pub fn from_text(text: &str, folders: &MeshFolders) -> Result<Self, DescriptionError> {
-        check_kind(text)?;
-        let mut urdf = urdf_rs::read_from_string(&completed(text))
+        let mut urdf = urdf_rs::read_from_string(&completed(&document(text)?))
             .map_err(|error| DescriptionError::Syntax(error.to_string()))?;
         urdf.links.iter().try_for_each(check_numbers)?;
         let mut warnings = Vec::new();
@@ -193,35 +193,23 @@ fn kinematics_of(
     urdf: &urdf_rs::Robot,
     warnings: &mut Vec<String>,
 ) -> Result<Kinematics, DescriptionError> {
-    let mut link_of = HashMap::new();
-    for (k, link) in urdf.links.iter().enumerate() {
-        if link_of.insert(link.name.as_str(), k).is_some() {
-            return Err(DescriptionError::Twice(link.name.clone()));
-        }
-    }
-    let mut joint_of = HashMap::new();
-    for (k, joint) in urdf.joints.iter().enumerate() {
-        if joint_of.insert(joint.name.as_str(), k).is_some() {
-            return Err(DescriptionError::Twice(joint.name.clone()));
-        }
-    }
+    let link_of = indices(urdf.links.iter().map(|link| &link.name))?;
+    let joint_of = indices(urdf.joints.iter().map(|joint| &joint.name))?;
     let mut joints = Vec::new();
     for joint in &urdf.joints {
-        let link = |name: &str| {
-            link_of
-                .get(name)
-                .copied()
-                .ok_or_else(|| DescriptionError::NoSuchLink {
-                    joint: joint.name.clone(),
-                    link: name.to_owned(),
-                })
+        let link = |name: &String| {
+            let found = link_of.get(name).copied();
+            found.ok_or_else(|| DescriptionError::NoSuchLink {
+                joint: joint.name.clone(),
+                link: name.clone(),
+            })
         };
         let (parent, child) = (link(&joint.parent.link)?, link(&joint.child.link)?);
         joints.push(joint_model(joint, parent, child, warnings)?);
     }
     for (k, joint) in urdf.joints.iter().enumerate() {
         let Some(mimic) = &joint.mimic else { continue };
-        let leader = joint_of.get(mimic.joint.as_str()).copied();
+        let leader = joint_of.get(&mimic.joint).copied();
         match leader.filter(|&leader| leader != k && joints[leader].kind.is_driven()) {
             Some(leader) if joints[k].kind.is_driven() => {
                 let multiplier = mimic.multiplier.unwrap_or(1.0) as f32;
@@ -233,13 +221,31 @@ fn kinematics_of(
             )),
         }
     }
-    check_tree(urdf, &joints)?;
-    Ok(Kinematics::new(urdf.links.len(), joints))
+    check_root(urdf, &joints)?;
+    let kinematics = Kinematics::new(urdf.links.len(), joints);
+    if !kinematics.is_connected() {
+        let loops = "some links form a loop".to_owned();
+        return Err(DescriptionError::NotATree(loops));
+    }
+    Ok(kinematics)
 }
 
-/// Fails for what is XML, but of another kind.
-fn check_kind(text: &str) -> Result<(), DescriptionError> {
-    let document = roxmltree::Document::parse(text).map_err(|error| {
+/// The index of each name.
+fn indices<'a>(
+    names: impl Iterator<Item = &'a String>,
+) -> Result<HashMap<&'a String, usize>, DescriptionError> {
+    let mut indices = HashMap::new();
+    for (k, name) in names.enumerate() {
+        if indices.insert(name, k).is_some() {
+            return Err(DescriptionError::Twice(name.clone()));
+        }
+    }
+    Ok(indices)
+}
+
+/// The XML of a URDF. Fails for what is XML, but of another kind.
+fn document(text: &str) -> Result<Document<'_>, DescriptionError> {
+    let document = Document::parse(text).map_err(|error| {
         let kind = match text.contains("xacro:") {
             true => DescriptionError::Xacro,
             false => DescriptionError::Syntax,
@@ -261,7 +267,7 @@ fn check_kind(text: &str) -> Result<(), DescriptionError> {
             None => None,
         }
     });
-    of_xacro.map_or(Ok(()), |found| Err(DescriptionError::Xacro(found)))
+    of_xacro.map_or(Ok(document), |found| Err(DescriptionError::Xacro(found)))
 }
 
 /// Fails for a link with a number that is not finite.
@@ -341,7 +347,8 @@ fn joint_model(
     })
 }
 
-fn check_tree(urdf: &urdf_rs::Robot, joints: &[JointModel]) -> Result<(), DescriptionError> {
+/// Fails unless one link, and no other, has no parent, and no link has two.
+fn check_root(urdf: &urdf_rs::Robot, joints: &[JointModel]) -> Result<(), DescriptionError> {
     let not_a_tree = |text: String| Err(DescriptionError::NotATree(text));
     let mut children = HashSet::new();
     for joint in joints {
@@ -350,28 +357,13 @@ fn check_tree(urdf: &urdf_rs::Robot, joints: &[JointModel]) -> Result<(), Descri
             return not_a_tree(format!("link {name} has two parents"));
         }
     }
-    let roots: Vec<usize> = (0..urdf.links.len())
-        .filter(|link| !children.contains(link))
+    let links = urdf.links.iter().enumerate();
+    let roots: Vec<&str> = (links.filter(|(k, _)| !children.contains(k)))
+        .map(|(_, link)| link.name.as_str())
         .collect();
-    match roots[..] {
-        [root] => {
-            let mut reached = vec![root];
-            let mut next = 0;
-            while next < reached.len() {
-                let from = |joint: &&JointModel| joint.parent == reached[next];
-                let found: Vec<usize> = joints.iter().filter(from).map(|j| j.child).collect();
-                reached.extend(found);
-                next += 1;
-            }
-            if reached.len() < urdf.links.len() {
-                return not_a_tree("some links form a loop".to_owned());
-            }
-            Ok(())
-        }
-        [] => not_a_tree("there is no link without a parent".to_owned()),
-        _ => {
-            let names: Vec<&str> = roots.iter().map(|k| urdf.links[*k].name.as_str()).collect();
-            not_a_tree(format!("no joint leads to {}", names.join(", ")))
-        }
+    match roots.len() {
+        0 => not_a_tree("there is no link without a parent".to_owned()),
+        1 => Ok(()),
+        _ => not_a_tree(format!("no joint leads to {}", roots.join(", "))),
     }
 }

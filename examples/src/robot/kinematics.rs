@@ -58,6 +58,7 @@ pub struct Kinematics {
     pub joints: Vec<JointModel>,
     /// Indices of joints, parents before children.
     order: Vec<usize>,
+    root: usize,
     /// The joint that moves each link; none for the root.
     joint_of_link: Vec<Option<usize>>,
 }
@@ -99,14 +100,19 @@ impl Kinematics {
         Self {
             joints,
             order,
+            root,
             joint_of_link,
         }
     }
 
     /// The link without a parent.
     pub fn root(&self) -> usize {
-        let root = self.joint_of_link.iter().position(Option::is_none);
-        root.unwrap_or(0)
+        self.root
+    }
+
+    /// Whether all joints are reached from the root: links that form a loop are not.
+    pub(super) fn is_connected(&self) -> bool {
+        self.order.len() == self.joints.len()
     }
 
     /// Number of links.
@@ -274,6 +280,23 @@ pub struct Aim {
 }
 
 impl JointModel {
+    /// A joint that turns the next link of a chain.
+    #[cfg(test)]
+    pub(super) fn in_chain(parent: usize, axis: Vec3, at: Vec3) -> Self {
+        Self {
+            name: format!("joint {parent}"),
+            kind: JointKind::Revolute,
+            parent,
+            child: parent + 1,
+            parent_from_joint: Pose3::from_translation(at),
+            axis,
+            limits: [-2.0, 2.0],
+            max_effort: None,
+            max_speed: None,
+            mimic: None,
+        }
+    }
+
     /// The position that is within the limits, and a little off their ends.
     pub fn clamped(&self, position: f32) -> f32 {
         let [lower, upper] = self.limits;
@@ -323,29 +346,14 @@ impl JointModel {
 mod tests {
     use super::*;
 
-    fn joint(parent: usize, axis: Vec3, at: Vec3, kind: JointKind) -> JointModel {
-        JointModel {
-            name: format!("joint {parent}"),
-            kind,
-            parent,
-            child: parent + 1,
-            parent_from_joint: Pose3::from_translation(at),
-            axis,
-            limits: [-2.0, 2.0],
-            max_effort: None,
-            max_speed: None,
-            mimic: None,
-        }
-    }
-
     /// A turntable with two links of 0.5 m on it.
     fn arm() -> Kinematics {
         Kinematics::new(
             4,
             vec![
-                joint(0, Vec3::Z, Vec3::ZERO, JointKind::Revolute),
-                joint(1, Vec3::Y, 0.3 * Vec3::Z, JointKind::Revolute),
-                joint(2, Vec3::Y, 0.5 * Vec3::Z, JointKind::Revolute),
+                JointModel::in_chain(0, Vec3::Z, Vec3::ZERO),
+                JointModel::in_chain(1, Vec3::Y, 0.3 * Vec3::Z),
+                JointModel::in_chain(2, Vec3::Y, 0.5 * Vec3::Z),
             ],
         )
     }

@@ -6,7 +6,7 @@ use anyhow::ensure;
 use rapier3d::geometry::{Group, InteractionGroups, InteractionTestMode};
 use rapier3d::parry::shape::TriMesh;
 use rapier3d_tldi::sample_shape;
-use tldi::glamx::Pose3;
+use tldi::glamx::{Pose3, Vec3};
 use tldi::{KdTree, PointCloud};
 
 /// The surface of one link.
@@ -20,13 +20,6 @@ pub struct LinkCloud {
     pub cloud: PointCloud<'static>,
 }
 
-/// How finely links are sampled.
-#[derive(Clone, Copy, Debug)]
-pub struct Spacing {
-    /// Mean point radius of the scan, metres.
-    pub scan_radius: f32,
-}
-
 /// Points that a link is at least across, in its second longest extent: less has no shape.
 const LEAST_ACROSS: f32 = 10.0;
 /// Points that a link is at most long: more would be finer than any contact needs.
@@ -34,33 +27,31 @@ const MOST_ALONG: f32 = 120.0;
 /// Links that have a collision group of their own; the others share one.
 const OWN_GROUPS: usize = 30;
 
-impl Spacing {
-    /// Distance of neighbouring points in metres for a link of this size: as fine as the scan, which
-    /// sets the pixels of their comparison, but fine enough for the link's own shape.
-    ///
-    /// ```
-    /// use tldi::glamx::Vec3;
-    /// use tldi_examples::robot::Spacing;
-    /// let spacing = Spacing { scan_radius: 0.01 };
-    /// assert_eq!(spacing.of(Vec3::new(0.5, 0.2, 0.2)), 0.01);
-    /// let of_finger = spacing.of(Vec3::new(0.02, 0.05, 0.02));
-    /// assert!((of_finger - 0.002).abs() < 1e-6);
-    /// ```
-    pub fn of(&self, extents: tldi::glamx::Vec3) -> f32 {
-        let mut extents = extents.to_array();
-        extents.sort_by(f32::total_cmp);
-        let finest = extents[2] / MOST_ALONG;
-        self.scan_radius.min(extents[1] / LEAST_ACROSS).max(finest)
-    }
+/// Distance of neighbouring points in metres for a link with these extents: as fine as the scan, of this mean point
+/// radius, which sets the pixels of their comparison, but fine enough for the link's own shape.
+///
+/// ```
+/// use tldi::glamx::Vec3;
+/// use tldi_examples::robot::link_spacing;
+/// assert_eq!(link_spacing(Vec3::new(0.5, 0.2, 0.2), 0.01), 0.01);
+/// let of_finger = link_spacing(Vec3::new(0.02, 0.05, 0.02), 0.01);
+/// assert!((of_finger - 0.002).abs() < 1e-6);
+/// ```
+pub fn link_spacing(extents: Vec3, scan_radius: f32) -> f32 {
+    let mut extents = extents.to_array();
+    extents.sort_by(f32::total_cmp);
+    let finest = extents[2] / MOST_ALONG;
+    scan_radius.min(extents[1] / LEAST_ACROSS).max(finest)
 }
 
-/// The clouds of the links that have a surface, and what is wrong with those whose mesh cannot be sampled.
+/// The clouds of the links that have a surface, for a scan of this mean point radius in metres, and what is wrong with
+/// those whose mesh cannot be sampled.
 ///
 /// # Errors
 /// If not even one can.
 pub fn clouds_of_links(
     robot: &Description,
-    spacing: Spacing,
+    scan_radius: f32,
 ) -> anyhow::Result<(Vec<LinkCloud>, Vec<String>)> {
     let mut clouds = Vec::new();
     let mut warnings = Vec::new();
@@ -69,10 +60,10 @@ pub fn clouds_of_links(
             continue;
         }
         let name = robot.urdf.links[link].name.clone();
-        let distance = spacing.of(mesh.bounds().extents());
+        let spacing = link_spacing(mesh.bounds().extents(), scan_radius);
         let cloud = TriMesh::new(mesh.points.clone(), mesh.faces.clone())
             .map_err(anyhow::Error::from)
-            .and_then(|mesh| Ok(sample_shape(&mesh, distance)?));
+            .and_then(|mesh| Ok(sample_shape(&mesh, spacing)?));
         match cloud {
             Ok(cloud) => clouds.push(LinkCloud { link, name, cloud }),
             Err(error) => warnings.push(format!("link {name} cannot be made a cloud: {error}")),
@@ -153,25 +144,13 @@ pub(super) fn world_groups() -> InteractionGroups {
 mod tests {
     use super::*;
     use crate::load;
-    use crate::robot::kinematics::{JointKind, JointModel};
+    use crate::robot::kinematics::JointModel;
     use crate::scene::BodyShape;
-    use tldi::glamx::Vec3;
 
     /// A chain of pebbles: the third lies within the first, the fourth across it, the last far away.
     #[test]
     fn neighbours_and_what_overlaps_at_the_start_are_silent() {
-        let joint = |parent: usize| JointModel {
-            name: format!("joint {parent}"),
-            kind: JointKind::Revolute,
-            parent,
-            child: parent + 1,
-            parent_from_joint: Pose3::IDENTITY,
-            axis: Vec3::Z,
-            limits: [-1.0, 1.0],
-            max_effort: None,
-            max_speed: None,
-            mimic: None,
-        };
+        let joint = |parent| JointModel::in_chain(parent, Vec3::Z, Vec3::ZERO);
         let kinematics = Kinematics::new(5, (0..4).map(joint).collect());
         let sample = load::body_from_surface(BodyShape::Pebble.sample(0.05, 1)).unwrap();
         // Widths and places along x, metres.

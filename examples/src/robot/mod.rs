@@ -22,7 +22,7 @@ mod tally;
 
 pub use description::{BUILT_IN, Description, DescriptionError};
 pub use kinematics::{Aim, JointKind, JointModel, Kinematics};
-pub use links::{LinkCloud, Spacing, clouds_of_links};
+pub use links::{LinkCloud, clouds_of_links, link_spacing};
 pub use motion::{Motion, Waypoint};
 pub use packages::MeshFolders;
 pub use placing::{NoPlace, Placement, Site, place};

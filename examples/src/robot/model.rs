@@ -1,7 +1,7 @@
 //! A robot whose links are clouds, before it is in a scan.
 
 use super::description::Description;
-use super::links::{LinkCloud, Spacing, clouds_of_links};
+use super::links::{LinkCloud, clouds_of_links};
 use super::placing::{NoPlace, Placement, Site, place};
 use super::plan::{Base, Build, start_pose};
 use super::{SelfFilter, count};
@@ -25,16 +25,16 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// Samples the links. Those that cannot be sampled are told.
+    /// Samples the links for a scan of this mean point radius in metres. Those that cannot be sampled are told.
     ///
     /// # Errors
     /// If not even one can.
     pub(super) fn new(
         mut description: Description,
         base: Base,
-        spacing: Spacing,
+        scan_radius: f32,
     ) -> anyhow::Result<Self> {
-        let (clouds, warnings) = clouds_of_links(&description, spacing)?;
+        let (clouds, warnings) = clouds_of_links(&description, scan_radius)?;
         for warning in &warnings {
             eprintln!("warning: {warning}");
         }

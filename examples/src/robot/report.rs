@@ -1,6 +1,8 @@
 //! What a run of `robot_in_scan` found.
 
 use super::StandingReport;
+use crate::bodies::PlacedBody;
+use crate::output::Report;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -69,12 +71,9 @@ pub struct Hardest {
 /// One loose body.
 #[derive(Clone, Debug, Serialize)]
 pub struct LooseBodyReport {
-    /// What it is, and its number.
-    pub name: String,
-    /// Number of points.
-    pub points: usize,
-    /// Position after the last step, in the frame of the scan, metres.
-    pub translation: [f32; 3],
+    /// Its name, its points and where it is.
+    #[serde(flatten)]
+    pub placed: PlacedBody,
     /// How far it was moved, metres.
     pub displacement: f32,
     /// Whether the robot touched it.
@@ -83,12 +82,8 @@ pub struct LooseBodyReport {
     pub sleeping: bool,
 }
 
-impl RobotReport {
-    /// Writes the results as tables for people.
-    ///
-    /// # Errors
-    /// Those of writing.
-    pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
+impl Report for RobotReport {
+    fn write_table(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(
             out,
             "{:<28} {:>8} {:>14} {:>12} {:>12}  most pushed by",
@@ -104,17 +99,14 @@ impl RobotReport {
                 link.name, link.points, link.contact_steps, link.max_force, link.mean_force
             )?;
         }
-        for body in &self.bodies {
-            let touched = if body.touched {
-                ", touched by the robot"
-            } else {
-                ""
+        for loose in &self.bodies {
+            let PlacedBody { name, points, .. } = &loose.placed;
+            let way = loose.displacement;
+            let touched = match loose.touched {
+                true => ", touched by the robot",
+                false => "",
             };
-            writeln!(
-                out,
-                "{:<28} {:>8} moved {:.3} m{touched}",
-                body.name, body.points, body.displacement
-            )?;
+            writeln!(out, "{name:<28} {points:>8} moved {way:.3} m{touched}")?;
         }
         writeln!(
             out,

@@ -2,7 +2,7 @@
 
 use super::assembly::{Assembled, assemble};
 use super::description::Description;
-use super::links::{LinkCloud, Spacing, world_groups};
+use super::links::{LinkCloud, world_groups};
 use super::loose_bodies::{LooseBody, lay_bodies, loose_size};
 use super::model::Model;
 use super::own_camera::OwnCamera;
@@ -13,12 +13,11 @@ use super::standing::Standing;
 use super::tally::{self, LinkTally};
 use super::{Motion, SelfFilter, count};
 use crate::load;
-use crate::step_totals::StepTotals;
+use crate::numbers::range;
 use crate::terrain::Terrain;
-use crate::world::{self, DT, GRAVITY, TOUCHING_GAP};
+use crate::world::{DT, GRAVITY, Stage, is_of};
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
-use std::collections::HashMap;
 use std::time::Instant;
 use tldi::Backend;
 use tldi::glamx::{Pose3, Vec3};
@@ -81,8 +80,7 @@ pub struct RobotSnapshot {
 
 /// The simulation.
 pub struct RobotSimulation {
-    world: PhysicsWorld,
-    tldi: TldiPipeline,
+    stage: Stage,
     scan: PointCloud<'static>,
     scan_collider: ColliderHandle,
     up: Vec3,
@@ -95,8 +93,6 @@ pub struct RobotSimulation {
     own_camera: Option<OwnCamera>,
     self_filtered: usize,
     standing: Option<Standing>,
-    totals: StepTotals,
-    max_penetration: f32,
 }
 
 impl RobotSimulation {
@@ -107,7 +103,7 @@ impl RobotSimulation {
     pub fn new(scene: RobotScene, backend: Box<dyn Backend>) -> anyhow::Result<Self> {
         let RobotScene { scan, up, seed, .. } = scene;
         let scan_radius = scan.mean_radius();
-        let model = Model::new(scene.robot, scene.base, Spacing { scan_radius })?;
+        let model = Model::new(scene.robot, scene.base, scan_radius)?;
         let is_fixed = model.build.is_fixed;
         let loose_size = loose_size(scan_radius);
         let site = Site {
@@ -133,8 +129,8 @@ impl RobotSimulation {
             .collect();
         let scan = load::subset(&scan, &kept, |p| p, |r| r)?;
 
-        let (mut world, tldi) = world::attached(up, backend)?;
-        soften(&mut world.integration_parameters, is_fixed);
+        let mut stage = Stage::new(up, backend)?;
+        soften(&mut stage.world.integration_parameters, is_fixed);
         let scan_shape = if scene.own_camera {
             // Every frame has other points: one radius for all, and normals found on the way.
             let bare = PointCloud::builder(scan.points().to_vec());
@@ -142,10 +138,13 @@ impl RobotSimulation {
         } else {
             scan.clone()
         };
-        let collider = tldi.collider(scan_shape).collision_groups(world_groups());
-        let (_, scan_collider) = world.insert(RigidBodyBuilder::fixed(), collider);
-        let assembled = assemble(&mut world, &tldi, &model, &placement)?;
-        let loose = lay_bodies(&mut world, &tldi, up, loose_size, &placement, seed)?;
+        let collider = stage
+            .tldi
+            .collider(scan_shape)
+            .collision_groups(world_groups());
+        let (_, scan_collider) = stage.world.insert(RigidBodyBuilder::fixed(), collider);
+        let assembled = assemble(&mut stage, &model, &placement);
+        let loose = lay_bodies(&mut stage, up, loose_size, &placement, seed)?;
         let motion = (scene.motion)
             .unwrap_or_else(|| plan_motion(&model, &placement, &scan, up, loose_size, seed));
         let standing = scene.terrain.map(|terrain| {
@@ -159,8 +158,7 @@ impl RobotSimulation {
             standing,
             tally: vec![LinkTally::default(); model.clouds.len()],
             own_camera: scene.own_camera.then(camera),
-            world,
-            tldi,
+            stage,
             scan,
             scan_collider,
             up,
@@ -170,8 +168,6 @@ impl RobotSimulation {
             motion,
             filter,
             self_filtered: count(&on_robot),
-            totals: StepTotals::new(DT),
-            max_penetration: 0.0,
         })
     }
 
@@ -191,24 +187,22 @@ impl RobotSimulation {
     /// Those of the pipeline.
     pub fn step(&mut self) -> anyhow::Result<()> {
         let start = Instant::now();
-        if self.totals.steps.is_multiple_of(STEPS_PER_FRAME) {
+        if self.stage.totals.steps.is_multiple_of(STEPS_PER_FRAME) {
             self.take_frame()?;
         }
-        let time = self.totals.steps as f32 * DT;
-        let targets = self.motion.positions(time);
+        let time = self.stage.totals.steps as f32 * DT;
         (self.assembled).drive(
-            &mut self.world,
+            &mut self.stage.world,
             &self.model.description.kinematics,
-            &targets,
             &self.motion,
+            time,
         );
-        let report = self.tldi.step(&mut self.world)?;
+        let report = self.stage.step()?;
         let seconds = start.elapsed().as_secs_f64();
         let touches = self.count_contacts();
         self.observe_standing();
-        self.totals.count(&report, touches);
-        self.totals.add_wall_seconds(seconds);
-        self.max_penetration = self.max_penetration.max(report.max_penetration);
+        self.stage.totals.count(&report, touches);
+        self.stage.totals.add_wall_seconds(seconds);
         Ok(())
     }
 
@@ -217,9 +211,8 @@ impl RobotSimulation {
         let Some(camera) = &mut self.own_camera else {
             return Ok(());
         };
-        let world_from_link: Vec<Pose3> = (self.assembled.links.iter())
-            .map(|body| *self.world.bodies[*body].position())
-            .collect();
+        let links = self.assembled.links.iter();
+        let world_from_link: Vec<Pose3> = links.map(|body| self.stage.pose(*body)).collect();
         let mut frame = camera.frame(&self.scan, &self.model.clouds, &world_from_link);
         if let Some(filter) = &self.filter {
             let on_robot = filter.on_robot(&frame, &world_from_link)?;
@@ -227,30 +220,27 @@ impl RobotSimulation {
             let mut on = on_robot.into_iter();
             frame.retain(|_| !on.next().unwrap_or(false));
         }
-        (self.tldi).set_points(&mut self.world, self.scan_collider, &frame, None)?;
+        let Stage { world, tldi, .. } = &mut self.stage;
+        tldi.set_points(world, self.scan_collider, &frame, None)?;
         Ok(())
     }
 
     /// Adds to the tallies; gives whether the robot touches the scan or a loose body.
     fn count_contacts(&mut self) -> bool {
-        let link_of: &HashMap<ColliderHandle, usize> = &self.assembled.cloud_of_collider;
+        let link_of =
+            |collider: ColliderHandle| self.assembled.cloud_of_collider.get(&collider).copied();
         let name_of = |collider: ColliderHandle| {
-            let body = self.loose.iter().find(|body| body.collider == collider);
-            match (body, link_of.get(&collider)) {
-                (Some(body), _) => body.name.clone(),
-                (None, Some(link)) => self.model.clouds[*link].name.clone(),
+            let is_it = |loose: &&LooseBody| loose.body.collider == collider;
+            match (self.loose.iter().find(is_it), link_of(collider)) {
+                (Some(loose), _) => loose.body.name.clone(),
+                (None, Some(link)) => self.model.clouds[link].name.clone(),
                 (None, None) => "scan".to_owned(),
             }
         };
-        let touched = tally::count(
-            &mut self.tally,
-            self.totals.steps + 1,
-            &self.world,
-            |collider| link_of.get(&collider).copied(),
-            name_of,
-        );
-        for body in &mut self.loose {
-            body.touched |= touched.contains(&body.collider);
+        let (step, world) = (self.stage.totals.steps + 1, &self.stage.world);
+        let touched = tally::count(&mut self.tally, step, world, link_of, name_of);
+        for loose in &mut self.loose {
+            loose.touched |= touched.contains(&loose.body.collider);
         }
         !touched.is_empty()
     }
@@ -266,9 +256,8 @@ impl RobotSimulation {
         let Some(standing) = &mut self.standing else {
             return;
         };
-        let contacts = (self.tldi)
-            .contacts(&self.world.narrow_phase, &self.world.colliders)
-            .filter(|c| [c.collider1, c.collider2].contains(&self.scan_collider))
+        let contacts = (self.stage.contacts())
+            .filter(|contact| is_of(contact, self.scan_collider))
             .map(|contact| (contact.point, contact.depth));
         let forces: Vec<f32> = self.tally.iter().map(|tally| tally.force).collect();
         standing.observe(
@@ -283,13 +272,12 @@ impl RobotSimulation {
 
     /// Where the root is.
     fn root(&self) -> Pose3 {
-        let root = self.assembled.links[self.model.description.kinematics.root()];
-        *self.world.bodies[root].position()
+        let root = self.model.description.kinematics.root();
+        self.stage.pose(self.assembled.links[root])
     }
 
     fn scan_from_link(&self) -> Vec<Pose3> {
-        let pose =
-            |link: &LinkCloud| *self.world.bodies[self.assembled.links[link.link]].position();
+        let pose = |link: &LinkCloud| self.stage.pose(self.assembled.links[link.link]);
         self.model.clouds.iter().map(pose).collect()
     }
 
@@ -305,27 +293,23 @@ impl RobotSimulation {
 
     /// The clouds of the loose bodies, each in its own frame.
     pub fn loose_clouds(&self) -> impl Iterator<Item = &PointCloud<'static>> {
-        self.loose.iter().map(|body| &body.cloud)
+        self.loose.iter().map(|loose| &loose.body.cloud)
     }
 
     /// Where everything is now.
     pub fn snapshot(&self) -> RobotSnapshot {
-        let contacts = self
-            .tldi
-            .contacts(&self.world.narrow_phase, &self.world.colliders);
+        let loose = self.loose.iter();
         let link_of = &self.assembled.cloud_of_collider;
+        let is_robots = |contact: &CloudContact| {
+            let mut colliders = [contact.collider1, contact.collider2].into_iter();
+            colliders.any(|collider| link_of.contains_key(&collider))
+        };
         RobotSnapshot {
             scan_from_link: self.scan_from_link(),
             link_touches: self.tally.iter().map(|tally| tally.touches).collect(),
-            scan_from_body: (self.loose.iter())
-                .map(|body| *self.world.bodies[body.handle].position())
-                .collect(),
-            contacts: contacts
-                .filter(|contact| {
-                    let colliders = [contact.collider1, contact.collider2];
-                    colliders.iter().any(|c| link_of.contains_key(c))
-                        && contact.depth > -TOUCHING_GAP * self.scan.mean_radius()
-                })
+            scan_from_body: loose.map(|b| self.stage.pose(b.body.handle)).collect(),
+            contacts: (self.stage.touching(self.scan.mean_radius()))
+                .filter(is_robots)
                 .map(|contact| contact.point)
                 .collect(),
         }
@@ -333,17 +317,11 @@ impl RobotSimulation {
 
     /// What happened so far.
     pub fn report(&self) -> RobotReport {
-        let link =
-            |(link, tally): (&LinkCloud, &LinkTally)| tally.report(&link.name, link.cloud.len());
-        let links: Vec<LinkReport> = self
-            .model
-            .clouds
-            .iter()
-            .zip(&self.tally)
-            .map(link)
+        let links: Vec<LinkReport> = (self.model.clouds.iter().zip(&self.tally))
+            .map(|(link, tally)| tally.report(&link.name, link.cloud.len()))
             .collect();
         RobotReport {
-            totals: self.totals.clone(),
+            totals: self.stage.totals.clone(),
             scan_points: self.scan.len(),
             self_filtered_points: self.self_filtered,
             mean_radius: self.scan.mean_radius(),
@@ -353,15 +331,10 @@ impl RobotSimulation {
             driven_joints: self.assembled.driven_joints(),
             link_count: links.len(),
             links,
-            max_penetration: self.max_penetration,
-            standing: self
-                .standing
-                .as_ref()
-                .map(|standing| standing.report().clone()),
-            bodies: self
-                .loose
-                .iter()
-                .map(|body| body.report(&self.world.bodies))
+            max_penetration: self.stage.max_penetration,
+            standing: (self.standing.as_ref()).map(|standing| standing.report().clone()),
+            bodies: (self.loose.iter())
+                .map(|loose| loose.report(&self.stage))
                 .collect(),
             warnings: self.model.description.warnings.clone(),
         }
@@ -384,7 +357,7 @@ impl RobotSimulation {
         if self.model.build.is_fixed {
             return true;
         }
-        let lowest = (self.scan.points().iter().map(|&p| p.dot(self.up))).fold(f32::MAX, f32::min);
+        let [lowest, _] = range(self.scan.points().iter().map(|&p| p.dot(self.up)));
         self.root().translation.dot(self.up) >= lowest - 0.1
     }
 }

@@ -2,6 +2,7 @@
 
 use super::count;
 use super::links::LinkCloud;
+use crate::numbers::range;
 use crate::terrain::Terrain;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -15,7 +16,7 @@ const LOCAL_POINTS: usize = 12;
 
 /// What a standing or walking robot did. Contacts come from the library, all else from the ground as it
 /// was made.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct StandingReport {
     /// Number of feet: links that the robot stands on at the start.
     pub feet: usize,
@@ -45,10 +46,7 @@ pub struct StandingReport {
 
 impl StandingReport {
     /// Writes a line for people.
-    ///
-    /// # Errors
-    /// Those of writing.
-    pub fn write_line(&self, out: &mut impl Write) -> io::Result<()> {
+    pub(crate) fn write_line(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(
             out,
             "went {:.2} m; base {:.3} m high at the start, at least {:.3} m, {:.3} m at the end; contacts at most {:.2} r \
@@ -89,12 +87,11 @@ impl Standing {
         links: &[Pose3],
         weight: f32,
     ) -> Self {
-        let lowest = |(cloud, pose): (&LinkCloud, &Pose3)| {
-            let heights = cloud.cloud.points().iter().map(|&p| (*pose * p).z);
-            heights.fold(f32::MAX, f32::min)
+        let lowest = |(link, pose): (&LinkCloud, &Pose3)| {
+            range(link.cloud.points().iter().map(|&p| (*pose * p).z))[0]
         };
         let heights: Vec<f32> = clouds.iter().zip(links).map(lowest).collect();
-        let least = heights.iter().copied().fold(f32::MAX, f32::min);
+        let [least, _] = range(heights.iter().copied());
         let feet: Vec<bool> = heights.iter().map(|h| *h < least + FOOT_HEIGHT).collect();
         let count = count(&feet);
         // The start is above the ground by the drop.
@@ -111,13 +108,7 @@ impl Standing {
                 start_height,
                 least_height: start_height,
                 last_height: start_height,
-                way: 0.0,
-                deepest_radii: 0.0,
-                deepest_step: 0,
-                max_foot_force: 0.0,
-                max_force_step: 0,
-                feet_under_ground: 0.0,
-                links_under_ground: 0.0,
+                ..StandingReport::default()
             },
         }
     }
@@ -164,13 +155,10 @@ impl Standing {
                 report.deepest_step = self.step;
             }
         }
-        for (force, _) in forces
-            .iter()
-            .zip(&self.feet)
-            .filter(|(_, is_foot)| **is_foot)
-        {
-            if force / report.weight_share > report.max_foot_force {
-                report.max_foot_force = force / report.weight_share;
+        for (force, is_foot) in forces.iter().zip(&self.feet) {
+            let shares = force / report.weight_share;
+            if *is_foot && shares > report.max_foot_force {
+                report.max_foot_force = shares;
                 report.max_force_step = self.step;
             }
         }

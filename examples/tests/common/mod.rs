@@ -16,17 +16,46 @@ pub(crate) fn folder(name: &str) -> PathBuf {
     folder
 }
 
+/// Lines of numbers.
+pub(crate) fn lines<const N: usize>(rows: impl IntoIterator<Item = [f32; N]>) -> String {
+    let line = |row: [f32; N]| row.map(|number| number.to_string()).join(" ") + "\n";
+    rows.into_iter().map(line).collect()
+}
+
+/// An ASCII PLY file. Lines of vertices have these properties, lines of faces a count and indices.
+pub(crate) fn ply(properties: &str, vertices: &str, faces: &str) -> String {
+    let count = |lines: &str| lines.lines().count();
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\n",
+        count(vertices)
+    );
+    for name in properties.split_whitespace() {
+        let is_color = ["red", "green", "blue"].contains(&name);
+        let kind = if is_color { "uchar" } else { "float" };
+        text += &format!("property {kind} {name}\n");
+    }
+    if !faces.is_empty() {
+        let list = "property list uchar uint vertex_indices";
+        text += &format!("element face {}\n{list}\n", count(faces));
+    }
+    text + "end_header\n" + vertices + faces
+}
+
 /// Writes points as an ASCII PLY file.
 pub(crate) fn write_ply(path: &Path, points: &[[f32; 3]]) {
-    let mut text = format!(
-        "ply\nformat ascii 1.0\nelement vertex {}\n\
-         property float x\nproperty float y\nproperty float z\nend_header\n",
-        points.len()
-    );
-    for [x, y, z] in points {
-        text += &format!("{x} {y} {z}\n");
-    }
-    fs::write(path, text).unwrap();
+    fs::write(path, ply("x y z", &lines(points.iter().copied()), "")).unwrap();
+}
+
+/// Points of a ball of radius 1 about the origin, on a golden spiral.
+pub(crate) fn ball(count: usize) -> Vec<[f64; 3]> {
+    (0..count)
+        .map(|k| {
+            let z = 1.0 - (2 * k + 1) as f64 / count as f64;
+            let angle = k as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt());
+            let ring = (1.0 - z * z).sqrt();
+            [ring * angle.cos(), ring * angle.sin(), z]
+        })
+        .collect()
 }
 
 /// Corners of a cube of 2 m about the origin, as Blender saves it, and its sides, anticlockwise as seen from outside.
@@ -53,18 +82,15 @@ pub(crate) const SIDES: [[usize; 4]; 6] = [
 pub(crate) fn cube_as_stl() -> String {
     let halves = SIDES.iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);
     let facets = halves.map(|corners| {
-        let vertex = |k: &usize| {
-            let [x, y, z] = CORNERS[*k];
-            format!("vertex {x} {y} {z}\n")
-        };
+        let vertex = |k: &usize| "vertex ".to_owned() + &lines([CORNERS[*k]]);
         let vertices: String = corners.into_iter().map(vertex).collect();
         format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
     });
     format!("solid\n{}endsolid\n", facets.collect::<String>())
 }
 
-/// The pictures of a run.
-pub(crate) const PICTURES: [&str; 3] = ["initial.png", "mid.png", "final.png"];
+/// The pictures of most runs.
+pub(crate) const PICTURES: &str = "initial.png mid.png final.png";
 
 /// The content of a JSON file.
 pub(crate) fn json(path: PathBuf) -> Value {
@@ -72,39 +98,34 @@ pub(crate) fn json(path: PathBuf) -> Value {
 }
 
 /// The keys of an object, sorted.
-pub(crate) fn keys(value: &Value) -> Vec<&str> {
-    let mut keys: Vec<&str> = value
-        .as_object()
-        .unwrap()
-        .keys()
+pub(crate) fn keys(value: &Value) -> String {
+    let mut keys: Vec<&str> = (value.as_object().unwrap().keys())
         .map(String::as_str)
         .collect();
     keys.sort_unstable();
-    keys
+    keys.join(" ")
 }
 
-/// Runs a binary in `folder`.
-pub(crate) fn run(binary: &str, folder: &Path, options: &[&str]) -> Output {
+/// Runs a binary in `folder`. White space is between options; `$TLDI_DATA` stands for the folder of test data.
+pub(crate) fn run(binary: &str, folder: &Path, options: &str) -> Output {
+    let data = data_folder();
+    let options = options.split_whitespace();
     Command::new(binary)
         .current_dir(folder)
-        .args(options)
+        .args(options.map(|option| option.replace("$TLDI_DATA", data.to_str().unwrap())))
         .output()
         .unwrap()
 }
 
 /// Runs a binary in `folder` without its pictures and gives its report; it must succeed.
-pub(crate) fn report(binary: &str, folder: &Path, options: &[&str]) -> Value {
-    report_with_pictures(binary, folder, &[options, &["--no-pictures"]].concat())
+pub(crate) fn report(binary: &str, folder: &Path, options: &str) -> Value {
+    report_with_pictures(binary, folder, &format!("{options} --no-pictures"))
 }
 
 /// Runs a binary in `folder` and gives its report; it must succeed.
-pub(crate) fn report_with_pictures(binary: &str, folder: &Path, options: &[&str]) -> Value {
-    let output = run(
-        binary,
-        folder,
-        &[&["--json", "report.json"], options].concat(),
-    );
-    assert!(output.status.success(), "{options:?}: {}", stderr(&output));
+pub(crate) fn report_with_pictures(binary: &str, folder: &Path, options: &str) -> Value {
+    let output = run(binary, folder, &format!("{options} --json report.json"));
+    assert!(output.status.success(), "{options}: {}", stderr(&output));
     json(folder.join("report.json"))
 }
 
@@ -114,13 +135,12 @@ pub(crate) fn report_with_pictures(binary: &str, folder: &Path, options: &[&str]
 pub(crate) fn seeded_report(
     binary: &str,
     folder: &Path,
-    options: &[&str],
-    times: &[&str],
-    frame_times: &[&str],
+    options: &str,
+    times: &str,
+    frame_times: &str,
 ) -> Value {
-    type Run = fn(&str, &Path, &[&str]) -> Value;
-    let run = |report: Run, seed: &str| {
-        let mut report = report(binary, folder, &[options, &["--seed", seed]].concat());
+    let run = |options: String| {
+        let mut report = report_with_pictures(binary, folder, &options);
         without_times(&mut report, times);
         let frames = report.get_mut("frames").and_then(Value::as_array_mut);
         for frame in frames.into_iter().flatten() {
@@ -128,43 +148,44 @@ pub(crate) fn seeded_report(
         }
         report
     };
-    let first = run(report_with_pictures, "1");
-    assert_eq!(run(report, "1"), first);
-    assert_ne!(run(report, "2"), first);
+    let first = run(format!("{options} --seed 1"));
+    let again = |seed| run(format!("{options} --seed {seed} --no-pictures"));
+    assert_eq!(again(1), first);
+    assert_ne!(again(2), first);
     first
 }
 
 /// Keys of a report's times.
-pub(crate) const TIMES: [&str; 2] = ["wall_seconds", "real_time_factor"];
+pub(crate) const TIMES: &str = "wall_seconds real_time_factor";
 
 /// Runs a binary with options that it must refuse: with this exit status, and a message that says so.
-pub(crate) fn assert_refused(binary: &str, folder: &Path, cases: &[(&[&str], i32, &str)]) {
+pub(crate) fn assert_refused(binary: &str, folder: &Path, cases: &[(&str, i32, &str)]) {
     for (options, code, message) in cases {
         let output = run(binary, folder, options);
         let said = stderr(&output);
-        assert_eq!(output.status.code(), Some(*code), "{options:?}: {said}");
-        assert!(said.contains(message), "{options:?}: {said}");
+        assert_eq!(output.status.code(), Some(*code), "{options}: {said}");
+        assert!(said.contains(message), "{options}: {said}");
     }
 }
 
 /// Takes numbers that differ from run to run, as times do, out of a report; they must be above 0.
-pub(crate) fn without_times(report: &mut Value, keys: &[&str]) {
-    for key in keys {
+fn without_times(report: &mut Value, keys: &str) {
+    for key in keys.split_whitespace() {
         assert!(number(&report[key]) > 0.0, "{key}: {}", report[key]);
         report[key] = Value::Null;
     }
 }
 
 /// Asserts that a report has all of these fields.
-pub(crate) fn assert_keys(report: &Value, expected: &[&str]) {
-    for key in expected {
-        assert!(keys(report).contains(key), "{key}");
+pub(crate) fn assert_keys(report: &Value, expected: &str) {
+    for key in expected.split_whitespace() {
+        assert!(report.get(key).is_some(), "{key}");
     }
 }
 
 /// Asserts that these pictures lie in a folder.
-pub(crate) fn assert_pictures(folder: &Path, names: &[&str]) {
-    for name in names {
+pub(crate) fn assert_pictures(folder: &Path, names: &str) {
+    for name in names.split_whitespace() {
         let png = fs::read(folder.join(name)).unwrap();
         assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n", "{name}");
     }
@@ -175,24 +196,36 @@ pub(crate) fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
+/// A place or a direction of a report.
+pub(crate) fn vector(value: &Value) -> [f64; 3] {
+    [0, 1, 2].map(|k| number(&value[k]))
+}
+
+/// A list of a report.
+pub(crate) fn list(value: &Value) -> &[Value] {
+    value.as_array().unwrap()
+}
+
 /// What a run wrote for people, to its standard error.
 pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// Test data that is not part of the project, or `None`, said aloud, where it is not at hand.
+fn data_folder() -> PathBuf {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    std::env::var_os("TLDI_DATA").map_or_else(beside, PathBuf::from)
+}
+
+/// Test data that is not part of the project, or `None`, said aloud, where it is not at hand; a failure where the variable
+/// `TLDI_REQUIRE_DATA` is set.
 pub(crate) fn data(name: &str) -> Option<PathBuf> {
-    let folder = std::env::var("TLDI_DATA").map_or_else(
-        |_| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
-        PathBuf::from,
-    );
-    let path = folder.join(name);
+    let path = data_folder().join(name);
     if path.exists() {
         return Some(path);
     }
-    eprintln!(
-        "SKIPPED: no test data at {} (set TLDI_DATA)",
-        path.display()
-    );
+    let place = path.display();
+    let is_required = std::env::var_os("TLDI_REQUIRE_DATA").is_some();
+    assert!(!is_required, "no test data at {place} (set TLDI_DATA)");
+    eprintln!("SKIPPED: no test data at {place} (set TLDI_DATA)");
     None
 }

@@ -1,10 +1,12 @@
-//! Results as JSON and as a table.
+//! What a run of `drop` found.
 
+use crate::bodies::PlacedBody;
+use crate::output::Report;
 use crate::step_totals::StepTotals;
 use serde::Serialize;
 use std::io::{self, Write};
 
-/// What a run of `drop` found, as written to `--json`.
+/// As written to `--json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct DropReport {
     /// Counts over all steps; contacts are those of any pair.
@@ -19,18 +21,15 @@ pub struct DropReport {
     /// Deepest penetration in metres after the last step.
     pub max_penetration: f32,
     /// The bodies, in the order in which they were inserted.
-    pub bodies: Vec<BodyReport>,
+    pub bodies: Vec<DropBody>,
 }
 
 /// One body after the last step.
 #[derive(Clone, Debug, Serialize)]
-pub struct BodyReport {
-    /// What it is, and its number.
-    pub name: String,
-    /// Number of points.
-    pub points: usize,
-    /// Position of the middle of its bounds, in the frame of the scan, metres.
-    pub translation: [f32; 3],
+pub struct DropBody {
+    /// Its name, its points and where it is.
+    #[serde(flatten)]
+    pub placed: PlacedBody,
     /// Speed in m/s.
     pub linear_speed: f32,
     /// Whether it sleeps.
@@ -47,14 +46,12 @@ impl DropReport {
     /// Names of the bodies that left the scan.
     pub fn lost(&self) -> impl Iterator<Item = &str> {
         let lost = self.bodies.iter().filter(|body| !body.inside_bounds);
-        lost.map(|body| body.name.as_str())
+        lost.map(|lost| lost.placed.name.as_str())
     }
+}
 
-    /// Writes the results as a table for people.
-    ///
-    /// # Errors
-    /// Those of writing.
-    pub fn write_table(&self, out: &mut impl Write) -> io::Result<()> {
+impl Report for DropReport {
+    fn write_table(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(
             out,
             "{:<24} {:>8} {:>10} {:>10} {:>14}  place",
@@ -65,14 +62,15 @@ impl DropReport {
                 Some(seconds) => format!("{seconds:.2} s"),
                 None => "awake".to_owned(),
             };
-            let [x, y, z] = body.translation;
+            let PlacedBody {
+                name,
+                points,
+                translation: [x, y, z],
+            } = &body.placed;
             let lost = if body.inside_bounds { "" } else { "  LOST" };
             writeln!(
                 out,
-                "{:<24} {:>8} {:>10} {:>10.3} {:>14.2}  {x:.2} {y:.2} {z:.2}{lost}",
-                body.name,
-                body.points,
-                asleep,
+                "{name:<24} {points:>8} {asleep:>10} {:>10.3} {:>14.2}  {x:.2} {y:.2} {z:.2}{lost}",
                 body.linear_speed,
                 1e3 * body.max_penetration
             )?;
