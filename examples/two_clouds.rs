@@ -10,7 +10,7 @@ use tldi_examples::load::Located;
 use tldi_examples::pictures::{ANIMATION_SIZE, PICTURE_SIZE};
 use tldi_examples::query::{Answer, CloudQuery};
 use tldi_examples::scene::BodyShape;
-use tldi_examples::{load, output, query_pictures};
+use tldi_examples::{load, output, query_pictures, section_picture};
 
 /// Asks about two clouds once: do they collide, what is the gap, where do they touch
 ///
@@ -123,7 +123,7 @@ fn draw(query: &CloudQuery, answer: &Answer, folder: &Path) -> anyhow::Result<()
     let pictures = [
         ("scene.png", query_pictures::scene(query, answer, &camera)),
         ("layers.png", query_pictures::layers(query, answer)),
-        ("section.png", query_pictures::section(query, answer)),
+        ("section.png", section_picture::section(query, answer)),
         ("zone.png", zone),
         ("pixels.png", query_pictures::contact_pixels(query, answer)),
     ];

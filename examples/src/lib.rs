@@ -26,6 +26,7 @@ pub mod recording;
 pub mod robot;
 pub mod scan;
 pub mod scene;
+pub mod section_picture;
 pub mod spots;
 pub mod step_totals;
 pub mod surface_sampling;
