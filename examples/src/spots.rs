@@ -119,10 +119,14 @@ pub fn find_spots_where(
         .collect())
 }
 
-/// Middles of all discs of `radius` metres on the surfaces of `scan` that face `up` (unit length)
-/// and are level and without holes; each is as high as its disc's highest point. Empty without any.
+/// Middles of discs of `radius` metres on the surfaces of `scan` that face `up` (unit length), are level and have no
+/// holes, with the best tolerance for which there are any; each is as high as its disc's highest point.
 pub fn level_places(scan: &PointCloud<'_>, up: Vec3, radius: f32) -> Vec<Vec3> {
-    HeightMap::of(scan, up, radius).level_places(radius)
+    let map = HeightMap::of(scan, up, radius);
+    (LEVEL_TOLERANCES.iter())
+        .map(|share| map.places_within(radius, share * radius))
+        .find(|places| !places.is_empty())
+        .unwrap_or_default()
 }
 
 /// Heights of the topmost surfaces over a grid of pixels.
@@ -177,15 +181,6 @@ impl HeightMap {
         } else {
             f32::NEG_INFINITY
         }
-    }
-
-    /// Middles of discs of `radius` metres that are seen without holes and level, with the best
-    /// tolerance for which there are any; each is as high as the disc's highest point.
-    fn level_places(&self, radius: f32) -> Vec<Vec3> {
-        (LEVEL_TOLERANCES.iter())
-            .map(|share| self.places_within(radius, share * radius))
-            .find(|places| !places.is_empty())
-            .unwrap_or_default()
     }
 
     /// Middles of discs of `radius` metres that are seen without holes and whose heights differ from
@@ -292,124 +287,4 @@ fn group_score(group: &[Vec3], up: Vec3, body_radius: f32) -> f32 {
         .filter(|pair| pair[1] - pair[0] > body_radius)
         .count();
     group.len() as f32 + 0.3 * steps.min(3) as f32
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use tldi::glamx::Quat;
-
-    /// A square of 3 × 3 m with a hole of 1 m radius in its middle, z up, and a table over part
-    /// of it.
-    fn holed_floor() -> Vec<Vec3> {
-        let mut points = Vec::new();
-        for i in 0..150 {
-            for j in 0..150 {
-                let p = Vec3::new(i as f32 * 0.02 - 1.5, j as f32 * 0.02 - 1.5, 0.0);
-                if p.length() > 1.0 {
-                    points.push(p);
-                }
-            }
-        }
-        points
-    }
-
-    #[test]
-    fn spots_avoid_holes_and_rims_in_any_frame() {
-        let demand = |seed| Demand {
-            count: 4,
-            body_radius: 0.15,
-            seed,
-        };
-        for (seed, rotation) in [
-            (1, Quat::IDENTITY),
-            (2, Quat::from_rotation_x(2.0)),
-            (3, Quat::from_rotation_y(-0.7)),
-        ] {
-            let points: Vec<Vec3> = holed_floor().iter().map(|p| rotation * *p).collect();
-            let scan = PointCloud::builder(points).radius(0.015).build().unwrap();
-            let spots = find_spots(&scan, rotation * Vec3::Z, &demand(seed)).unwrap();
-            assert_eq!(spots.len(), 4);
-            for spot in &spots {
-                let p = rotation.inverse() * spot.surface;
-                // One pixel is 3 cm: the disc may reach that far over a rim, and 3 % of it again.
-                assert!(p.truncate().length() > 1.0 + 0.15 - 0.05, "{p}");
-                assert!(p.truncate().abs().max_element() < 1.5 - 0.15 + 0.05, "{p}");
-                assert!(p.z.abs() < 0.01, "{p}");
-                assert_eq!(spot.level, 0);
-            }
-            for (k, a) in spots.iter().enumerate() {
-                for b in &spots[..k] {
-                    assert!(a.surface.distance(b.surface) >= 0.45 - 1e-4);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn more_bodies_than_places_are_stacked() {
-        let points: Vec<Vec3> = (0..400)
-            .map(|i| Vec3::new((i % 20) as f32 * 0.02, (i / 20) as f32 * 0.02, 1.0))
-            .collect();
-        let scan = PointCloud::builder(points).radius(0.015).build().unwrap();
-        let demand = Demand {
-            count: 3,
-            body_radius: 0.15,
-            seed: 1,
-        };
-        let levels: Vec<usize> = find_spots(&scan, Vec3::Z, &demand)
-            .unwrap()
-            .iter()
-            .map(|spot| spot.level)
-            .collect();
-        assert_eq!(levels, [0, 1, 2]);
-        let error = find_spots(
-            &scan,
-            Vec3::Z,
-            &Demand {
-                body_radius: 0.5,
-                ..demand
-            },
-        )
-        .unwrap_err();
-        assert_eq!(error, NoSpot { diameter: 1.0 });
-    }
-
-    /// Two points far away make the image so large that its pixels are three times as wide: a strip of 90 cm still has
-    /// room for a body of 30 cm, which is eleven of the wanted pixels and five of the larger ones.
-    #[test]
-    fn a_wide_scan_has_places_as_large_as_asked_for() {
-        let mut points: Vec<Vec3> = (0..45 * 150)
-            .map(|k| Vec3::new((k % 45) as f32 * 0.02, (k / 45) as f32 * 0.02, 0.0))
-            .collect();
-        points.extend([-100.0, 100.0].map(|far| Vec3::new(far, far, 0.0)));
-        let scan = PointCloud::builder(points).radius(0.015).build().unwrap();
-        let demand = Demand {
-            count: 2,
-            body_radius: 0.15,
-            seed: 1,
-        };
-        for spot in find_spots(&scan, Vec3::Z, &demand).unwrap() {
-            let p = spot.surface;
-            assert!(
-                (0.15..0.75).contains(&p.x) && (0.15..2.85).contains(&p.y),
-                "{p}"
-            );
-        }
-    }
-
-    #[test]
-    fn nothing_is_dropped_on_a_ceiling() {
-        let mut points = holed_floor();
-        points.extend(holed_floor().iter().map(|p| *p + 2.4 * Vec3::Z));
-        let scan = PointCloud::builder(points).radius(0.015).build().unwrap();
-        let demand = Demand {
-            count: 3,
-            body_radius: 0.15,
-            seed: 1,
-        };
-        for spot in find_spots(&scan, Vec3::Z, &demand).unwrap() {
-            assert!(spot.surface.z < 0.01, "{}", spot.surface);
-        }
-    }
 }
