@@ -2,11 +2,11 @@
 
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
-use tldi::glamx::Vec3;
+use tldi::glamx::{Quat, Vec3};
 use tldi_examples::depth::{RegisteredFrames, camera_up};
 use tldi_examples::load;
 use tldi_examples::scene::BodyShape;
-use tldi_examples::spots::{Demand, find_spots};
+use tldi_examples::spots::{Demand, Spot, find_spots};
 use tldi_sources::depth::{DepthCamera, DepthCloud};
 
 /// Five that were looked at while this was made, and five that were run once it was done.
@@ -18,6 +18,16 @@ const WITH_BODIES: [u64; 4] = [1, 2, 101, 102];
 fn seen(frames: &RegisteredFrames) -> DepthCloud {
     let mut camera = DepthCamera::new(frames.intrinsics(), frames.model);
     camera.points(&frames.depths(0), &frames.world_from_camera)
+}
+
+/// A scene and its seed.
+fn plain(seed: u64) -> (u64, RegisteredFrames) {
+    (seed, RegisteredFrames::new(seed))
+}
+
+/// The same with three fifths of the pixels empty.
+fn empty(seed: u64) -> (u64, RegisteredFrames) {
+    (seed, RegisteredFrames::with_empty(seed, 0.6))
 }
 
 /// The pixel that shows a point.
@@ -33,14 +43,8 @@ fn pixel(frames: &RegisteredFrames, point: Vec3) -> usize {
 /// Within 15° at the 90th percentile, 16° where three fifths of the pixels are empty; as good as none of what flies is kept.
 #[test]
 fn normals_and_up_are_near_the_truth() {
-    let plain = SEEDS
-        .iter()
-        .map(|&seed| (seed, RegisteredFrames::new(seed)));
-    // Three fifths of the pixels are empty.
-    let empty = SEEDS
-        .iter()
-        .map(|&seed| (seed, RegisteredFrames::with_empty(seed, 0.6)));
-    for (seed, frames) in plain.chain(empty) {
+    let seeds = || SEEDS.into_iter();
+    for (seed, frames) in seeds().map(plain).chain(seeds().map(empty)) {
         let cloud = seen(&frames);
         let truth = frames.truth();
         let mut errors = Vec::new();
@@ -52,8 +56,7 @@ fn normals_and_up_are_near_the_truth() {
             off_surface += usize::from((z - pixel.depth).abs() > 6.0 * frames.model.deviation(z));
         }
         errors.sort_unstable_by(f32::total_cmp);
-        let [median, tenth_worst] =
-            [1, 9].map(|k| errors[(errors.len() - 1) * if k == 1 { 5 } else { k } / 10]);
+        let [median, tenth_worst] = [5, 9].map(|tenths| errors[(errors.len() - 1) * tenths / 10]);
         let empty = cloud.empty as f32 / truth.len() as f32;
         let up = camera_up(&cloud.normals, &frames.world_from_camera).unwrap();
         let up_error = up.direction.angle_between(Vec3::Z).to_degrees();
@@ -98,7 +101,37 @@ struct Rest {
     depth: f32,
 }
 
-/// Three bodies on the frames of a scene: clouds, or balls and boxes of rapier.
+/// Three bodies over their spots: clouds, or balls and boxes of rapier.
+fn dropped(
+    world: &mut PhysicsWorld,
+    tldi: &TldiPipeline,
+    spots: &[Spot],
+    are_clouds: bool,
+) -> Vec<(RigidBodyHandle, ColliderHandle)> {
+    let shapes = [BodyShape::RoundedBox, BodyShape::Pebble, BodyShape::Star];
+    let half = 0.4 * BODY_SIZE;
+    let upright = Quat::from_rotation_arc(Vec3::Y, Vec3::Z);
+    let drop = |(k, spot): (usize, &Spot)| {
+        let (collider, height) = if are_clouds {
+            let body = load::body_from_surface(shapes[k].sample(0.03, 1)).unwrap();
+            let body = load::resized(&body, BODY_SIZE).unwrap();
+            let height = 0.5 * body.bounds().extents().y;
+            (tldi.collider(body), height)
+        } else if k == 1 {
+            (ColliderBuilder::ball(half), half)
+        } else {
+            (ColliderBuilder::cuboid(half, 0.6 * half, half), 0.6 * half)
+        };
+        let place = spot.surface + (height + 0.03) * Vec3::Z;
+        let body = RigidBodyBuilder::dynamic()
+            .pose(Pose::from_parts(place, upright))
+            .angular_damping(1.0);
+        world.insert(body, collider.density(300.0))
+    };
+    spots.iter().enumerate().map(drop).collect()
+}
+
+/// How three bodies rest on the frames of a scene.
 fn rests(frames: &RegisteredFrames, are_clouds: bool) -> Vec<Rest> {
     let mut camera = DepthCamera::new(frames.intrinsics(), frames.model);
     let mut cloud_of = |frame: usize| {
@@ -121,29 +154,7 @@ fn rests(frames: &RegisteredFrames, are_clouds: bool) -> Vec<Rest> {
     let spots = find_spots(&first, Vec3::Z, &demand).unwrap();
     assert!(spots.iter().all(|spot| spot.level == 0), "{spots:?}");
     let (_, surface) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(first).density(0.0));
-    let shapes = [BodyShape::RoundedBox, BodyShape::Pebble, BodyShape::Star];
-    let half = 0.4 * BODY_SIZE;
-    let bodies: Vec<_> = (0..3)
-        .map(|k| {
-            let (collider, height) = if are_clouds {
-                let body = load::body_from_surface(shapes[k].sample(0.03, 1)).unwrap();
-                let body = load::resized(&body, BODY_SIZE).unwrap();
-                let height = 0.5 * body.bounds().extents().y;
-                (tldi.collider(body), height)
-            } else if k == 1 {
-                (ColliderBuilder::ball(half), half)
-            } else {
-                (ColliderBuilder::cuboid(half, 0.6 * half, half), 0.6 * half)
-            };
-            let upright = tldi::glamx::Quat::from_rotation_arc(Vec3::Y, Vec3::Z);
-            let place = spots[k].surface + (height + 0.03) * Vec3::Z;
-            let body = RigidBodyBuilder::dynamic()
-                .pose(Pose::from_parts(place, upright))
-                .angular_damping(1.0);
-            let (handle, collider) = world.insert(body, collider.density(300.0));
-            (handle, collider)
-        })
-        .collect();
+    let bodies = dropped(&mut world, &tldi, &spots, are_clouds);
     let camera_from_world = frames.world_from_camera.inverse();
     let mut landed = [Vec3::ZERO; 3];
     let mut deepest = [0.0_f32; 3];
@@ -153,46 +164,39 @@ fn rests(frames: &RegisteredFrames, are_clouds: bool) -> Vec<Rest> {
         for _ in 0..STEPS_PER_FRAME {
             tldi.step(&mut world).unwrap();
         }
+        if frame < FRAMES / 4 {
+            continue;
+        }
         if frame == FRAMES / 4 {
             landed = std::array::from_fn(|k| world.bodies[bodies[k].0].translation());
         }
-        if frame >= FRAMES / 4 {
-            for contact in tldi.contacts(&world.narrow_phase, &world.colliders) {
-                let sigma = frames
-                    .model
-                    .deviation((camera_from_world * contact.point).z);
-                for (k, (_, collider)) in bodies.iter().enumerate() {
-                    if [contact.collider1, contact.collider2].contains(collider) {
-                        deepest[k] = deepest[k].max(contact.depth / sigma);
-                    }
+        for contact in tldi.contacts(&world.narrow_phase, &world.colliders) {
+            let depth_in_image = (camera_from_world * contact.point).z;
+            let depth = contact.depth / frames.model.deviation(depth_in_image);
+            for (deepest, (_, collider)) in deepest.iter_mut().zip(&bodies) {
+                if [contact.collider1, contact.collider2].contains(collider) {
+                    *deepest = deepest.max(depth);
                 }
             }
         }
     }
-    (bodies.iter().enumerate())
-        .map(|(k, (handle, _))| {
-            let body = &world.bodies[*handle];
-            Rest {
-                speed: body.linvel().length(),
-                moved: body.translation().distance(landed[k]),
-                depth: deepest[k],
-            }
-        })
-        .collect()
+    let rest = |(k, (handle, _)): (usize, &(RigidBodyHandle, ColliderHandle))| {
+        let body = &world.bodies[*handle];
+        Rest {
+            speed: body.linvel().length(),
+            moved: body.translation().distance(landed[k]),
+            depth: deepest[k],
+        }
+    };
+    bodies.iter().enumerate().map(rest).collect()
 }
 
 /// All of 3 bodies for each seed, as clouds and as rapier's own shapes.
 #[test]
 fn bodies_rest_within_two_seconds() {
     let mut restless = Vec::new();
-    let empty = WITH_BODIES
-        .iter()
-        .step_by(2)
-        .map(|&seed| (seed, RegisteredFrames::with_empty(seed, 0.6)));
-    let plain = WITH_BODIES
-        .iter()
-        .map(|&seed| (seed, RegisteredFrames::new(seed)));
-    for (seed, frames) in plain.chain(empty) {
+    let seeds = || WITH_BODIES.into_iter();
+    for (seed, frames) in seeds().map(plain).chain(seeds().step_by(2).map(empty)) {
         for are_clouds in [true, false] {
             for rest in rests(&frames, are_clouds) {
                 eprintln!("seed {seed}, clouds {are_clouds}: {rest:?}");

@@ -1,12 +1,13 @@
 //! A generated depth sequence: a camera over a low table, across which a ball is moved.
 
+use super::pinhole::{self, SIZE, ray};
 use crate::random;
 use crate::rays::{distance_to_box, distance_to_ground};
 use crate::spots::Spot;
 use fastrand::Rng;
 use rayon::prelude::*;
+use tldi::Aabb;
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{Aabb, VirtualCamera};
 use tldi_sources::depth::{Intrinsics, SensorModel};
 
 /// Where the camera is and what it looks at, metres; z is up.
@@ -19,9 +20,6 @@ const BALL_RADIUS: f32 = 0.11;
 const SWING: f32 = 0.8;
 /// Part of the sequence in which nothing moves, so that bodies come to rest.
 const STILL: f32 = 0.4;
-/// Columns and rows, focal length in pixels.
-const SIZE: [usize; 2] = [640, 480];
-const FOCAL: f32 = 560.0;
 
 /// The camera of the generated sequence.
 #[derive(Clone, Copy, Debug)]
@@ -53,19 +51,12 @@ impl GeneratedCamera {
 
     /// Geometry of the camera.
     pub fn intrinsics(&self) -> Intrinsics {
-        Intrinsics {
-            size: SIZE,
-            focal: [FOCAL; 2],
-            center: SIZE.map(|n| 0.5 * n as f32 - 0.5),
-            depth_unit: 0.001,
-        }
+        pinhole::intrinsics(0.001)
     }
 
     /// From the frame of the camera into that of the world.
     pub fn world_from_camera() -> Pose3 {
-        let size = SIZE.map(|n| n as u32);
-        let camera = VirtualCamera::perspective(EYE, TARGET, Vec3::Z, 1.0, size, 0.1, 10.0);
-        camera.view_from_frame.inverse()
+        pinhole::world_from_camera(EYE, TARGET, Vec3::Z)
     }
 
     /// Where the ball is in a frame: it waits beside the table, then goes across it and back.
@@ -79,17 +70,13 @@ impl GeneratedCamera {
     /// The depth image of a frame, with the noise of [`SensorModel`] and rounded to millimetres.
     pub fn depths(&self, frame: usize) -> Vec<u16> {
         let pose = Self::world_from_camera();
-        let intrinsics = self.intrinsics();
         let ball = self.ball(frame);
         let model = SensorModel::default();
         let row = |v: usize| {
             let mut rng = Rng::with_seed(self.seed ^ ((frame * SIZE[1] + v) as u64) << 8);
             (0..SIZE[0])
                 .map(|u| {
-                    let [x, y] = [(u, 0), (v, 1)]
-                        .map(|(pixel, axis)| (pixel as f32 - intrinsics.center[axis]) / FOCAL);
-                    let direction = pose.rotation * Vec3::new(x, y, 1.0);
-                    // The ray's parameter is the depth: its direction is 1 along the camera's z.
+                    let direction = ray([u, v], &pose);
                     let depth = nearest(pose.translation, direction, ball);
                     let seen = depth + random::normal(&mut rng) * model.deviation(depth);
                     if seen < model.range[1] {

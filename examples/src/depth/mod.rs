@@ -2,6 +2,7 @@
 
 mod camera_up;
 mod generated;
+mod pinhole;
 mod placing;
 mod registered;
 mod report;

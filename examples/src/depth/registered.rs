@@ -1,16 +1,14 @@
 //! Generated depth frames with all that is wrong with real ones, and the truth: a room with a table and
 //! boxes, seen by a camera whose frames are registered to another one.
 
+use super::pinhole::{self, SIZE, ray};
 use crate::random::between;
 use crate::rays::crossing;
 use fastrand::Rng;
+use tldi::Aabb;
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{Aabb, VirtualCamera};
 use tldi_sources::depth::{Intrinsics, SensorModel};
 
-/// Columns and rows, focal length in pixels.
-const SIZE: [usize; 2] = [640, 480];
-const FOCAL: f32 = 560.0;
 /// Half the width and depth of the room, its height, metres; z is up.
 const ROOM: Vec3 = Vec3::new(2.2, 1.9, 2.5);
 /// Difference of depth, metres, from which on a pixel may mix what is before and behind.
@@ -53,10 +51,7 @@ impl RegisteredFrames {
         let dropped = 0.3 * rng.f32();
         let truth = (0..SIZE[0] * SIZE[1])
             .map(|k| {
-                let [x, y] = [(k % SIZE[0], 0), (k / SIZE[0], 1)]
-                    .map(|(at, axis)| (at as f32 - (0.5 * SIZE[axis] as f32 - 0.5)) / FOCAL);
-                // The ray's parameter is the depth: its direction is 1 along the camera's z.
-                let direction = world_from_camera.rotation * Vec3::new(x, y, 1.0);
+                let direction = ray([k % SIZE[0], k / SIZE[0]], &world_from_camera);
                 nearest(&blocks, eye, direction)
             })
             .collect();
@@ -82,12 +77,7 @@ impl RegisteredFrames {
 
     /// Geometry of the camera.
     pub fn intrinsics(&self) -> Intrinsics {
-        Intrinsics {
-            size: SIZE,
-            focal: [FOCAL; 2],
-            center: SIZE.map(|n| 0.5 * n as f32 - 0.5),
-            depth_unit: self.model.step,
-        }
+        pinhole::intrinsics(self.model.step)
     }
 
     /// What the pixels really see, row by row.
@@ -172,9 +162,7 @@ fn before(table: &Aabb, rng: &mut Rng) -> (Vec3, Pose3) {
     );
     let target = Vec3::new(0.0, table.min.y + 0.3, table.max.z - within(0.0, 0.2));
     let upper = (Vec3::Z + within(-0.08, 0.08) * Vec3::X).normalize();
-    let size = SIZE.map(|n| n as u32);
-    let camera = VirtualCamera::perspective(eye, target, upper, 1.0, size, 0.1, 10.0);
-    (eye, camera.view_from_frame.inverse())
+    (eye, pinhole::world_from_camera(eye, target, upper))
 }
 
 /// Where a ray first meets a block or the room from within.
