@@ -174,10 +174,9 @@ fn simulate(
 ) -> anyhow::Result<Vec<DepthSnapshot>> {
     let held = (args.hold / FRAME_SECONDS).round() as usize;
     let all = held + source.count();
-    let bar = output::progress_bar(all, "frames");
     let mut snapshots = vec![simulation.snapshot(1)?];
     let order = std::iter::repeat_n(0, held).chain(0..source.count());
-    for (k, index) in order.enumerate() {
+    for (k, index) in output::with_progress(order.enumerate(), "frames") {
         let frame = source.frame(index)?;
         (simulation.take_frame(&frame)).with_context(|| format!("{} failed", frame.name))?;
         if let Some(recording) = &mut recording {
@@ -197,9 +196,7 @@ fn simulate(
         } else if args.animate && k % ANIMATION_FRAMES == 0 {
             snapshots.push(simulation.snapshot(ANIMATION_POINT_STEP)?);
         }
-        bar.inc(1);
     }
-    bar.finish_and_clear();
     Ok(snapshots)
 }
 

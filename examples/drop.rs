@@ -4,8 +4,8 @@ use anyhow::{Context, bail};
 use clap::Parser;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use tldi::VirtualCamera;
 use tldi::glamx::Vec3;
-use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::bodies::NamedCloud;
 use tldi_examples::cli::{Common, ended, positive};
 use tldi_examples::drop::{DropReport, DropSimulation, Snapshot};
@@ -91,46 +91,42 @@ fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn load_bodies(args: &Args, scan_radius: f32) -> anyhow::Result<Vec<NamedCloud>> {
-    let kinds: Vec<(String, PointCloud<'static>)> = match &args.body {
+    let mut kinds = match &args.body {
         Some(path) => {
             eprintln!("reading {}", path.display());
-            vec![(load::stem(path), load::body_from_file(path)?.cloud)]
+            let (name, cloud) = (load::stem(path), load::body_from_file(path)?.cloud);
+            vec![NamedCloud { name, cloud }]
         }
         None => (BodyShape::ALL.into_iter())
             .map(|shape| {
                 let surface = shape.sample(BODY_SPACING, args.common.seed);
-                Ok((shape.name().to_owned(), load::body_from_surface(surface)?))
+                let (name, cloud) = (shape.name().to_owned(), load::body_from_surface(surface)?);
+                Ok(NamedCloud { name, cloud })
             })
             .collect::<anyhow::Result<_>>()?,
     };
-    let mut bodies = Vec::new();
-    for (name, cloud) in kinds {
+    for NamedCloud { name, cloud } in &mut kinds {
         let file_size = cloud.bounds().extents().max_element();
         if !(file_size.is_finite() && file_size > 0.0) {
             bail!("the body {name} has no extent: all its points coincide");
         }
         // Generated bodies have no size of their own: an extent that is taken for none.
-        let own_size = if args.body.is_some() {
-            file_size
-        } else {
-            f32::INFINITY
+        let own_size = match args.body {
+            Some(_) => file_size,
+            None => f32::INFINITY,
         };
-        let size = args
-            .size
-            .unwrap_or_else(|| load::default_size(own_size, scan_radius));
-        eprintln!(
-            "{name}: {} points, {file_size:.3} in its file, {size:.3} m here",
-            cloud.len()
-        );
-        bodies.push((name, load::resized(&cloud, size)?));
+        let default_size = || load::default_size(own_size, scan_radius);
+        let size = args.size.unwrap_or_else(default_size);
+        let points = cloud.len();
+        eprintln!("{name}: {points} points, {file_size:.3} in its file, {size:.3} m here");
+        *cloud = load::resized(cloud, size)?;
     }
-    let count = usize::from(args.count);
-    Ok((bodies.iter().cycle().take(count).enumerate())
-        .map(|(k, (name, cloud))| NamedCloud {
-            name: format!("{name} {}", k + 1),
-            cloud: cloud.clone(),
-        })
-        .collect())
+    let numbered = |(k, NamedCloud { name, cloud }): (usize, &NamedCloud)| NamedCloud {
+        name: format!("{name} {}", k + 1),
+        cloud: cloud.clone(),
+    };
+    let all = kinds.iter().cycle().take(args.count.into());
+    Ok(all.enumerate().map(numbered).collect())
 }
 
 /// What is drawn of a run.
@@ -144,11 +140,10 @@ struct Run {
 /// Takes all steps.
 fn simulate(simulation: &mut DropSimulation, args: &Args) -> anyhow::Result<Run> {
     let steps = args.steps;
-    let bar = output::progress_bar(steps, "steps");
     let initial = simulation.snapshot();
     let mut mid = initial.clone();
     let mut motion: Vec<Snapshot> = args.animate.then(|| initial.clone()).into_iter().collect();
-    for step in 1..=steps {
+    for step in output::with_progress(1..=steps, "steps") {
         (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
         if step == MID_STEP.min(steps) {
             mid = simulation.snapshot();
@@ -156,9 +151,7 @@ fn simulate(simulation: &mut DropSimulation, args: &Args) -> anyhow::Result<Run>
         if args.animate && step <= ANIMATION_END && step % ANIMATION_STEPS == 0 {
             motion.push(simulation.snapshot());
         }
-        bar.inc(1);
     }
-    bar.finish_and_clear();
     Ok(Run {
         stills: [initial, mid, simulation.snapshot()],
         motion,

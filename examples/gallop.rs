@@ -154,8 +154,7 @@ fn load_runner(args: &Args) -> anyhow::Result<Runner> {
             points.points()
         );
     }
-    Runner::with_faces(points, mesh.faces)
-        .with_context(|| format!("cannot use the faces of {}", path.display()))
+    Ok(Runner::with_faces(points, mesh.faces))
 }
 
 /// Takes all steps; snapshots before the first, in the middle and after the last or, for an
@@ -166,10 +165,9 @@ fn simulate(
     animate: bool,
     mut recording: Option<Recording>,
 ) -> anyhow::Result<Vec<GallopSnapshot>> {
-    let bar = output::progress_bar(steps, "steps");
     let mut snapshots = vec![simulation.snapshot()];
     let mut middle: Option<GallopSnapshot> = None;
-    for step in 1..=steps {
+    for step in output::with_progress(1..=steps, "steps") {
         (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
         if let Some(recording) = &mut recording {
             let snapshot = simulation.snapshot();
@@ -191,9 +189,7 @@ fn simulate(
                 middle = Some(snapshot);
             }
         }
-        bar.inc(1);
     }
-    bar.finish_and_clear();
     snapshots.push(simulation.snapshot());
     let place = snapshots.len() / 2;
     snapshots.insert(place, middle.unwrap_or_else(|| simulation.snapshot()));

@@ -9,10 +9,10 @@ use tldi::glamx::Vec3;
 use tldi::{KdTree, PointCloud};
 use tldi_examples::bodies::NamedCloud;
 use tldi_examples::cli::{Common, UpChoice, ended, positive};
-use tldi_examples::lidar::{LidarReport, LidarScene, LidarSimulation, Scanner, Sweep, SweepSource};
+use tldi_examples::lidar::{LidarReport, LidarSimulation, Scanner, Sweep, SweepSource};
 use tldi_examples::pictures::{self, PICTURE_SIZE};
 use tldi_examples::scene::BodyShape;
-use tldi_examples::spots::{Demand, find_spots};
+use tldi_examples::spots::{Demand, Spot, find_spots};
 use tldi_examples::{load, output};
 use tldi_pictures::{BODY_COLORS, Item, viewpoint};
 
@@ -69,15 +69,15 @@ fn run(args: &Args) -> anyhow::Result<()> {
         None => SweepSource::Generated(Scanner::new(args.count.get(), args.common.seed)),
     };
     let count = source.count().min(args.count.get());
-    let scene = scene(args, [&source.sweep(0)?, &source.sweep(count - 1)?])?;
-    let mut simulation = LidarSimulation::new(scene, args.common.backend.open()?)?;
-    let bar = output::progress_bar(count, "sweeps");
-    for index in 0..count {
+    let (first, last) = (source.sweep(0)?, source.sweep(count - 1)?);
+    let up = (args.up).or_else(|| first.world_from_scanner.rotation * Vec3::Z);
+    let (bodies, spots) = place_bodies(args, up, [&first, &last])?;
+    let backend = args.common.backend.open()?;
+    let mut simulation = LidarSimulation::new(bodies, &spots, up, args.range, backend)?;
+    for index in output::with_progress(0..count, "sweeps") {
         let sweep = source.sweep(index)?;
         (simulation.take(&sweep)).with_context(|| format!("sweep {} failed", sweep.name))?;
-        bar.inc(1);
     }
-    bar.finish_and_clear();
     let report = simulation.report();
     output::publish(&report, source.origin(), args.common.json.as_deref())?;
     if !args.common.no_pictures {
@@ -93,8 +93,11 @@ fn run(args: &Args) -> anyhow::Result<()> {
 
 /// Bodies, and places for them that the first and the last sweep see: where the scanner drives, it loses
 /// sight of the ground.
-fn scene(args: &Args, [first, last]: [&Sweep; 2]) -> anyhow::Result<LidarScene> {
-    let up = (args.up).or_else(|| first.world_from_scanner.rotation * Vec3::Z);
+fn place_bodies(
+    args: &Args,
+    up: Vec3,
+    [first, last]: [&Sweep; 2],
+) -> anyhow::Result<(Vec<NamedCloud>, Vec<Spot>)> {
     let (first, last) = (near(args, first)?, near(args, last)?);
     let in_last = KdTree::new(&last);
     let stays = |i: &usize| {
@@ -111,12 +114,8 @@ fn scene(args: &Args, [first, last]: [&Sweep; 2]) -> anyhow::Result<LidarScene> 
         body_radius: 0.5 * args.size,
         seed,
     };
-    Ok(LidarScene {
-        bodies,
-        spots: find_spots(&seen, up, &demand)?,
-        up,
-        range: args.range,
-    })
+    let spots = find_spots(&seen, up, &demand)?;
+    Ok((bodies, spots))
 }
 
 /// What a sweep sees near the scanner, in the frame of the world.

@@ -138,7 +138,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
         robot,
     };
     let mut simulation = RobotSimulation::new(scene, args.common.backend.open()?)?;
-    if simulation.tip().is_none() && simulation.report().driven_joints == 0 {
+    if simulation.report().driven_joints == 0 {
         eprintln!("the robot has no joint that moves: it just stands there");
     }
     let mut recording = args.recording.start("robot_in_scan", up)?;
@@ -196,10 +196,9 @@ fn simulate(
         _ => ENDLESS_SECONDS,
     };
     let steps = steps.unwrap_or((seconds / DT).ceil() as usize);
-    let bar = output::progress_bar(steps, "steps");
     let mut snapshots = vec![simulation.snapshot()];
     let mut hardest = (0.0, simulation.snapshot());
-    for step in 1..=steps {
+    for step in output::with_progress(1..=steps, "steps") {
         (simulation.step()).with_context(|| format!("step {step} of {steps} failed"))?;
         if let Some(recording) = &mut recording {
             let snapshot = simulation.snapshot();
@@ -216,9 +215,7 @@ fn simulate(
             snapshots.push(simulation.snapshot());
             break;
         }
-        bar.inc(1);
     }
-    bar.finish_and_clear();
     Ok((snapshots, hardest.1))
 }
 

@@ -39,7 +39,17 @@ pub struct ByKind<T> {
     pub resting: T,
 }
 
-impl<T> ByKind<T> {
+impl<T: Copy> ByKind<T> {
+    /// What is for each kind, and its name.
+    pub(crate) fn each(&self) -> [(&'static str, T); 4] {
+        [
+            ("scripted", self.scripted),
+            ("squeezed", self.squeezed),
+            ("pushed", self.pushed),
+            ("resting", self.resting),
+        ]
+    }
+
     /// What is for contacts of a kind.
     pub fn of(&mut self, kind: Kind) -> &mut T {
         match kind {
@@ -135,13 +145,13 @@ impl ContactKinds {
 
     /// Writes a line for each kind, for people.
     pub(crate) fn write_lines(&self, out: &mut dyn Write) -> io::Result<()> {
-        let kinds = [
-            ("scripted, neither gives way", self.deepest.scripted),
-            ("squeezed between the two", self.deepest.squeezed),
-            ("pushed by what moves in", self.deepest.pushed),
-            ("resting and others", self.deepest.resting),
+        let more = [
+            ", neither gives way",
+            " between the two",
+            " by what moves in",
+            " and others",
         ];
-        for (name, worst) in kinds {
+        for ((name, worst), more) in self.deepest.each().into_iter().zip(more) {
             match worst {
                 Some(WorstContact {
                     depth,
@@ -149,10 +159,10 @@ impl ContactKinds {
                     step,
                 }) => writeln!(
                     out,
-                    "deepest {name}: {:.2} mm at {x:.3},{y:.3},{z:.3} in step {step}",
+                    "deepest {name}{more}: {:.2} mm at {x:.3},{y:.3},{z:.3} in step {step}",
                     1e3 * depth
                 )?,
-                None => writeln!(out, "deepest {name}: none")?,
+                None => writeln!(out, "deepest {name}{more}: none")?,
             }
         }
         Ok(())
@@ -178,57 +188,48 @@ mod tests {
             normal,
             depth,
         };
-        let worst = |depth: f32, step| {
-            let position = [depth, 0.0, 0.0];
-            Some(WorstContact {
-                depth,
-                position,
-                step,
-            })
-        };
-        let mut kinds = ContactKinds::default();
+        // By steps: contacts, whether what comes from the side has just moved there, and the deepest since then: scripted,
+        // squeezed, pushed and resting, each with its step.
         let on_ground = contact(ground, body, Vec3::Y, 0.01);
         let stamped = contact(ground, hoof, Vec3::Y, 0.3);
-        let still = |_: &CloudContact| false;
-        kinds.count(1, &[on_ground, stamped], &world, still);
         let gap = contact(ground, body, Vec3::Y, -0.01);
-        kinds.count(2, &[gap], &world, still);
-        assert_eq!(
-            (kinds.deepest.scripted, kinds.deepest.resting),
-            (worst(0.3, 1), worst(0.01, 1))
-        );
-        assert_eq!(kinds.deepest.squeezed, None);
         // The hoof comes from above: its normal leads from the hoof down into the body.
         let under_hoof = contact(hoof, body, -Vec3::Y, 0.2);
-        kinds.count(3, &[on_ground, under_hoof], &world, still);
-        assert_eq!(
-            (kinds.deepest.squeezed, kinds.deepest.resting),
-            (worst(0.2, 3), worst(0.01, 1))
-        );
-        assert_eq!(kinds.deepest.pushed, None);
         // Something comes from the side: the body is not only resting, wherever it touches.
         let from_side = contact(ground, body, Vec3::X, 0.1);
-        let comes = |c: &CloudContact| c.normal == Vec3::X;
-        kinds.count(4, &[on_ground, from_side], &world, comes);
-        assert_eq!(
-            (kinds.deepest.pushed, kinds.deepest.resting),
-            (worst(0.1, 4), worst(0.01, 1))
-        );
         // What came stands still, and the body is still inside, even deeper: it is not resting yet.
         let deeper = contact(ground, body, Vec3::X, 0.12);
-        kinds.count(5, &[on_ground, deeper], &world, still);
-        assert_eq!(
-            (kinds.deepest.pushed, kinds.deepest.resting),
-            (worst(0.12, 5), worst(0.01, 1))
-        );
         // It is out when all that is left is what rapier leaves, a millimetre, and rests from then on.
         let left = contact(ground, body, Vec3::Y, 0.0009);
-        kinds.count(6, &[left], &world, still);
         let again = contact(ground, body, Vec3::Y, 0.02);
-        kinds.count(7, &[again], &world, still);
-        assert_eq!(
-            (kinds.deepest.pushed, kinds.deepest.resting),
-            (worst(0.12, 5), worst(0.02, 7))
-        );
+        let (stamp, rest) = (Some((0.3, 1)), Some((0.01, 1)));
+        let (squeeze, push) = (Some((0.2, 3)), Some((0.12, 5)));
+        let steps = [
+            (vec![on_ground, stamped], false, [stamp, None, None, rest]),
+            (vec![gap], false, [stamp, None, None, rest]),
+            (
+                vec![on_ground, under_hoof],
+                false,
+                [stamp, squeeze, None, rest],
+            ),
+            (
+                vec![on_ground, from_side],
+                true,
+                [stamp, squeeze, Some((0.1, 4)), rest],
+            ),
+            (vec![on_ground, deeper], false, [stamp, squeeze, push, rest]),
+            (vec![left], false, [stamp, squeeze, push, rest]),
+            (vec![again], false, [stamp, squeeze, push, Some((0.02, 7))]),
+        ];
+        let mut kinds = ContactKinds::default();
+        for (k, (contacts, has_moved, expected)) in steps.into_iter().enumerate() {
+            let moved_in = |c: &CloudContact| has_moved && c.normal == Vec3::X;
+            kinds.count(k + 1, &contacts, &world, moved_in);
+            let found = kinds.deepest.each().map(|(_, worst)| worst);
+            let told = found.map(|worst| worst.map(|worst| (worst.depth, worst.step)));
+            assert_eq!(told, expected, "step {}", k + 1);
+            let mut places = found.into_iter().flatten();
+            assert!(places.all(|w| w.position == [w.depth, 0.0, 0.0]));
+        }
     }
 }

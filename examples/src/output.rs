@@ -1,27 +1,23 @@
 //! Files, folders and progress on a terminal.
 
 use anyhow::Context;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use serde::Serialize;
 use std::fs::OpenOptions;
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, Write};
 use std::path::Path;
 use tldi::glamx::DVec3;
 use tldi_pictures::{Picture, animation};
 
-/// A progress bar over `length` of `things` (a plural) on a terminal; hidden elsewhere.
-pub fn progress_bar(length: usize, things: &str) -> ProgressBar {
-    let bar = if io::stderr().is_terminal() {
-        ProgressBar::new(length as u64)
-    } else {
-        ProgressBar::hidden()
-    };
-    let template = format!("{{bar:40}} {{pos}}/{{len}} {things}, {{eta}} left");
+/// Goes through `things`, a progress bar on a terminal meanwhile; `plural` is what they are called.
+pub fn with_progress<T>(things: impl Iterator<Item = T>, plural: &str) -> impl Iterator<Item = T> {
+    let bar = ProgressBar::new(things.size_hint().0 as u64).with_finish(ProgressFinish::AndClear);
+    let template = format!("{{bar:40}} {{pos}}/{{len}} {plural}, {{eta}} left");
     // Only a broken template fails; the bar then keeps its own.
     if let Ok(style) = ProgressStyle::with_template(&template) {
         bar.set_style(style);
     }
-    bar
+    bar.wrap_iter(things)
 }
 
 fn make_folder(path: &Path) -> anyhow::Result<()> {
@@ -59,9 +55,8 @@ pub fn write_animation(
     held: usize,
     pictures: impl Iterator<Item = anyhow::Result<Picture>>,
 ) -> anyhow::Result<()> {
-    let bar = progress_bar(pictures.size_hint().0, "pictures");
-    let mut pictures: Vec<Picture> = pictures.inspect(|_| bar.inc(1)).collect::<Result<_, _>>()?;
-    bar.finish_and_clear();
+    let mut pictures: Vec<Picture> =
+        with_progress(pictures, "pictures").collect::<Result<_, _>>()?;
     let last = pictures.last().cloned();
     pictures.extend(std::iter::repeat_n(last, held).flatten());
     let bytes = animation::to_apng(&pictures, seconds)?;

@@ -94,72 +94,52 @@ fn limb_poses(limbs: &[Limb], frame: usize) -> Vec<Pose3> {
     poses
 }
 
-fn limbs() -> Vec<Limb> {
-    let limb =
-        |parent, joint: [f32; 3], end: [f32; 3], radius, [turn, swing, phase]: [f32; 3]| Limb {
-            ends: [Vec3::ZERO, Vec3::from(end)],
-            radius,
-            parent,
-            joint: Vec3::from(joint),
-            turn,
+/// A limb that does not swing, from its joint to `end`.
+fn limb(parent: Option<usize>, joint: [f32; 3], end: [f32; 3], radius: f32) -> Limb {
+    Limb {
+        ends: [Vec3::ZERO, Vec3::from(end)],
+        radius,
+        parent,
+        joint: Vec3::from(joint),
+        turn: 0.0,
+        swing: 0.0,
+        phase: 0.0,
+    }
+}
+
+impl Limb {
+    fn swinging(self, swing: f32, phase: f32) -> Self {
+        Self {
             swing,
             phase,
-        };
+            ..self
+        }
+    }
+}
+
+fn limbs() -> Vec<Limb> {
     let mut limbs = vec![
-        limb(None, [0.0; 3], [0.0001, 0.0, 0.0], 0.01, [0.0, 0.07, 0.25]),
-        limb(
-            Some(0),
-            [-0.38, 0.0, 0.0],
-            [0.76, 0.03, 0.0],
-            0.17,
-            [0.0; 3],
-        ),
+        // What carries the others, and the trunk.
+        limb(None, [0.0; 3], [0.0001, 0.0, 0.0], 0.01).swinging(0.07, 0.25),
+        limb(Some(0), [-0.38, 0.0, 0.0], [0.76, 0.03, 0.0], 0.17),
         // Neck, head and tail.
-        limb(
-            Some(0),
-            [0.42, 0.08, 0.0],
-            [0.27, 0.34, 0.0],
-            0.085,
-            [0.0, 0.15, 0.6],
-        ),
-        limb(
-            Some(2),
-            [0.27, 0.34, 0.0],
-            [0.2, -0.12, 0.0],
-            0.07,
-            [0.0, 0.1, 0.2],
-        ),
-        limb(
-            Some(0),
-            [-0.5, 0.06, 0.0],
-            [-0.3, -0.1, 0.0],
-            0.035,
-            [0.0, 0.3, 0.1],
-        ),
+        limb(Some(0), [0.42, 0.08, 0.0], [0.27, 0.34, 0.0], 0.085).swinging(0.15, 0.6),
+        limb(Some(2), [0.27, 0.34, 0.0], [0.2, -0.12, 0.0], 0.07).swinging(0.1, 0.2),
+        limb(Some(0), [-0.5, 0.06, 0.0], [-0.3, -0.1, 0.0], 0.035).swinging(0.3, 0.1),
     ];
-    for (x, z, phase) in [
-        (0.34, 0.11, 0.0),
-        (0.34, -0.11, 0.1),
-        (-0.34, 0.11, 0.45),
-        (-0.34, -0.11, 0.55),
-    ] {
+    let front = [(0.34, 0.11, 0.0), (0.34, -0.11, 0.1)];
+    let hind = [(-0.34, 0.11, 0.45), (-0.34, -0.11, 0.55)];
+    for (x, z, phase) in front.into_iter().chain(hind) {
         let upper = limbs.len();
         let back = if x < 0.0 { 1.0 } else { -1.0 };
-        limbs.push(limb(
-            Some(0),
-            [x, -0.06, z],
-            [0.0, -0.4, 0.0],
-            0.07,
-            [0.0, 0.5, phase],
-        ));
+        let thigh = limb(Some(0), [x, -0.06, z], [0.0, -0.4, 0.0], 0.07);
+        let shin = limb(Some(upper), [0.0, -0.4, 0.0], [0.0, -0.36, 0.0], 0.045);
+        limbs.push(thigh.swinging(0.5, phase));
         // Knees bend while the leg goes forward.
-        limbs.push(limb(
-            Some(upper),
-            [0.0, -0.4, 0.0],
-            [0.0, -0.36, 0.0],
-            0.045,
-            [0.35 * back, 0.35 * back, phase + 0.25],
-        ));
+        limbs.push(Limb {
+            turn: 0.35 * back,
+            ..shin.swinging(0.35 * back, phase + 0.25)
+        });
     }
     limbs
 }

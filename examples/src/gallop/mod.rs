@@ -10,6 +10,6 @@ mod truth;
 pub use creature::creature;
 pub use ground::WavyGround;
 pub use report::{GallopFrame, GallopReport};
-pub use runner::{FacesOutOfRange, Runner};
+pub use runner::Runner;
 pub use simulation::{GallopScene, GallopSimulation, GallopSnapshot};
 pub use truth::{Comparisons, TrueDepth};

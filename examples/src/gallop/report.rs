@@ -89,13 +89,7 @@ impl Report for GallopReport {
             median(|frame| frame.step_ms)
         )?;
         self.deepest.write_lines(out)?;
-        let depths = &self.true_depths;
-        for (name, of_kind) in [
-            ("scripted", depths.scripted),
-            ("squeezed", depths.squeezed),
-            ("pushed", depths.pushed),
-            ("resting", depths.resting),
-        ] {
+        for (name, of_kind) in self.true_depths.each() {
             let Comparisons {
                 compared,
                 mean_error,

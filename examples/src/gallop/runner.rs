@@ -1,6 +1,6 @@
 //! A cycle of moving points, with normals, brought to a size and onto its feet.
 
-use thiserror::Error;
+use tldi::Aabb;
 use tldi::glamx::{Quat, Vec3};
 use tldi_sources::{MovingPoints, RawCloud};
 
@@ -21,18 +21,6 @@ enum Normals {
     Faces(Vec<[u32; 3]>),
 }
 
-/// Faces that do not belong to the points.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error(
-    "a face refers to point {index}, but the frames have {points} points: are these the faces of another mesh?"
-)]
-pub struct FacesOutOfRange {
-    /// The index.
-    pub index: u32,
-    /// Number of points.
-    pub points: usize,
-}
-
 impl Runner {
     /// Points whose normals are not known: they are estimated where they are needed.
     pub fn new(points: MovingPoints) -> Self {
@@ -51,21 +39,11 @@ impl Runner {
     }
 
     /// Points with normals from the faces that connect them.
-    ///
-    /// # Errors
-    /// [`FacesOutOfRange`].
-    pub fn with_faces(points: MovingPoints, faces: Vec<[u32; 3]>) -> Result<Self, FacesOutOfRange> {
-        let count = points.points();
-        if let Some(&index) = faces.iter().flatten().find(|i| **i as usize >= count) {
-            return Err(FacesOutOfRange {
-                index,
-                points: count,
-            });
-        }
-        Ok(Self {
+    pub fn with_faces(points: MovingPoints, faces: Vec<[u32; 3]>) -> Self {
+        Self {
             points,
             normals: Normals::Faces(faces),
-        })
+        }
     }
 
     /// Number of frames and of points.
@@ -75,9 +53,12 @@ impl Runner {
 
     /// The largest extent over all frames.
     pub fn size(&self) -> f32 {
-        let all = self.points.frames().iter().flatten();
-        let bounds = all.fold(tldi::Aabb::EMPTY, |bounds, p| bounds.including(*p));
-        bounds.extents().max_element()
+        self.bounds().extents().max_element()
+    }
+
+    fn bounds(&self) -> Aabb {
+        let all = self.points.frames().iter().flatten().copied();
+        all.fold(Aabb::EMPTY, Aabb::including)
     }
 
     /// Turns `up` to y, scales the largest extent to `size` metres, sets the feet on y = 0 and the
@@ -97,10 +78,8 @@ impl Runner {
         if let Normals::Given(normals) = &mut self.normals {
             normals.map(|n| turn * (upright * n));
         }
-        let all = || self.points.frames().iter().flatten();
-        let bounds = all().fold(tldi::Aabb::EMPTY, |bounds, p| bounds.including(*p));
-        let mut lift = bounds.center();
-        lift.y = bounds.min.y;
+        let bounds = self.bounds();
+        let lift = bounds.center().with_y(bounds.min.y);
         self.points.map(|p| p - lift);
         ahead.length()
     }
@@ -182,17 +161,9 @@ mod tests {
     }
 
     #[test]
-    fn faces_of_another_mesh_are_refused() {
+    fn faces_tell_normals() {
         let moving = MovingPoints::new(vec![vec![Vec3::ZERO, Vec3::X, Vec3::Z]]).unwrap();
-        let error = Runner::with_faces(moving.clone(), vec![[0, 1, 3]]).unwrap_err();
-        assert_eq!(
-            error,
-            FacesOutOfRange {
-                index: 3,
-                points: 3
-            }
-        );
-        let runner = Runner::with_faces(moving, vec![[0, 2, 1]]).unwrap();
+        let runner = Runner::with_faces(moving, vec![[0, 2, 1]]);
         assert_eq!(runner.at(0.3).1.unwrap()[0], Vec3::Y);
     }
 }

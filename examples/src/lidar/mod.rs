@@ -7,5 +7,5 @@ mod source;
 
 pub use generated::Scanner;
 pub use report::{LidarBody, LidarReport, SweepReport};
-pub use simulation::{LidarScene, LidarSimulation};
+pub use simulation::LidarSimulation;
 pub use source::{SeenSweep, Sweep, SweepSource, recipe};

@@ -21,18 +21,6 @@ const MATERIAL: Material = Material {
 /// Height over the surface at the start, metres.
 const DROP: f32 = 0.2;
 
-/// What takes part.
-pub struct LidarScene {
-    /// Bodies, their y axis up.
-    pub bodies: Vec<NamedCloud>,
-    /// A place for each.
-    pub spots: Vec<Spot>,
-    /// Against gravity, in the frame of the world.
-    pub up: Vec3,
-    /// Points farther from the scanner are left out, metres.
-    pub range: f32,
-}
-
 /// A world with a stream of sweeps and bodies.
 pub struct LidarSimulation {
     stage: Stage,
@@ -46,16 +34,22 @@ pub struct LidarSimulation {
 }
 
 impl LidarSimulation {
-    /// Places the bodies above their spots.
+    /// Places the bodies above their spots, their y axis along `up`. Points farther than `range` metres from the scanner
+    /// are left out.
     ///
     /// # Errors
     /// Those of [`TldiPipeline::with_backend`].
-    pub fn new(scene: LidarScene, backend: Box<dyn Backend>) -> anyhow::Result<Self> {
-        let LidarScene { up, range, .. } = scene;
+    pub fn new(
+        bodies: Vec<NamedCloud>,
+        spots: &[Spot],
+        up: Vec3,
+        range: f32,
+        backend: Box<dyn Backend>,
+    ) -> anyhow::Result<Self> {
         let mut stage = Stage::new(up, backend)?;
         let stream = CloudStream::new(&mut stage.world.colliders, recipe())?;
         let upright = Quat::from_rotation_arc(Vec3::Y, up);
-        let bodies = (scene.bodies.into_iter().zip(&scene.spots))
+        let bodies = (bodies.into_iter().zip(spots))
             .map(|(named, spot)| {
                 let lift = DROP - named.cloud.bounds().min.y + spot.level as f32;
                 let pose = Pose3::from_parts(spot.surface + lift * up, upright);

@@ -125,13 +125,6 @@ impl SweepSource {
     /// # Errors
     /// What is missing or cannot be understood, with the file and the line.
     pub fn open(folder: &Path) -> anyhow::Result<Self> {
-        let read_text = |name: &str| {
-            let path = folder.join(name);
-            let text = std::fs::read_to_string(&path)
-                .with_context(|| format!("cannot read {}", path.display()))?;
-            // Some editors put a mark in front.
-            anyhow::Ok(text.trim_start_matches('\u{feff}').to_owned())
-        };
         let entries = std::fs::read_dir(folder)
             .with_context(|| format!("cannot read the folder {}", folder.display()))?;
         let mut files = Vec::new();
@@ -143,27 +136,7 @@ impl SweepSource {
             }
         }
         files.sort_by(tldi_sources::numbered_order);
-        let camera_from_scanner = if folder.join("calib.txt").is_file() {
-            let text = read_text("calib.txt")?;
-            let line = (text.lines()).find_map(|line| line.strip_prefix("Tr:"));
-            let line = line.context("calib.txt has no line `Tr:`")?;
-            parse_pose(line).context("calib.txt, the line `Tr:`")?
-        } else {
-            DPose3::IDENTITY
-        };
-        let text = read_text("poses.txt")?;
-        let says_something = |line: &str| !line.is_empty() && !line.starts_with('#');
-        let lines = text
-            .lines()
-            .enumerate()
-            .filter(|(_, line)| says_something(line.trim()));
-        let poses = lines
-            .map(|(k, line)| {
-                let pose =
-                    parse_pose(line).with_context(|| format!("poses.txt, line {}", k + 1))?;
-                Ok(pose * camera_from_scanner)
-            })
-            .collect::<anyhow::Result<Vec<_>>>()?;
+        let poses = poses(folder)?;
         ensure!(
             !files.is_empty(),
             "there are no .bin files in {}",
@@ -224,4 +197,31 @@ impl SweepSource {
             }),
         }
     }
+}
+
+/// The poses of a folder, from the scanner's frame into that of the world.
+fn poses(folder: &Path) -> anyhow::Result<Vec<DPose3>> {
+    let read_text = |name: &str| {
+        let path = folder.join(name);
+        let text = std::fs::read_to_string(&path)
+            .with_context(|| format!("cannot read {}", path.display()))?;
+        // Some editors put a mark in front.
+        anyhow::Ok(text.trim_start_matches('\u{feff}').to_owned())
+    };
+    let camera_from_scanner = if folder.join("calib.txt").is_file() {
+        let text = read_text("calib.txt")?;
+        let line = (text.lines()).find_map(|line| line.strip_prefix("Tr:"));
+        let line = line.context("calib.txt has no line `Tr:`")?;
+        parse_pose(line).context("calib.txt, the line `Tr:`")?
+    } else {
+        DPose3::IDENTITY
+    };
+    let text = read_text("poses.txt")?;
+    (text.lines().enumerate())
+        .filter(|(_, line)| !line.trim().is_empty() && !line.trim().starts_with('#'))
+        .map(|(k, line)| {
+            let pose = parse_pose(line).with_context(|| format!("poses.txt, line {}", k + 1))?;
+            Ok(pose * camera_from_scanner)
+        })
+        .collect()
 }
