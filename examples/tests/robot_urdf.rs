@@ -191,6 +191,36 @@ fn xacro_is_named_only_where_it_is() {
     }
 }
 
+/// Links are to be one tree, and names are to tell them apart.
+#[test]
+fn what_is_no_tree_is_named() {
+    let link = |name: &str| format!(r#"<link name="{name}"/>"#);
+    let joint = |[parent, child]: [&str; 2]| {
+        format!(
+            r#"<joint name="{parent}{child}" type="fixed"><parent link="{parent}"/><child link="{child}"/></joint>"#
+        )
+    };
+    let (to_a, a_to_b, b_to_a) = (["base", "a"], ["a", "b"], ["b", "a"]);
+    for (links, joints, message) in [
+        (&["a"][..], &[a_to_b][..], "link b, which does not exist"),
+        (&["b"], &[], "no joint leads to base, b"),
+        (&["base"], &[], "the name base is given twice"),
+        (&["a"], &[to_a, to_a], "the name basea is given twice"),
+        (&["a", "b"], &[to_a, b_to_a], "link a has two parents"),
+        (&["a", "b"], &[a_to_b, b_to_a], "some links form a loop"),
+        (&["a"], &[to_a, ["a", "base"]], "no link without a parent"),
+    ] {
+        let links: String = links.iter().copied().map(link).collect();
+        let joints: String = joints.iter().copied().map(joint).collect();
+        let text = format!(r#"<robot name="r">{BASE}{links}{joints}</robot>"#);
+        let error = read(&text, Path::new("")).err().expect("it is no tree");
+        assert!(error.contains(message), "{message}: {error}");
+    }
+    let bare = r#"<robot name="r"><link name="a"/></robot>"#;
+    let error = read(bare, Path::new("")).err().expect("it has no surface");
+    assert!(error.contains("no link has a geometry"), "{error}");
+}
+
 /// A mesh without area cannot be sampled: the other links are.
 #[test]
 fn a_link_that_cannot_be_sampled_is_left_out() {

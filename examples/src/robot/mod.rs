@@ -25,11 +25,9 @@ pub use kinematics::{Aim, JointKind, JointModel, Kinematics};
 pub use links::{LinkCloud, clouds_of_links, link_spacing};
 pub use motion::{Motion, Waypoint};
 pub use packages::MeshFolders;
-pub use placing::{NoPlace, Placement, Site, place};
-pub use plan::{Base, Tip};
+pub use plan::Base;
 pub use quadruped::{Walk, quadruped};
 pub use report::{Hardest, LinkReport, LooseBodyReport, RobotReport};
-pub use self_filter::SelfFilter;
 pub use simulation::{RobotScene, RobotSimulation, RobotSnapshot};
 pub use standing::StandingReport;
 

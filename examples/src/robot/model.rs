@@ -1,10 +1,11 @@
 //! A robot whose links are clouds, before it is in a scan.
 
+use super::count;
 use super::description::Description;
 use super::links::{LinkCloud, clouds_of_links};
 use super::placing::{NoPlace, Placement, Site, place};
 use super::plan::{Base, Build, start_pose};
-use super::{SelfFilter, count};
+use super::self_filter::SelfFilter;
 use tldi::PointCloud;
 use tldi::glamx::{Pose3, Vec3};
 

@@ -143,17 +143,19 @@ impl Motion {
     pub fn positions(&self, time: f32) -> Vec<f32> {
         match self {
             Self::Path(path) => {
-                let next = path.iter().position(|waypoint| waypoint.time > time);
-                let Some(next) = next.filter(|next| *next > 0) else {
-                    let end = if next.is_some() {
-                        path.first()
-                    } else {
-                        path.last()
-                    };
-                    return end.map_or(Vec::new(), |waypoint| waypoint.positions.clone());
+                let next = path.partition_point(|waypoint| waypoint.time <= time);
+                let ends = path
+                    .get(next.saturating_sub(1))
+                    .zip(path.get(next).or(path.last()));
+                let Some((from, to)) = ends else {
+                    return Vec::new();
                 };
-                let (from, to) = (&path[next - 1], &path[next]);
-                let t = (time - from.time) / (to.time - from.time);
+                let seconds = to.time - from.time;
+                let t = if seconds > 0.0 {
+                    (time - from.time) / seconds
+                } else {
+                    0.0
+                };
                 (from.positions.iter().zip(&to.positions))
                     .map(|(from, to)| from + (to - from) * t)
                     .collect()

@@ -2,37 +2,37 @@
 
 use crate::spots::level_places;
 use fastrand::Rng;
-use std::f32::consts::FRAC_PI_2;
+use std::f32::consts::FRAC_PI_4;
 use thiserror::Error;
 use tldi::PointCloud;
 use tldi::glamx::{Pose3, Quat, Vec3};
 
 /// What a robot needs. Lengths in metres.
 #[derive(Clone, Copy, Debug)]
-pub struct Site {
+pub(super) struct Site {
     /// Radius of what it stands on.
-    pub footprint: f32,
+    pub(super) footprint: f32,
     /// Height of the root's origin over what it stands on.
-    pub lift: f32,
+    pub(super) lift: f32,
     /// How far its tip gets from its base; 0: it does not reach.
-    pub reach: f32,
+    pub(super) reach: f32,
     /// Radius of the bodies that are laid into its reach.
-    pub body_radius: f32,
+    pub(super) body_radius: f32,
     /// How many.
-    pub bodies: usize,
+    pub(super) bodies: usize,
     /// The level direction that it faces; found where it is left out.
-    pub facing: Option<Vec3>,
+    pub(super) facing: Option<Vec3>,
     /// Seed of the choice.
-    pub seed: u64,
+    pub(super) seed: u64,
 }
 
 /// A place for a robot.
 #[derive(Clone, Debug)]
-pub struct Placement {
+pub(super) struct Placement {
     /// From the frame of the root (z up) into that of the scan.
-    pub scan_from_root: Pose3,
+    pub(super) scan_from_root: Pose3,
     /// Surface points under the bodies, in the frame of the scan.
-    pub bodies: Vec<Vec3>,
+    pub(super) bodies: Vec<Vec3>,
 }
 
 /// There is nowhere to stand.
@@ -40,9 +40,9 @@ pub struct Placement {
 #[error(
     "the scan has no level place without holes of {diameter:.2} m for the robot: give --place, --up if the direction is wrong, or --scan-scale if the scan is not in metres"
 )]
-pub struct NoPlace {
+pub(super) struct NoPlace {
     /// Diameter of what was looked for.
-    pub diameter: f32,
+    pub(super) diameter: f32,
 }
 
 /// Places that are tried.
@@ -61,81 +61,68 @@ const APART: f32 = 3.5;
 /// Chooses a place on `scan`: level and without holes, with much in reach, and where few points of
 /// the scan are in the robot's way: `in_the_way` counts them for a pose of the root. With `at`, the
 /// robot stands there and only turns.
-///
-/// # Errors
-/// [`NoPlace`].
-pub fn place(
+pub(super) fn place(
     scan: &PointCloud<'_>,
     up: Vec3,
     site: &Site,
     at: Option<Vec3>,
     in_the_way: impl Fn(&Pose3) -> usize,
 ) -> Result<Placement, NoPlace> {
-    let mut rng = Rng::with_seed(site.seed);
+    let no_place = NoPlace {
+        diameter: 2.0 * site.footprint,
+    };
     let mut bases = match at {
         Some(at) => vec![at],
         None => level_places(scan, up, site.footprint),
     };
-    if bases.is_empty() {
-        return Err(NoPlace {
-            diameter: 2.0 * site.footprint,
-        });
-    }
-    rng.shuffle(&mut bases);
+    Rng::with_seed(site.seed).shuffle(&mut bases);
     bases.truncate(CANDIDATES);
-    let surfaces = if site.reach > 0.0 && site.bodies > 0 {
-        let places = |room: &f32| level_places(scan, up, room * site.body_radius);
-        let found = DISC_RADII
-            .iter()
-            .map(places)
-            .find(|places| !places.is_empty());
-        found.unwrap_or_default()
-    } else {
-        Vec::new()
-    };
-    let mut options: Vec<(f32, Placement)> = bases
-        .into_iter()
-        .flat_map(|base| {
-            let reachable = in_reach(&surfaces, base, up, site);
-            let turns = if site.facing.is_some() { 0..1 } else { 0..8 };
-            turns
-                .map(move |turn| (base, reachable.clone(), turn))
-                .collect::<Vec<_>>()
-        })
-        .map(|(base, reachable, turn)| {
-            let turned = || forward(up, turn as f32 * 0.5 * FRAC_PI_2);
-            let forward = site.facing.unwrap_or_else(turned);
-            let bodies = in_front(&reachable, base, forward, site);
+    let surfaces = surfaces_for_bodies(scan, up, site);
+    let directions = directions(up, site);
+    let mut options: Vec<(f32, Placement)> = Vec::new();
+    for base in bases {
+        let reachable = in_reach(&surfaces, base, up, site);
+        for forward in &directions {
+            let bodies = in_front(&reachable, base, *forward, site);
             let level = bodies.iter().map(|b| (*b - base).dot(up)).sum::<f32>();
             // Rather a table than the floor: what is higher is easier seen and reached.
             let score = bodies.len() as f32 + 0.2 * level / site.reach.max(1e-3);
-            let pose = standing(base + site.lift * up, up, forward);
-            let placement = Placement {
-                scan_from_root: pose,
-                bodies,
-            };
-            (score, placement)
-        })
-        .collect();
+            let scan_from_root = standing(base + site.lift * up, up, *forward);
+            options.push((
+                score,
+                Placement {
+                    scan_from_root,
+                    bodies,
+                },
+            ));
+        }
+    }
     options.sort_by(|a, b| b.0.total_cmp(&a.0));
     options.truncate(FINALISTS * 8);
-    let best = options
-        .into_iter()
-        .min_by_key(|(score, option)| {
-            // As clear as can be; among the equally clear, the best.
-            let blocked = in_the_way(&option.scan_from_root);
-            (blocked, (-1e3 * score) as i64)
-        })
-        .map(|(_, option)| option);
-    best.ok_or(NoPlace {
-        diameter: 2.0 * site.footprint,
-    })
+    // As clear as can be; among the equally clear, the best.
+    let best = options.into_iter().min_by_key(|(score, option)| {
+        let blocked = in_the_way(&option.scan_from_root);
+        (blocked, (-1e3 * score) as i64)
+    });
+    best.map(|(_, option)| option).ok_or(no_place)
 }
 
-/// A horizontal direction.
-fn forward(up: Vec3, angle: f32) -> Vec3 {
+/// The surfaces on which a body has room, with as much of it as there is.
+fn surfaces_for_bodies(scan: &PointCloud<'_>, up: Vec3, site: &Site) -> Vec<Vec3> {
+    if site.reach <= 0.0 || site.bodies == 0 {
+        return Vec::new();
+    }
+    let with_room = |room: &f32| level_places(scan, up, room * site.body_radius);
+    let mut places = DISC_RADII.iter().map(with_room);
+    places.find(|places| !places.is_empty()).unwrap_or_default()
+}
+
+/// The horizontal directions that are tried.
+fn directions(up: Vec3, site: &Site) -> Vec<Vec3> {
     let (level, _) = up.any_orthonormal_pair();
-    Quat::from_axis_angle(up, angle) * level
+    let turned = |turn: u8| Quat::from_axis_angle(up, f32::from(turn) * FRAC_PI_4) * level;
+    let all_around = || (0..8).map(turned).collect();
+    site.facing.map_or_else(all_around, |facing| vec![facing])
 }
 
 /// The pose of a root whose z is `up` and x is `forward`.

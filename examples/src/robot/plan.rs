@@ -33,18 +33,18 @@ pub enum Base {
 
 /// The end of the longest limb.
 #[derive(Clone, Copy, Debug)]
-pub struct Tip {
+pub(super) struct Tip {
     /// Index of its link.
-    pub link: usize,
+    pub(super) link: usize,
     /// The point that reaches, in the frame of the link, metres.
-    pub point: Vec3,
+    pub(super) point: Vec3,
     /// A point behind it, in the frame of the link, a quarter of the reach away: where the link
     /// comes from.
-    pub behind: Vec3,
+    pub(super) behind: Vec3,
     /// How far it gets from the first joint of its chain, at most, metres.
-    pub reach: f32,
+    pub(super) reach: f32,
     /// Height of that joint over the origin of the root, metres.
-    pub shoulder: f32,
+    pub(super) shoulder: f32,
 }
 
 /// The build of a robot. Lengths in metres.
@@ -227,11 +227,8 @@ pub(super) fn plan_motion(
     if placement.bodies.is_empty() {
         for touch in touchable(scan, &root_from_scan, &tip, seed) {
             let into = (touch - tip.shoulder * Vec3::Z).normalize_or(Vec3::X);
-            corners.extend([
-                touch - 0.15 * tip.reach * into,
-                touch + PRESS * tip.reach * into,
-            ]);
-            corners.push(touch - 0.15 * tip.reach * into);
+            let [before, pressed] = [-0.15, PRESS].map(|way| touch + way * tip.reach * into);
+            corners.extend([before, pressed, before]);
         }
     }
     for (k, surface) in placement.bodies.iter().enumerate() {

@@ -7,11 +7,12 @@ use super::loose_bodies::{LooseBody, lay_bodies, loose_size};
 use super::model::Model;
 use super::own_camera::OwnCamera;
 use super::placing::Site;
-use super::plan::{Base, Tip, plan_motion};
+use super::plan::{Base, plan_motion};
 use super::report::{LinkReport, RobotReport};
+use super::self_filter::SelfFilter;
 use super::standing::Standing;
 use super::tally::{self, LinkTally};
-use super::{Motion, SelfFilter, count};
+use super::{Motion, count};
 use crate::load;
 use crate::numbers::range;
 use crate::terrain::Terrain;
@@ -119,15 +120,8 @@ impl RobotSimulation {
         let scan_from_link = model.scan_from_link(&placement.scan_from_root);
 
         let filter = scene.self_filter.then(|| model.filter(scene.sensor_noise));
-        let on_robot = match &filter {
-            Some(filter) if is_fixed => filter.on_robot(scan.points(), &scan_from_link)?,
-            _ => vec![false; scan.len()],
-        };
-        let on_surface = load::on_surfaces(&scan);
-        let kept: Vec<usize> = (0..scan.len())
-            .filter(|i| on_surface[*i] && !on_robot[*i])
-            .collect();
-        let scan = load::subset(&scan, &kept, |p| p, |r| r)?;
+        let at_start = filter.as_ref().filter(|_| is_fixed);
+        let (scan, self_filtered) = cleaned(&scan, at_start, &scan_from_link)?;
 
         let mut stage = Stage::new(up, backend)?;
         soften(&mut stage.world.integration_parameters, is_fixed);
@@ -167,18 +161,13 @@ impl RobotSimulation {
             loose,
             motion,
             filter,
-            self_filtered: count(&on_robot),
+            self_filtered,
         })
     }
 
     /// Seconds that the planned motion takes; infinite for one that goes on for ever.
     pub fn motion_seconds(&self) -> f32 {
         self.motion.seconds()
-    }
-
-    /// The tip that reaches, if the robot has one.
-    pub fn tip(&self) -> Option<Tip> {
-        self.model.build.tip
     }
 
     /// Takes one step of 1/60 s.
@@ -360,6 +349,25 @@ impl RobotSimulation {
         let [lowest, _] = range(self.scan.points().iter().map(|&p| p.dot(self.up)));
         self.root().translation.dot(self.up) >= lowest - 0.1
     }
+}
+
+/// A scan without points on no surface and, where there is a filter, without those on the robot; and the number of the
+/// latter.
+fn cleaned(
+    scan: &PointCloud<'_>,
+    filter: Option<&SelfFilter>,
+    scan_from_link: &[Pose3],
+) -> Result<(PointCloud<'static>, usize), CloudError> {
+    let on_robot = match filter {
+        Some(filter) => filter.on_robot(scan.points(), scan_from_link)?,
+        None => vec![false; scan.len()],
+    };
+    let on_surface = load::on_surfaces(scan);
+    let kept: Vec<usize> = (0..scan.len())
+        .filter(|i| on_surface[*i] && !on_robot[*i])
+        .collect();
+    let scan = load::subset(scan, &kept, |p| p, |r| r)?;
+    Ok((scan, count(&on_robot)))
 }
 
 /// Contacts that give way as motors and feet need it.
