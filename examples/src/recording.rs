@@ -243,22 +243,14 @@ mod stream {
     /// The viewer knows axes only: the one that is up, or nearest to it.
     fn nearest_axis(up: Vec3) -> ViewCoordinates {
         let size = up.abs();
-        if size.y >= size.x && size.y >= size.z {
-            if up.y < 0.0 {
-                ViewCoordinates::RIGHT_HAND_Y_DOWN()
-            } else {
-                ViewCoordinates::RIGHT_HAND_Y_UP()
-            }
-        } else if size.z >= size.x {
-            if up.z < 0.0 {
-                ViewCoordinates::RIGHT_HAND_Z_DOWN()
-            } else {
-                ViewCoordinates::RIGHT_HAND_Z_UP()
-            }
-        } else if up.x < 0.0 {
-            ViewCoordinates::RIGHT_HAND_X_DOWN()
-        } else {
-            ViewCoordinates::RIGHT_HAND_X_UP()
+        let [is_y, is_z] = [size.y, size.z].map(|axis| axis >= size.max_element());
+        match (is_y, is_z) {
+            (true, _) if up.y < 0.0 => ViewCoordinates::RIGHT_HAND_Y_DOWN(),
+            (true, _) => ViewCoordinates::RIGHT_HAND_Y_UP(),
+            (_, true) if up.z < 0.0 => ViewCoordinates::RIGHT_HAND_Z_DOWN(),
+            (_, true) => ViewCoordinates::RIGHT_HAND_Z_UP(),
+            _ if up.x < 0.0 => ViewCoordinates::RIGHT_HAND_X_DOWN(),
+            _ => ViewCoordinates::RIGHT_HAND_X_UP(),
         }
     }
 

@@ -157,25 +157,15 @@ fn rounded_rectangle(p: Vec2, half: Vec2, rounding: f32) -> f32 {
 
 /// A disc around the z axis.
 fn rounded_disc(p: Vec3, radius: f32, half_height: f32, rounding: f32) -> f32 {
-    rounded_rectangle(
-        Vec2::new(p.truncate().length(), p.z),
-        Vec2::new(radius, half_height),
-        rounding,
-    )
+    let from_axis = Vec2::new(p.truncate().length(), p.z);
+    rounded_rectangle(from_axis, Vec2::new(radius, half_height), rounding)
 }
 
 /// A box of 0.7 × 0.5 × 0.3 m with walls of 3 cm, open at the top, standing on z = 0.
 fn open_crate(p: Vec3) -> f32 {
-    let outside = rounded_block(
-        p - Vec3::new(0.0, 0.0, 0.15),
-        Vec3::new(0.35, 0.25, 0.15),
-        0.005,
-    );
-    let inside = rounded_block(
-        p - Vec3::new(0.0, 0.0, 0.33),
-        Vec3::new(0.32, 0.22, 0.3),
-        0.005,
-    );
+    let block = |height: f32, half| rounded_block(p - height * Vec3::Z, Vec3::from(half), 0.005);
+    let outside = block(0.15, [0.35, 0.25, 0.15]);
+    let inside = block(0.33, [0.32, 0.22, 0.3]);
     outside.max(-inside)
 }
 

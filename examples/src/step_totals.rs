@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::io::{self, Write};
 
 /// Counts over all steps of a simulation; its report flattens them.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct StepTotals {
     /// What compared the clouds.
     #[serde(flatten)]
@@ -32,14 +32,8 @@ impl StepTotals {
     /// Before the first step of `dt` seconds.
     pub fn new(dt: f32) -> Self {
         Self {
-            devices: Devices::default(),
-            steps: 0,
             dt,
-            wall_seconds: 0.0,
-            real_time_factor: 0.0,
-            contact_steps: 0,
-            pairs_batched: 0,
-            pairs_missed: 0,
+            ..Self::default()
         }
     }
 

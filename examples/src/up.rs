@@ -116,10 +116,8 @@ fn every_nth(len: usize, limit: usize) -> impl Iterator<Item = usize> {
 
 /// The vertical axis (of either sign), and the share of normals that are parallel to it.
 fn vertical_axis(sampled: &[(Vec3, Vec3)]) -> (Vec3, f32) {
-    let largest_extent = [Vec3::X, Vec3::Y, Vec3::Z]
-        .map(|axis| extent_along(sampled, axis))
-        .into_iter()
-        .fold(f32::MIN_POSITIVE, f32::max);
+    let extents = Vec3::AXES.map(|axis| extent_along(sampled, axis));
+    let largest_extent = extents.into_iter().fold(f32::MIN_POSITIVE, f32::max);
     let score = |axis: Vec3| {
         let (parallel, perpendicular) = shares(sampled, axis);
         let extent = extent_along(sampled, axis) / largest_extent;
@@ -148,10 +146,16 @@ fn shares(sampled: &[(Vec3, Vec3)], axis: Vec3) -> (f32, f32) {
 
 /// Length in metres, along an axis, of what holds 98 % of the points.
 fn extent_along(sampled: &[(Vec3, Vec3)], axis: Vec3) -> f32 {
-    let mut along: Vec<f32> = sampled.iter().map(|(p, _)| p.dot(axis)).collect();
-    along.sort_unstable_by(f32::total_cmp);
-    let tail = along.len() / 100;
-    along[along.len() - 1 - tail] - along[tail]
+    let [low, high] = without_tails(sampled.iter().map(|(p, _)| p.dot(axis)));
+    high - low
+}
+
+/// Between which numbers 98 % of them are.
+fn without_tails(numbers: impl Iterator<Item = f32>) -> [f32; 2] {
+    let mut numbers: Vec<f32> = numbers.collect();
+    numbers.sort_unstable_by(f32::total_cmp);
+    let tail = numbers.len() / 100;
+    [tail, numbers.len() - 1 - tail].map(|k| numbers[k])
 }
 
 /// Directions around which the normals cluster, most of them first.
@@ -208,8 +212,7 @@ fn snapped_to_file_axis(sampled: &[(Vec3, Vec3)], axis: Vec3) -> Vec3 {
     // is what the noise and the registration of a scan leave uncertain at best.
     let spread = (sum / count.max(1) as f32).sqrt();
     let reach = if spread > 0.14 { 0.14 } else { 0.035 };
-    [Vec3::X, Vec3::Y, Vec3::Z]
-        .into_iter()
+    (Vec3::AXES.into_iter())
         .map(|file_axis| file_axis * file_axis.dot(axis).signum())
         .find(|file_axis| file_axis.cross(axis).length() < reach)
         .unwrap_or(axis)
@@ -223,10 +226,7 @@ fn sign_evidence(points: &[Vec3], normals: &[Vec3], axis: Vec3) -> f32 {
     let picked: Vec<usize> = every_nth(points.len(), HEIGHT_SAMPLES)
         .filter(|&i| points[i].is_finite() && normals[i].is_normalized())
         .collect();
-    let mut heights: Vec<f32> = picked.iter().map(|&i| points[i].dot(axis)).collect();
-    heights.sort_unstable_by(f32::total_cmp);
-    let tail = heights.len() / 100;
-    let (low, high) = (heights[tail], heights[heights.len() - 1 - tail]);
+    let [low, high] = without_tails(picked.iter().map(|&i| points[i].dot(axis)));
     if high <= low {
         return 0.0;
     }

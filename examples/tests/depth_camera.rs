@@ -128,12 +128,8 @@ fn the_generated_ball_pushes_and_equal_seeds_give_equal_reports() {
     // in its way by more than a frame's noise.
     let has_rested = |body: &Value| !body["first_rested_at_seconds"].is_null();
     assert!(bodies.iter().all(has_rested), "{bodies:?}");
-    assert!(
-        bodies
-            .iter()
-            .any(|body| number(&body["displacement"]) > 0.05),
-        "{bodies:?}"
-    );
+    let is_pushed = |body: &Value| number(&body["displacement"]) > 0.05;
+    assert!(bodies.iter().any(is_pushed), "{bodies:?}");
     assert_pictures(&folder.join("out/depth_camera"), PICTURES);
 }
 
@@ -180,10 +176,8 @@ fn the_range_can_be_set() {
     ];
     assert_refused(BINARY, &folder, &cases);
     let report = report(BINARY, &folder, &ranged("1,16"));
-    assert!(
-        number(&report["frames"][0]["points"]) > 10_000.0,
-        "{report}"
-    );
+    let points = number(&report["frames"][0]["points"]);
+    assert!(points > 10_000.0, "{points}");
 }
 
 #[test]
