@@ -23,8 +23,8 @@ pub(crate) enum ColorScale {
     Reals,
 }
 
-/// What each point of a file has.
-#[derive(Clone, Copy, Debug)]
+/// What each point of a file has, beside its place.
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Layout {
     pub(crate) normals: bool,
     pub(crate) colors: Option<ColorScale>,
@@ -223,23 +223,24 @@ impl Collector {
         Ok(())
     }
 
-    /// Reads the points of `count` records of `size` bytes; the errors call them `what`.
+    /// Reads the points of `count` records of `size` bytes, or of all records up to the end of the input; the errors call
+    /// them `what`.
     pub(crate) fn read_records(
         &mut self,
         input: &mut Input<'_>,
         size: usize,
-        count: u64,
+        count: Option<u64>,
         what: &str,
         sample: impl Fn(&[u8]) -> Sample,
     ) -> Result<(), SourceError> {
-        let mut left = count;
-        while left > 0 {
+        let mut left = count.unwrap_or(u64::MAX);
+        while left > 0 && (count.is_some() || !input.peek(1)?.is_empty()) {
             let position = input.byte_position();
             let records = input.records(size, left, what)?;
             left -= (records.len() / size) as u64;
             for record in records.chunks_exact(size) {
                 self.push(&sample(record))
-                    .map_err(|kind| SourceError::new(kind, position))?;
+                    .map_err(|kind| kind.at(position))?;
             }
             input.points_read = self.count();
         }

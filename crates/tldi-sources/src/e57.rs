@@ -10,8 +10,8 @@ use crate::input::Input;
 use crate::seekable::{self, ReadSeek, guarded};
 use crate::{Format, Position, RawCloud, ReadOptions, SourceError, SourceErrorKind};
 use ::e57::{
-    CartesianCoordinate, E57Reader, Error, PointCloud, Quaternion, RecordDataType, RecordName,
-    RecordValue,
+    CartesianCoordinate, ColorLimits, E57Reader, Error, PointCloud, Quaternion, RecordDataType,
+    RecordName, RecordValue,
 };
 use std::path::Path;
 use tldi::glamx::DVec3;
@@ -44,11 +44,9 @@ fn read(
 
     let has_color = scans.iter().any(|s| color_ranges(s).is_some());
     let layout = Layout {
-        splats: None,
-        normals: false,
         colors: has_color.then_some(ColorScale::Bytes),
-        radii: false,
         wide: true,
+        ..Layout::default()
     };
     let mut collector = Collector::new(layout, count, options);
     let mut done = 0;
@@ -74,14 +72,13 @@ fn read(
             };
             let mut sample = Sample::EMPTY;
             sample.position = [x, y, z];
-            if let (Some(color), Some([red, green, blue])) = (point.color, ranges) {
-                sample.color[0] = red.scaled(color.red);
-                sample.color[1] = green.scaled(color.green);
-                sample.color[2] = blue.scaled(color.blue);
+            if let (Some(color), Some(ranges)) = (point.color, ranges) {
+                let channels = [color.red, color.green, color.blue];
+                for (k, range) in ranges.into_iter().enumerate() {
+                    sample.color[k] = range.scaled(channels[k]);
+                }
             }
-            collector
-                .push(&sample)
-                .map_err(|kind| SourceError::new(kind, position))?;
+            collector.push(&sample).map_err(|kind| kind.at(position))?;
         }
     }
     input.report_share(done, count);
@@ -115,30 +112,20 @@ fn check_scan(scan: &PointCloud) -> Result<()> {
         }
     });
     if scan.records > 0 && !takes_bits {
-        return Err(bad_header("the points of a scan have no values that vary"));
+        let reason = "the points of a scan have no values that vary";
+        return Err(SourceErrorKind::header(Format::E57, reason).into());
     }
     Ok(())
-}
-
-fn bad_header(reason: &str) -> SourceError {
-    let reason = reason.to_owned();
-    let format = Format::E57;
-    SourceErrorKind::Header { format, reason }.into()
 }
 
 fn error(error: Error, position: Position) -> SourceError {
     let reason = error.to_string();
     let kind = match error {
-        Error::Read { .. } => SourceErrorKind::Truncated {
-            what: format!("an E57 section ({reason})"),
-        },
+        Error::Read { .. } => SourceErrorKind::truncated(format!("an E57 section ({reason})")),
         Error::NotImplemented { .. } => SourceErrorKind::Unsupported { what: reason },
-        _ => SourceErrorKind::Header {
-            format: Format::E57,
-            reason,
-        },
+        _ => SourceErrorKind::header(Format::E57, reason),
     };
-    SourceError::new(kind, position)
+    kind.at(position)
 }
 
 /// Values of a colour channel from black to full.
@@ -157,29 +144,19 @@ impl ColorRange {
 
 /// The ranges of red, green and blue, if the scan has colours.
 fn color_ranges(scan: &PointCloud) -> Option<[ColorRange; 3]> {
-    let limits = scan.color_limits.as_ref();
-    let range = |name, limits: Option<(&Option<RecordValue>, &Option<RecordValue>)>| {
+    let range = |name, limits: fn(&ColorLimits) -> [&Option<RecordValue>; 2]| {
         let record = scan.prototype.iter().find(|r| r.name == name)?;
-        let given = limits.and_then(|(min, max)| {
-            let min = number(min.as_ref()?, &record.data_type)?;
-            let max = number(max.as_ref()?, &record.data_type)?;
-            (max > min).then_some(ColorRange { min, max })
+        let given = scan.color_limits.as_ref().and_then(|given| {
+            let [min, max] = limits(given).map(|value| number(value.as_ref()?, &record.data_type));
+            let (min, max) = min.zip(max).filter(|(min, max)| max > min)?;
+            Some(ColorRange { min, max })
         });
         Some(given.unwrap_or_else(|| default_range(&record.data_type)))
     };
     Some([
-        range(
-            RecordName::ColorRed,
-            limits.map(|l| (&l.red_min, &l.red_max)),
-        )?,
-        range(
-            RecordName::ColorGreen,
-            limits.map(|l| (&l.green_min, &l.green_max)),
-        )?,
-        range(
-            RecordName::ColorBlue,
-            limits.map(|l| (&l.blue_min, &l.blue_max)),
-        )?,
+        range(RecordName::ColorRed, |l| [&l.red_min, &l.red_max])?,
+        range(RecordName::ColorGreen, |l| [&l.green_min, &l.green_max])?,
+        range(RecordName::ColorBlue, |l| [&l.blue_min, &l.blue_max])?,
     ])
 }
 

@@ -20,14 +20,6 @@ pub struct SourceError {
 }
 
 impl SourceError {
-    pub(crate) fn new(kind: SourceErrorKind, position: Position) -> Self {
-        Self {
-            kind,
-            file: None,
-            position,
-        }
-    }
-
     pub(crate) fn in_file(mut self, path: &Path) -> Self {
         self.file = Some(path.to_owned());
         self
@@ -36,7 +28,7 @@ impl SourceError {
 
 impl From<SourceErrorKind> for SourceError {
     fn from(kind: SourceErrorKind) -> Self {
-        Self::new(kind, Position::Unknown)
+        kind.at(Position::Unknown)
     }
 }
 
@@ -190,6 +182,32 @@ pub enum SourceErrorKind {
     /// The file is sound but has no points.
     #[error("there are no points in it: give a file with at least one")]
     NoPoints,
+}
+
+impl SourceErrorKind {
+    /// Something wrong at a place of the file.
+    pub(crate) fn at(self, position: Position) -> SourceError {
+        SourceError {
+            kind: self,
+            file: None,
+            position,
+        }
+    }
+
+    pub(crate) fn truncated(what: impl Into<String>) -> Self {
+        let what = what.into();
+        Self::Truncated { what }
+    }
+
+    pub(crate) fn value(reason: impl Into<String>) -> Self {
+        let reason = reason.into();
+        Self::Value { reason }
+    }
+
+    pub(crate) fn header(format: Format, reason: impl Into<String>) -> Self {
+        let reason = reason.into();
+        Self::Header { format, reason }
+    }
 }
 
 /// What helps against more points than `limit`.

@@ -16,19 +16,16 @@ pub(crate) fn read<H>(
 ) -> Result<H> {
     for _ in 0..MAX_LINES {
         let Some(line) = input.line()? else {
-            let what = "the header".to_owned();
-            return Err(input.error_at_line(SourceErrorKind::Truncated { what }));
+            return Err(input.error_at_line(SourceErrorKind::truncated("the header")));
         };
         match take(line) {
             Ok(None) => {}
             Ok(Some(header)) => return Ok(header),
-            Err(reason) => {
-                return Err(input.error_at_line(SourceErrorKind::Header { format, reason }));
-            }
+            Err(reason) => return Err(input.error_at_line(SourceErrorKind::header(format, reason))),
         }
     }
     let reason = format!("it has more than {MAX_LINES} lines");
-    Err(input.error_at_line(SourceErrorKind::Header { format, reason }))
+    Err(input.error_at_line(SourceErrorKind::header(format, reason)))
 }
 
 /// A line of a header as text, or what is wrong with it.

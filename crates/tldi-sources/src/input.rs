@@ -107,18 +107,17 @@ impl<'a> Input<'a> {
 
     /// An error about the line read last.
     pub(crate) fn error_at_line(&self, kind: SourceErrorKind) -> SourceError {
-        SourceError::new(kind, self.line_position())
+        kind.at(self.line_position())
     }
 
     /// An error about the next byte.
     pub(crate) fn error_at_byte(&self, kind: SourceErrorKind) -> SourceError {
-        SourceError::new(kind, self.byte_position())
+        kind.at(self.byte_position())
     }
 
     fn truncated(&self, what: &str) -> SourceError {
-        let what = what.to_owned();
         let end = self.offset + (self.end - self.start) as u64;
-        SourceError::new(SourceErrorKind::Truncated { what }, Position::Byte(end))
+        SourceErrorKind::truncated(what).at(Position::Byte(end))
     }
 
     /// Fetches more bytes behind the unread ones; there must be room, or none unread.

@@ -1,7 +1,7 @@
 //! Points that move: a deforming mesh as a NumPy array or as a folder of clouds.
 
 use crate::input::GZIP_MAGIC;
-use crate::scalar::{Endian, Scalar};
+use crate::scalar::{Endian, Scalar, unsigned};
 use crate::{ReadOptions, SourceError, numbered_order, origin};
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
@@ -220,11 +220,7 @@ fn read_npy(path: &Path) -> Result<MovingPoints, MovingError> {
 /// The frames of an unpacked NumPy file, or what is wrong with it.
 fn npy_frames(mut source: impl Read) -> Result<Vec<Vec<Vec3>>, String> {
     let header = npy_header(&mut source)?;
-    let header = parse_header(&String::from_utf8_lossy(&header))?;
-    let Header {
-        scalar,
-        shape: [frames, points],
-    } = header;
+    let (scalar, [frames, points]) = parse_header(&String::from_utf8_lossy(&header))?;
     if frames == 0 || points == 0 {
         return Err(format!(
             "its shape is ({frames}, {points}, 3): there are no frames, or no points in them"
@@ -268,22 +264,20 @@ fn npy_header(source: &mut impl Read) -> Result<Vec<u8>, String> {
         return Err("it is no NumPy file".to_owned());
     }
     // Version 1 has two bytes of length, later ones four.
-    let length = exactly(source, if start[6] == 1 { 2 } else { 4 }, "header")?;
-    let length = (length.iter().rev()).fold(0, |length, byte| length << 8 | u64::from(*byte));
+    let length = unsigned(&exactly(
+        source,
+        if start[6] == 1 { 2 } else { 4 },
+        "header",
+    )?);
     if length > 1 << 16 {
         return Err("its header is too long".to_owned());
     }
     exactly(source, length, "header")
 }
 
-struct Header {
-    scalar: Scalar,
-    /// Frames and points.
-    shape: [u64; 2],
-}
-
-/// Reads `{'descr': '<f4', 'fortran_order': False, 'shape': (24, 8431, 3), }`.
-fn parse_header(header: &str) -> Result<Header, String> {
+/// Reads `{'descr': '<f4', 'fortran_order': False, 'shape': (24, 8431, 3), }`: the type of the numbers, and how many
+/// frames and points there are.
+fn parse_header(header: &str) -> Result<(Scalar, [u64; 2]), String> {
     let after = |key: &str| {
         let rest = header.split_once(&format!("'{key}':"));
         rest.map(|(_, rest)| rest.trim_start())
@@ -306,10 +300,7 @@ fn parse_header(header: &str) -> Result<Header, String> {
         .map(|size| size.parse().map_err(|_| format!("its shape is ({inside})")))
         .collect::<Result<_, _>>()?;
     match sizes[..] {
-        [frames, points, 3] => Ok(Header {
-            scalar,
-            shape: [frames, points],
-        }),
+        [frames, points, 3] => Ok((scalar, [frames, points])),
         _ => Err(format!("its shape is ({inside})")),
     }
 }

@@ -126,7 +126,7 @@ impl PointCloud2<'_> {
                 let index = collector.count();
                 collector
                     .push(&columns.sample(point, endian))
-                    .map_err(|kind| SourceError::new(kind, Position::Point(index)))?;
+                    .map_err(|kind| kind.at(Position::Point(index)))?;
             }
         }
         let mut cloud = collector.finish()?;

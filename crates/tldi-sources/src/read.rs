@@ -90,7 +90,7 @@ fn open<'a>(
     let mut buffered = BufReader::new(counted);
     let start = buffered
         .fill_buf()
-        .map_err(|e| SourceError::new(SourceErrorKind::Io(e), Position::Byte(0)))?;
+        .map_err(|e| SourceErrorKind::Io(e).at(Position::Byte(0)))?;
     let gzip = start.starts_with(&GZIP_MAGIC);
     let source: Box<dyn Read + 'a> = if gzip {
         Box::new(MultiGzDecoder::new(buffered))

@@ -53,14 +53,14 @@ impl Scalar {
         match self {
             Self::I8 => f64::from(bytes[0] as i8),
             Self::U8 => f64::from(bytes[0]),
-            Self::I16 => f64::from(u16::from_order(bytes, endian) as i16),
-            Self::U16 => f64::from(u16::from_order(bytes, endian)),
-            Self::I32 => f64::from(u32::from_order(bytes, endian) as i32),
-            Self::U32 => f64::from(u32::from_order(bytes, endian)),
-            Self::I64 => u64::from_order(bytes, endian) as i64 as f64,
-            Self::U64 => u64::from_order(bytes, endian) as f64,
-            Self::F32 => f64::from(f32::from_bits(u32::from_order(bytes, endian))),
-            Self::F64 => f64::from_bits(u64::from_order(bytes, endian)),
+            Self::I16 => f64::from(i16::from_le_bytes(endian.little(bytes))),
+            Self::U16 => f64::from(u16::from_le_bytes(endian.little(bytes))),
+            Self::I32 => f64::from(i32::from_le_bytes(endian.little(bytes))),
+            Self::U32 => f64::from(u32::from_le_bytes(endian.little(bytes))),
+            Self::I64 => i64::from_le_bytes(endian.little(bytes)) as f64,
+            Self::U64 => u64::from_le_bytes(endian.little(bytes)) as f64,
+            Self::F32 => f64::from(f32::from_le_bytes(endian.little(bytes))),
+            Self::F64 => f64::from_le_bytes(endian.little(bytes)),
         }
     }
 
@@ -68,8 +68,8 @@ impl Scalar {
     #[inline]
     pub(crate) fn decode_integer(self, bytes: &[u8], endian: Endian) -> Option<i64> {
         match self {
-            Self::I64 => Some(u64::from_order(bytes, endian) as i64),
-            Self::U64 => i64::try_from(u64::from_order(bytes, endian)).ok(),
+            Self::I64 => Some(i64::from_le_bytes(endian.little(bytes))),
+            Self::U64 => i64::try_from(u64::from_le_bytes(endian.little(bytes))).ok(),
             Self::F32 | Self::F64 => None,
             // At most 32 bits: exact in f64.
             _ => Some(self.decode(bytes, endian) as i64),
@@ -77,33 +77,28 @@ impl Scalar {
     }
 }
 
-/// Unsigned integers from bytes of either order.
-trait FromOrder: Sized {
-    fn from_order(bytes: &[u8], endian: Endian) -> Self;
+impl Endian {
+    /// The first `N` bytes, the lowest one first.
+    #[inline]
+    fn little<const N: usize>(self, bytes: &[u8]) -> [u8; N] {
+        let mut first = [0; N];
+        first.copy_from_slice(&bytes[..N]);
+        if self == Self::Big {
+            first.reverse();
+        }
+        first
+    }
 }
 
-macro_rules! from_order {
-    ($($integer:ty),*) => {$(
-        impl FromOrder for $integer {
-            #[inline]
-            fn from_order(bytes: &[u8], endian: Endian) -> Self {
-                let mut array = [0; size_of::<Self>()];
-                array.copy_from_slice(&bytes[..size_of::<Self>()]);
-                match endian {
-                    Endian::Little => Self::from_le_bytes(array),
-                    Endian::Big => Self::from_be_bytes(array),
-                }
-            }
-        }
-    )*};
+/// The unsigned integer of these bytes, eight at most, the lowest one first.
+pub(crate) fn unsigned(bytes: &[u8]) -> u64 {
+    let highest_first = bytes.iter().rev();
+    highest_first.fold(0, |number, byte| number << 8 | u64::from(*byte))
 }
-from_order!(u16, u32, u64);
 
 /// A number in text. Everything that C programs print for NaN and infinity is understood.
 pub(crate) fn parse_number(token: &[u8]) -> Result<f64, SourceErrorKind> {
-    let bad = || SourceErrorKind::Value {
-        reason: format!("expected a number, found `{}`", excerpt(token)),
-    };
+    let bad = || SourceErrorKind::value(format!("expected a number, found `{}`", excerpt(token)));
     let text = std::str::from_utf8(token).map_err(|_| bad())?;
     if let Ok(number) = text.parse() {
         return Ok(number);
@@ -131,8 +126,8 @@ pub(crate) fn parse_integer(token: &[u8]) -> Result<i64, SourceErrorKind> {
     std::str::from_utf8(token)
         .ok()
         .and_then(|text| text.parse().ok())
-        .ok_or_else(|| SourceErrorKind::Value {
-            reason: format!("expected an integer, found `{}`", excerpt(token)),
+        .ok_or_else(|| {
+            SourceErrorKind::value(format!("expected an integer, found `{}`", excerpt(token)))
         })
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::input::Input;
-use crate::{Format, Position, SourceError, SourceErrorKind};
+use crate::{Format, SourceError, SourceErrorKind};
 use std::any::Any;
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
@@ -46,8 +46,7 @@ pub(crate) fn guarded<T>(format: Format, parse: impl FnOnce() -> Result<T>) -> R
     // Whatever `parse` was in the middle of is dropped with it.
     catch_unwind(AssertUnwindSafe(parse)).unwrap_or_else(|panic| {
         let reason = format!("its parser gave up: {}", message(panic.as_ref()));
-        let kind = SourceErrorKind::Header { format, reason };
-        Err(SourceError::new(kind, Position::Unknown))
+        Err(SourceErrorKind::header(format, reason).into())
     })
 }
 

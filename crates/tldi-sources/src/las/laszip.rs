@@ -1,12 +1,13 @@
 //! Checks the sizes in LASzip data before the crate laz takes memory for them: the items of a
 //! record, the number of chunks, and the layers of each chunk.
 
-use super::preview::{Preview, bad_header, bytes, truncated, unsigned};
+use super::preview::{Preview, bad_header, bytes, truncated};
 use crate::error::Result;
-use crate::scalar::Scalar;
+use crate::scalar::unsigned;
 use crate::seekable::ReadSeek;
 use ::las::Header;
 use ::las::laz::is_laszip_vlr;
+use std::ops::Range;
 
 /// Bytes that tell, before the chunks, where their table is.
 const TABLE_OFFSET_SIZE: u64 = 8;
@@ -26,7 +27,7 @@ struct Packing {
 pub(super) fn check(source: &mut dyn ReadSeek, header: &Header, preview: &Preview) -> Result<()> {
     let vlr = header.vlrs().iter().find(|vlr| is_laszip_vlr(vlr));
     let Some(vlr) = vlr else {
-        return Err(bad_header("the record of LASzip is missing".to_owned()));
+        return Err(bad_header("the record of LASzip is missing"));
     };
     let packing = Packing::parse(&vlr.data, preview.record_length)?;
     if packing.is_chunked {
@@ -42,22 +43,17 @@ impl Packing {
     fn parse(record: &[u8], record_length: u64) -> Result<Self> {
         const ITEMS: usize = 34;
         const ITEM_SIZE: usize = 6;
-        let too_short = || bad_header("the record of LASzip is too short".to_owned());
-        let u16_at = |at: usize| -> Result<u64> {
-            let bytes = record.get(at..at + 2).ok_or_else(too_short)?;
-            Ok(unsigned(Scalar::U16, bytes))
-        };
-        let chunk_size = record.get(12..16).ok_or_else(too_short)?;
-        let chunk_size = unsigned(Scalar::U32, chunk_size);
-        let compressor = u16_at(0)?;
-        let count = u16_at(ITEMS - 2)? as usize;
+        let too_short = || bad_header("the record of LASzip is too short");
+        let number = |at: Range<usize>| record.get(at).map(unsigned).ok_or_else(too_short);
+        let chunk_size = number(12..16)?;
+        let compressor = number(0..2)?;
+        let count = number(ITEMS - 2..ITEMS)? as usize;
         let items = record.get(ITEMS..ITEMS + count * ITEM_SIZE);
         let mut length = 0;
         let mut layers = 0;
         let mut versions = Vec::new();
         for item in items.ok_or_else(too_short)?.chunks_exact(ITEM_SIZE) {
-            let [kind, size, version] =
-                [0, 2, 4].map(|field| unsigned(Scalar::U16, &item[field..]));
+            let [kind, size, version] = [0, 2, 4].map(|field| unsigned(&item[field..field + 2]));
             let (natural_size, item_layers) = match kind {
                 0 => (size, 0),
                 6 => (20, 0),
@@ -84,8 +80,9 @@ impl Packing {
         }
         let is_layered = versions.iter().any(|v| *v >= 3);
         if is_layered != (compressor == 3) {
-            let reason = "the compressor of LASzip does not fit its items";
-            return Err(bad_header(reason.to_owned()));
+            return Err(bad_header(
+                "the compressor of LASzip does not fit its items",
+            ));
         }
         Ok(Self {
             is_chunked: compressor >= 2,
@@ -102,19 +99,18 @@ impl Packing {
 /// Checks that the table of chunks is in the file, and not longer than chunks there can be.
 fn check_table(source: &mut dyn ReadSeek, preview: &Preview) -> Result<()> {
     let start = preview.offset_to_points;
-    let offset = |bytes: Vec<u8>| unsigned(Scalar::U64, &bytes);
     let size = TABLE_OFFSET_SIZE as usize;
-    let mut table = offset(bytes(source, start, size, preview.length)?);
+    let mut table = unsigned(&bytes(source, start, size, preview.length)?);
     // Writers that cannot go back put −1 there, and the offset at the end.
     if table <= start || table > i64::MAX as u64 {
         let end = preview.length.saturating_sub(TABLE_OFFSET_SIZE);
-        table = offset(bytes(source, end, size, preview.length)?);
+        table = unsigned(&bytes(source, end, size, preview.length)?);
     }
     if table <= start {
-        return Err(bad_header("the table of LASzip chunks is missing".into()));
+        return Err(bad_header("the table of LASzip chunks is missing"));
     }
     let head = bytes(source, table, 8, preview.length)?;
-    let chunks = unsigned(Scalar::U32, &head[4..]);
+    let chunks = unsigned(&head[4..]);
     // Each starts with one point that is not packed.
     if chunks.saturating_mul(preview.record_length) > preview.length {
         let reason = format!("there are {chunks} LASzip chunks, more than fit into the file");
@@ -142,7 +138,7 @@ fn check_layers(
             head_size as usize,
             preview.length,
         )?;
-        let mut sizes = head.chunks_exact(4).map(|size| unsigned(Scalar::U32, size));
+        let mut sizes = head.chunks_exact(4).map(unsigned);
         let points = sizes.next().unwrap_or(0);
         let expected = if packing.chunk_size == VARIABLE {
             points.min(left)

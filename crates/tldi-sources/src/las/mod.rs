@@ -49,14 +49,12 @@ fn read(
     let mut reader = Reader::new(source).map_err(|e| error(e, Position::Unknown))?;
 
     let layout = Layout {
-        splats: None,
-        normals: false,
         colors: header
             .point_format()
             .has_color
             .then_some(ColorScale::Integers),
-        radii: false,
         wide: true,
+        ..Layout::default()
     };
     let mut collector = Collector::new(layout, preview.points, options);
     let batch = (BATCH_BYTES / preview.record_length).max(1);
@@ -64,11 +62,7 @@ fn read(
         let position = Position::Point(collector.count());
         let points = reader.read_points(batch).map_err(|e| error(e, position))?;
         if points.is_empty() {
-            let what = "the points".to_owned();
-            return Err(SourceError::new(
-                SourceErrorKind::Truncated { what },
-                position,
-            ));
+            return Err(SourceErrorKind::truncated("the points").at(position));
         }
         let mut colors = points.rgb();
         for ((x, y), z) in points.x().zip(points.y()).zip(points.z()) {
@@ -77,9 +71,7 @@ fn read(
             if let Some((red, green, blue)) = colors.as_mut().and_then(Iterator::next) {
                 sample.color[..3].copy_from_slice(&[red, green, blue].map(f32::from));
             }
-            collector
-                .push(&sample)
-                .map_err(|kind| SourceError::new(kind, position))?;
+            collector.push(&sample).map_err(|kind| kind.at(position))?;
         }
         input.points_read = collector.count();
         input.report_share(collector.count(), preview.points);
@@ -89,14 +81,11 @@ fn read(
 
 fn error(error: Error, position: Position) -> SourceError {
     let kind = match error {
-        Error::Io(e) if e.kind() == ErrorKind::UnexpectedEof => SourceErrorKind::Truncated {
-            what: "the points".to_owned(),
-        },
+        Error::Io(e) if e.kind() == ErrorKind::UnexpectedEof => {
+            SourceErrorKind::truncated("the points")
+        }
         Error::Io(e) if e.kind() != ErrorKind::Other => SourceErrorKind::Io(e),
-        other => SourceErrorKind::Header {
-            format: Format::Las,
-            reason: other.to_string(),
-        },
+        other => SourceErrorKind::header(Format::Las, other.to_string()),
     };
-    SourceError::new(kind, position)
+    kind.at(position)
 }

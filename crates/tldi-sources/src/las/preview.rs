@@ -1,7 +1,7 @@
 //! What a header says about sizes, read before anything trusts it.
 
 use crate::error::Result;
-use crate::scalar::{Endian, Scalar};
+use crate::scalar::unsigned;
 use crate::seekable::ReadSeek;
 use crate::{Format, Position, SourceError, SourceErrorKind};
 use std::io::SeekFrom;
@@ -30,13 +30,13 @@ impl Preview {
         } else {
             header
         };
-        let u64_at = |at: usize| unsigned(Scalar::U64, &header[at..]);
-        let u32_at = |at: usize| unsigned(Scalar::U32, &header[at..]);
+        let u64_at = |at: usize| unsigned(&header[at..at + 8]);
+        let u32_at = |at: usize| unsigned(&header[at..at + 4]);
         let legacy_points = u32_at(107);
         let preview = Self {
             length,
             offset_to_points: u32_at(96),
-            record_length: unsigned(Scalar::U16, &header[105..]).max(1),
+            record_length: unsigned(&header[105..107]).max(1),
             points: if is_extended && legacy_points == 0 {
                 u64_at(247)
             } else {
@@ -56,7 +56,7 @@ impl Preview {
         if is_extended && u32_at(243) > 0 {
             let start = u64_at(235);
             let head = bytes(source, start, EVLR_HEAD as usize, length)?;
-            let size = unsigned(Scalar::U64, &head[20..]);
+            let size = unsigned(&head[20..28]);
             if size > length - start - EVLR_HEAD {
                 return Err(truncated("an extended variable-length record", length));
             }
@@ -68,19 +68,6 @@ impl Preview {
     pub(super) fn end_of_points(&self) -> u64 {
         // No overflow: at most 2³² + 2³⁶ × 2¹⁶.
         self.offset_to_points + self.points * self.record_length
-    }
-}
-
-/// The unsigned integer at the start of `bytes`.
-pub(super) fn unsigned(scalar: Scalar, bytes: &[u8]) -> u64 {
-    match scalar {
-        Scalar::U64 => {
-            let low = Scalar::U32.decode(bytes, Endian::Little) as u64;
-            let high = Scalar::U32.decode(&bytes[4..], Endian::Little) as u64;
-            high << 32 | low
-        }
-        // At most 32 bits: exact.
-        _ => scalar.decode(bytes, Endian::Little) as u64,
     }
 }
 
@@ -113,11 +100,9 @@ fn io_error(error: std::io::Error) -> SourceError {
 }
 
 pub(super) fn truncated(what: &str, length: u64) -> SourceError {
-    let what = what.to_owned();
-    SourceError::new(SourceErrorKind::Truncated { what }, Position::Byte(length))
+    SourceErrorKind::truncated(what).at(Position::Byte(length))
 }
 
-pub(super) fn bad_header(reason: String) -> SourceError {
-    let format = Format::Las;
-    SourceErrorKind::Header { format, reason }.into()
+pub(super) fn bad_header(reason: impl Into<String>) -> SourceError {
+    SourceErrorKind::header(Format::Las, reason).into()
 }

@@ -22,8 +22,7 @@ pub(super) fn read(
     let mut left = header.points;
     while left > 0 {
         let Some(line) = input.line()? else {
-            let what = "the points".to_owned();
-            return Err(input.error_at_line(SourceErrorKind::Truncated { what }));
+            return Err(input.error_at_line(SourceErrorKind::truncated("the points")));
         };
         if line.trim_ascii().is_empty() {
             continue;
@@ -44,10 +43,8 @@ fn read_point(
     let mut tokens = line
         .split(u8::is_ascii_whitespace)
         .filter(|token| !token.is_empty());
-    let wrong_number = || {
-        let reason = format!("the line does not have {} values", columns.len());
-        SourceErrorKind::Value { reason }
-    };
+    let count = columns.len();
+    let wrong_number = || SourceErrorKind::value(format!("the line does not have {count} values"));
     let mut sample = Sample::EMPTY;
     for column in columns {
         let token = tokens.next().ok_or_else(wrong_number)?;

@@ -2,12 +2,12 @@
 
 use super::header::Header;
 use super::lzf;
+use crate::SourceErrorKind;
 use crate::collector::{Collector, Sample};
 use crate::error::Result;
 use crate::input::Input;
-use crate::scalar::{Endian, Scalar};
+use crate::scalar::{Endian, unsigned};
 use crate::slot::Columns;
-use crate::{SourceError, SourceErrorKind};
 
 /// One block of LZF: two sizes, then data that unpacks to all of the first field, all of the
 /// second, and so on.
@@ -19,22 +19,18 @@ pub(super) fn read(
 ) -> Result<()> {
     let position = input.byte_position();
     let sizes = input.bytes(8, "the sizes of the compressed points")?;
-    let size = |bytes| Scalar::U32.decode(bytes, Endian::Little) as u64;
-    let (packed, unpacked) = (size(&sizes[..4]), size(&sizes[4..]));
+    let (packed, unpacked) = (unsigned(&sizes[..4]), unsigned(&sizes[4..]));
     // Fits: points are limited, and a record has at most 128 KiB.
     let expected = header.points.saturating_mul(header.record_size() as u64);
+    let damaged = |reason| SourceErrorKind::Compression { reason }.at(position);
     if unpacked != expected {
-        let reason = format!("it unpacks to {unpacked} bytes, but the points need {expected}");
-        return Err(SourceError::new(
-            SourceErrorKind::Compression { reason },
-            position,
-        ));
+        return Err(damaged(format!(
+            "it unpacks to {unpacked} bytes, but the points need {expected}"
+        )));
     }
     let packed = input.gather(packed, "the compressed points")?;
-    let unpacked = lzf::unpack(&packed, unpacked).map_err(|reason| {
-        let reason = format!("LZF: {reason}");
-        SourceError::new(SourceErrorKind::Compression { reason }, position)
-    })?;
+    let unpacked =
+        lzf::unpack(&packed, unpacked).map_err(|reason| damaged(format!("LZF: {reason}")))?;
     drop(packed);
 
     // Each field takes what its size is per point: offsets within a record scale with the number
@@ -46,9 +42,7 @@ pub(super) fn read(
             let start = column.place * points + index * column.scalar.size();
             sample.decode(column, &unpacked[start..], Endian::Little);
         }
-        collector
-            .push(&sample)
-            .map_err(|kind| SourceError::new(kind, position))?;
+        collector.push(&sample).map_err(|kind| kind.at(position))?;
     }
     input.points_read = collector.count();
     Ok(())

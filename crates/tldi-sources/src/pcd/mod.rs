@@ -20,10 +20,8 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
     let header = Header::read(input)?;
     let columns = header.columns();
     if !columns.has_position() {
-        return Err(input.error_at_line(SourceErrorKind::Header {
-            format: Format::Pcd,
-            reason: "it lacks one of the fields x, y, z".to_owned(),
-        }));
+        let reason = "it lacks one of the fields x, y, z";
+        return Err(input.error_at_line(SourceErrorKind::header(Format::Pcd, reason)));
     }
     check_count(header.points, options).map_err(|kind| input.error_at_line(kind))?;
     let mut collector = Collector::new(Layout::of(&columns, options), header.points, options);
@@ -33,16 +31,12 @@ pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawC
             // Little endian, as the machines that write it are.
             let sample = |record: &[u8]| columns.sample(record, Endian::Little);
             let size = header.record_size();
-            collector.read_records(input, size, header.points, "the points", sample)?;
+            collector.read_records(input, size, Some(header.points), "the points", sample)?;
         }
-        Encoding::BinaryCompressed => {
-            compressed::read(input, &header, &columns, &mut collector)?;
-        }
+        Encoding::BinaryCompressed => compressed::read(input, &header, &columns, &mut collector)?,
     }
     let mut cloud = collector.finish()?;
-    cloud.viewpoint = header
-        .viewpoint
-        .map(|viewpoint| (viewpoint - cloud.origin).as_vec3());
+    cloud.viewpoint = header.viewpoint.map(|v| (v - cloud.origin).as_vec3());
     cloud.size = header.size;
     Ok(cloud)
 }

@@ -45,27 +45,28 @@ pub(super) fn read(
     if element.role == Role::Faces {
         faces.reserve(element.count);
     }
-    // The slot of each property that is kept.
+    // The slot of each property that is kept; only vertices have some.
+    let slot = |i: usize| columns.0.iter().find(|c| c.place == i).map(|c| c.slot);
     let slots: Vec<Option<Slot>> = (0..element.properties.len())
-        .map(|i| columns.0.iter().find(|c| c.place == i).map(|c| c.slot))
+        .map(|i| slot(i).filter(|_| element.role == Role::Vertices))
         .collect();
     let corner_list = element.corner_list();
     let mut left = element.count;
     while left > 0 {
         let Some(line) = input.line()? else {
             let what = format!("the element `{}`", element.name);
-            return Err(input.error_at_line(SourceErrorKind::Truncated { what }));
+            return Err(input.error_at_line(SourceErrorKind::truncated(what)));
         };
         if line.trim_ascii().is_empty() {
             continue;
         }
         left -= 1;
         let mut tokens = Tokens(line);
-        let outcome = match element.role {
-            Role::Vertices => read_vertex(&mut tokens, element, &slots, collector),
-            Role::Faces | Role::Other => read_other(&mut tokens, element, corner_list, faces),
-        };
-        outcome
+        read_record(&mut tokens, element, &slots, corner_list, faces)
+            .and_then(|sample| match element.role {
+                Role::Vertices => collector.push(&sample),
+                Role::Faces | Role::Other => Ok(()),
+            })
             .and_then(|()| tokens.end())
             .map_err(|kind| input.error_at_line(kind))?;
         if element.role == Role::Vertices {
@@ -75,42 +76,23 @@ pub(super) fn read(
     Ok(())
 }
 
-type Outcome = std::result::Result<(), SourceErrorKind>;
+type Outcome<T> = std::result::Result<T, SourceErrorKind>;
 
-fn read_vertex(
+/// Reads a record: the values of the `slots`, and the corners of a face into `faces`.
+fn read_record(
     tokens: &mut Tokens<'_>,
     element: &Element,
     slots: &[Option<Slot>],
-    collector: &mut Collector,
-) -> Outcome {
-    let mut sample = Sample::EMPTY;
-    for (property, slot) in element.properties.iter().zip(slots) {
-        match property.kind {
-            Kind::One(_) => {
-                let token = tokens.next()?;
-                if let Some(slot) = slot {
-                    sample.set(*slot, parse_number(token)?);
-                }
-            }
-            Kind::List { .. } => {
-                for _ in 0..tokens.list_length()? {
-                    tokens.next()?;
-                }
-            }
-        }
-    }
-    collector.push(&sample)
-}
-
-fn read_other(
-    tokens: &mut Tokens<'_>,
-    element: &Element,
     corner_list: Option<usize>,
     faces: &mut Faces,
-) -> Outcome {
+) -> Outcome<Sample> {
+    let mut sample = Sample::EMPTY;
     for (index, property) in element.properties.iter().enumerate() {
         let Kind::List { .. } = property.kind else {
-            tokens.next()?;
+            let token = tokens.next()?;
+            if let Some(slot) = slots[index] {
+                sample.set(slot, parse_number(token)?);
+            }
             continue;
         };
         let mut fan = Fan::default();
@@ -122,18 +104,18 @@ fn read_other(
             }
         }
     }
-    Ok(())
+    Ok(sample)
 }
 
 /// The words of a line.
 struct Tokens<'a>(&'a [u8]);
 
 impl<'a> Tokens<'a> {
-    fn next(&mut self) -> std::result::Result<&'a [u8], SourceErrorKind> {
+    fn next(&mut self) -> Outcome<&'a [u8]> {
         let rest = self.0.trim_ascii_start();
         if rest.is_empty() {
-            let reason = "the line has fewer values than its element has properties".to_owned();
-            return Err(SourceErrorKind::Value { reason });
+            let reason = "the line has fewer values than its element has properties";
+            return Err(SourceErrorKind::value(reason));
         }
         let length = rest
             .iter()
@@ -144,18 +126,17 @@ impl<'a> Tokens<'a> {
         Ok(token)
     }
 
-    fn list_length(&mut self) -> std::result::Result<u64, SourceErrorKind> {
+    fn list_length(&mut self) -> Outcome<u64> {
         let length = parse_integer(self.next()?)?;
-        u64::try_from(length).map_err(|_| SourceErrorKind::Value {
-            reason: format!("a list has {length} items"),
-        })
+        u64::try_from(length)
+            .map_err(|_| SourceErrorKind::value(format!("a list has {length} items")))
     }
 
-    fn end(&self) -> Outcome {
+    fn end(&self) -> Outcome<()> {
         if self.0.trim_ascii().is_empty() {
             return Ok(());
         }
-        let reason = "the line has more values than its element has properties".to_owned();
-        Err(SourceErrorKind::Value { reason })
+        let reason = "the line has more values than its element has properties";
+        Err(SourceErrorKind::value(reason))
     }
 }

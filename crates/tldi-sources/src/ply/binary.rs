@@ -62,7 +62,7 @@ pub(super) fn read(
         // A record fits into the buffer: a header has at most 10,000 lines, a value 8 bytes.
         (Role::Vertices, Some(size)) => {
             let sample = |record: &[u8]| columns.sample(record, endian);
-            collector.read_records(input, size, element.count, "the vertices", sample)
+            collector.read_records(input, size, Some(element.count), "the vertices", sample)
         }
         (Role::Vertices, None) => read_vertices(input, element, endian, columns, collector),
         (_, Some(size)) => {
@@ -151,7 +151,7 @@ fn read_corners(
             faces
                 .corner(item.decode_integer(bytes, endian))
                 .and_then(|corner| fan.push(corner, faces))
-                .map_err(|kind| crate::SourceError::new(kind, position))?;
+                .map_err(|kind| kind.at(position))?;
         }
     }
     Ok(())
@@ -168,8 +168,7 @@ fn list_length(
     let length = count.decode_integer(bytes, endian);
     length.and_then(|n| u64::try_from(n).ok()).ok_or_else(|| {
         let length = length.map_or("more than 2⁶³".to_owned(), |n| n.to_string());
-        let reason = format!("a list has {length} items");
-        crate::SourceError::new(SourceErrorKind::Value { reason }, position)
+        SourceErrorKind::value(format!("a list has {length} items")).at(position)
     })
 }
 

@@ -26,10 +26,7 @@ use header::{Element, Encoding, Header, Role};
 pub(crate) fn parse(input: &mut Input<'_>, options: &ReadOptions) -> Result<RawCloud> {
     let header = Header::read(input)?;
     let header_error = |input: &Input<'_>, reason: &str| {
-        input.error_at_line(SourceErrorKind::Header {
-            format: Format::Ply,
-            reason: reason.to_owned(),
-        })
+        input.error_at_line(SourceErrorKind::header(Format::Ply, reason))
     };
     let Some(vertices) = header.elements.iter().find(|e| e.role == Role::Vertices) else {
         return Err(header_error(input, "there is no element `vertex`"));

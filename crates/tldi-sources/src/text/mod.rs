@@ -114,13 +114,11 @@ impl State<'_> {
 }
 
 fn no_header(line: &[u8]) -> SourceErrorKind {
-    SourceErrorKind::Header {
-        format: Format::Text,
-        reason: format!(
-            "expected numbers, or the names of columns with x, y and z among them, found `{}`",
-            excerpt(line)
-        ),
-    }
+    let found = excerpt(line);
+    let reason = format!(
+        "expected numbers, or the names of columns with x, y and z among them, found `{found}`"
+    );
+    SourceErrorKind::header(Format::Text, reason)
 }
 
 /// What is between columns.
@@ -164,14 +162,12 @@ impl Separator {
     }
 
     fn number(self, field: &[u8]) -> Outcome<f64> {
-        if self == Self::Semicolon && field.contains(&b',') {
-            let mut with_point = field.to_vec();
-            for byte in with_point.iter_mut().filter(|b| **b == b',') {
-                *byte = b'.';
-            }
-            return parse_number(&with_point);
+        if self != Self::Semicolon || !field.contains(&b',') {
+            return parse_number(field);
         }
-        parse_number(field)
+        let point = |byte: &u8| if *byte == b',' { b'.' } else { *byte };
+        let with_point: Vec<u8> = field.iter().map(point).collect();
+        parse_number(&with_point)
     }
 }
 
@@ -224,15 +220,10 @@ impl Table {
                 return Err(SourceErrorKind::UnnamedColumns { what });
             }
         };
-        let columns = named_columns(&["x", "y", "z"].map(str::to_owned));
         Ok(Self {
-            separator,
             width,
-            exact: true,
             triples,
-            collector: Collector::new(Layout::of(&columns, options), 0, options),
-            columns,
-            fields: Vec::new(),
+            ..Self::assumed(separator, &["x", "y", "z"], options)
         })
     }
 
@@ -256,7 +247,7 @@ impl Table {
         if found < self.width || found > self.width && self.exact {
             let width = self.width;
             let reason = format!("the line does not have the expected {width} columns");
-            return Err(SourceErrorKind::Value { reason });
+            return Err(SourceErrorKind::value(reason));
         }
         let mut sample = Sample::EMPTY;
         for column in &self.columns.0 {
@@ -273,44 +264,29 @@ impl Table {
         let width = self.width;
         let mut cloud = self.collector.finish()?;
         let mut triples = self.triples.into_iter();
-        match (triples.next(), triples.next()) {
-            (None, _) => {}
-            (Some(only), None) if only.is_color() => cloud.colors = Some(only.into_colors()),
-            (Some(only), None) if width == 6 && only.is_normal() => {
-                cloud.normals = Some(only.into_normals());
+        let (color, normal) = match (triples.next(), triples.next()) {
+            (None, _) => (None, None),
+            (Some(only), None) if only.is_color() => (Some(only), None),
+            (Some(only), None) if width == 6 && only.is_normal() => (None, Some(only)),
+            (Some(first), Some(second)) if fit(&first, &second) => (Some(first), Some(second)),
+            (Some(first), Some(second)) if fit(&second, &first) => (Some(second), Some(first)),
+            _ => {
+                let what = match width {
+                    6 => "the last three of six columns without names are neither colours (whole numbers from 0 to 255) nor normals (of length 1)",
+                    7 => "the last three of seven columns without names are no colours (whole numbers from 0 to 255)",
+                    _ => "the last six of nine columns without names are not colours (whole numbers from 0 to 255) and normals (of length 1)",
+                }
+                .to_owned();
+                return Err(SourceErrorKind::UnnamedColumns { what });
             }
-            (Some(_), None) if width == 6 => {
-                return Err(unclear(
-                    "the last three of six columns without names are neither colours (whole numbers from 0 to 255) nor normals (of length 1)",
-                ));
-            }
-            (Some(_), None) => {
-                return Err(unclear(
-                    "the last three of seven columns without names are no colours (whole numbers from 0 to 255)",
-                ));
-            }
-            (Some(first), Some(second)) => {
-                let fit = |color: &Triple, normal: &Triple| {
-                    color.is_color() && (normal.is_normal() || normal.is_missing())
-                };
-                let (color, normal) = if fit(&first, &second) {
-                    (first, second)
-                } else if fit(&second, &first) {
-                    (second, first)
-                } else {
-                    return Err(unclear(
-                        "the last six of nine columns without names are not colours (whole numbers from 0 to 255) and normals (of length 1)",
-                    ));
-                };
-                cloud.colors = Some(color.into_colors());
-                cloud.normals = Some(normal.into_normals());
-            }
-        }
+        };
+        cloud.colors = color.map(Triple::into_colors).or(cloud.colors);
+        cloud.normals = normal.map(Triple::into_normals).or(cloud.normals);
         Ok(cloud)
     }
 }
 
-fn unclear(what: &str) -> SourceErrorKind {
-    let what = what.to_owned();
-    SourceErrorKind::UnnamedColumns { what }
+/// Whether the columns of one triple are colours, and those of the other normals.
+fn fit(color: &Triple, normal: &Triple) -> bool {
+    color.is_color() && (normal.is_normal() || normal.is_missing())
 }
