@@ -1,16 +1,36 @@
-//! From counts to places: the middle step of a counting sort.
+//! Counting sorts: from counts to places, and items to their places.
 
 use std::ops::AddAssign;
 
-/// Turns the number of items in each bin into where the bin ends, and returns the end of all. To place the items, last
-/// one first, count the end of their bin down: it ends up where the bin starts.
-pub(crate) fn ends_of(counts: &mut [u32]) -> u32 {
+/// Sorts items by their bins: tells `put` the place of each. Afterwards `starts` holds where each of the bins starts, and
+/// where the last one ends. Within a bin, the items are in reverse order.
+pub(crate) fn sort_by_bin<T>(
+    items: impl Iterator<Item = (u32, T)> + Clone,
+    bins: usize,
+    starts: &mut Vec<u32>,
+    mut put: impl FnMut(usize, T),
+) {
+    starts.clear();
+    starts.resize(bins + 1, 0);
+    for (bin, _) in items.clone() {
+        starts[bin as usize] += 1;
+    }
+    ends_of(starts);
+    // Filled from the end, so that each start ends up where it belongs.
+    for (bin, item) in items {
+        let place = &mut starts[bin as usize];
+        *place -= 1;
+        put(*place as usize, item);
+    }
+}
+
+/// Turns the number of items in each bin into where the bin ends.
+pub(crate) fn ends_of(counts: &mut [u32]) {
     let mut end = 0;
     for count in counts {
         end += *count;
         *count = end;
     }
-    end
 }
 
 /// Turns the number of items in each bin into where the bin starts, and returns the end of all.

@@ -1,7 +1,7 @@
 //! Which contact pixels continue each other, and which penetrations their neighbours confirm.
 
 use crate::contact::retain_by_index;
-use crate::counting_sort::ends_of;
+use crate::counting_sort::sort_by_bin;
 use crate::{ContactPixel, PairResult, Params};
 use std::ops::Range;
 
@@ -184,28 +184,15 @@ impl Links {
 
     /// Fills what [`neighbors`](Self::neighbors) returns.
     fn index(&mut self, contacts: &[ContactPixel]) {
-        self.starts.clear();
-        self.starts.resize(contacts.len() + 1, 0);
-        for &(k, l) in &self.pairs {
-            self.starts[k as usize] += 1;
-            self.starts[l as usize] += 1;
-        }
-        let end = ends_of(&mut self.starts);
-        // Filled from the end, so that each start ends up where it belongs.
-        self.neighbors.clear();
-        self.neighbors.resize(end as usize, 0);
-        self.steps.clear();
-        self.steps.resize(end as usize, [0; 2]);
-        for &(k, l) in &self.pairs {
+        self.neighbors.resize(2 * self.pairs.len(), 0);
+        self.steps.resize(2 * self.pairs.len(), [0; 2]);
+        let both = self.pairs.iter().flat_map(|&(k, l)| [(k, l), (l, k)]);
+        let ways = both.map(|(k, l)| (k, (k, l)));
+        sort_by_bin(ways, contacts.len(), &mut self.starts, |place, (k, l)| {
             let [from, to] = [k, l].map(|m| contacts[m as usize].pixel);
-            let step = [0, 1].map(|axis| (to[axis] - from[axis]) as i8);
-            for (of, neighbor, step) in [(k, l, step), (l, k, step.map(|s| -s))] {
-                let slot = &mut self.starts[of as usize];
-                *slot -= 1;
-                self.neighbors[*slot as usize] = neighbor;
-                self.steps[*slot as usize] = step;
-            }
-        }
+            self.neighbors[place] = l;
+            self.steps[place] = [0, 1].map(|axis| (to[axis] - from[axis]) as i8);
+        });
     }
 }
 
@@ -220,20 +207,11 @@ pub(crate) struct Groups {
 impl Groups {
     /// Sorts as many items as `roots` has, each by its root. Cost: linear.
     pub(crate) fn sort(&mut self, roots: &[u32]) {
-        self.starts.clear();
-        self.starts.resize(roots.len(), 0);
-        for &root in roots {
-            self.starts[root as usize] += 1;
-        }
-        ends_of(&mut self.starts);
-        // Filled from the end, so that each start ends up where it belongs.
-        self.members.clear();
         self.members.resize(roots.len(), 0);
-        for (item, &root) in roots.iter().enumerate().rev() {
-            let slot = &mut self.starts[root as usize];
-            *slot -= 1;
-            self.members[*slot as usize] = item as u32;
-        }
+        let items = roots.iter().enumerate().rev().map(|(k, root)| (*root, k));
+        sort_by_bin(items, roots.len(), &mut self.starts, |place, item| {
+            self.members[place] = item as u32;
+        });
     }
 
     /// The sets of those roots.

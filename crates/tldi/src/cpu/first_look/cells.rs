@@ -6,7 +6,7 @@
 //! no search for neighbours, no normals of points, no splats. Sums are integers: they do not depend
 //! on the order of the points.
 
-use crate::counting_sort::ends_of;
+use crate::counting_sort::sort_by_bin;
 use crate::cpu::columns::Columns;
 use crate::cpu::first_look::cell_plane::{CellPlane, Sums, moved};
 use crate::cpu::lanes::multiversioned;
@@ -215,20 +215,11 @@ impl Cells {
                 point.key |= if is_exit(i as usize) { EXIT } else { 0 };
             }
         }
-        self.starts.clear();
-        self.starts.resize(count + 1, 0);
-        for (pixel, _) in &self.located {
-            self.starts[*pixel as usize] += 1;
-        }
-        let end = ends_of(&mut self.starts);
-        // Filled from the end, so that each start ends up where it belongs.
-        self.points.clear();
-        self.points.resize(end as usize, Point::default());
-        for (pixel, point) in self.located.iter().rev() {
-            let slot = &mut self.starts[*pixel as usize];
-            *slot -= 1;
-            self.points[*slot as usize] = *point;
-        }
+        self.points.resize(kept.len(), Point::default());
+        let located = self.located.iter().rev().copied();
+        sort_by_bin(located, count, &mut self.starts, |place, point| {
+            self.points[place] = point;
+        });
     }
 
     /// Makes cells of the points of each pixel.

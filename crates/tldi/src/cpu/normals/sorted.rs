@@ -1,6 +1,6 @@
 //! Points in a grid of cells, so that each finds its neighbours in 27 of them.
 
-use crate::counting_sort::ends_of;
+use crate::counting_sort::sort_by_bin;
 use crate::cpu::lanes::{bounds, multiversioned, truncated};
 use crate::cpu::zone::cells_over;
 use glamx::Vec3;
@@ -120,38 +120,23 @@ impl Sorted {
             dims,
         } = self;
         *dims = [grid.dims[0], grid.dims[1]];
-        offsets.clear();
-        offsets.resize(grid.cells() + 1, 0);
         cells.resize(support.len(), 0);
         locate(grid, points, cells);
-        // Counts go one further, so that after the prefix sum an entry is its cell's cursor, and
-        // after the sort its end: the next cell's first point.
-        for &cell in &*cells {
-            offsets[cell as usize + 1] += 1;
-        }
-        ends_of(offsets);
         entries.resize(support.len(), Entry::default());
         for coordinate in &mut *coordinates {
             coordinate.resize(support.len() + RUN, 0.0);
         }
-        for (k, (&id, &cell)) in support.iter().zip(&*cells).enumerate().rev() {
-            let cursor = &mut offsets[cell as usize + 1];
-            *cursor -= 1;
-            let place = *cursor as usize;
+        let in_cells = cells.iter().enumerate().rev().map(|(k, cell)| (*cell, k));
+        sort_by_bin(in_cells, grid.cells(), offsets, |place, k| {
             entries[place] = Entry {
-                id,
-                cell,
+                id: support[k],
+                cell: cells[k],
                 wanted: wanted(k),
             };
             for (to, from) in coordinates.iter_mut().zip(&*points) {
                 to[place] = from[k];
             }
-        }
-        // Every entry has moved to its cell's first point, one index too far.
-        offsets.copy_within(1.., 0);
-        if let Some(end) = offsets.last_mut() {
-            *end = support.len() as u32;
-        }
+        });
     }
 
     /// Of the `k`-th point.
