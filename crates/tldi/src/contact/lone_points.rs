@@ -5,7 +5,6 @@
 //! rule, the points of a wire, of a coarse part of a scan and of a body of few points do not stand
 //! alone.
 
-use crate::cloud::reach::Ring;
 use crate::contact::links::{Groups, Links};
 use crate::contact::retain_by_index;
 use crate::cpu::cull::{CullScratch, Region, Survivors, cull};
@@ -89,13 +88,7 @@ impl Surroundings {
         } else {
             let bounds = (places.iter().copied()).fold(Aabb::EMPTY, Aabb::including);
             let bounds = bounds.loosened(2.0 * self.cell);
-            self.region = Region {
-                overlap: bounds,
-                other_from_frame: Pose3::IDENTITY,
-                other_bounds: bounds,
-                ring: Ring::default(),
-                included: 0.0,
-            };
+            self.region = Region::of_box(bounds);
             let (region, scratch) = (&self.region, &mut self.scratch);
             cull(cloud, frame_from_cloud, region, 1, scratch, &mut own);
             &own
@@ -343,18 +336,14 @@ mod tests {
                 .map(|p| pose.inverse_transform_point(*p))
                 .collect();
             let cloud = cloud(own);
+            let up_to = |edge: f32| Aabb {
+                min: Vec3::ZERO,
+                max: Vec3::splat(edge),
+            };
             let region = Region {
-                overlap: Aabb {
-                    min: Vec3::ZERO,
-                    max: Vec3::splat(0.32),
-                },
                 other_from_frame: Pose3::translation(-0.02, 0.0, 0.0),
-                other_bounds: Aabb {
-                    min: Vec3::ZERO,
-                    max: Vec3::ONE,
-                },
-                ring: Ring::default(),
-                included: 0.0,
+                other_bounds: up_to(1.0),
+                ..Region::of_box(up_to(0.32))
             };
             let (mut culled, mut scratch) = (Survivors::default(), CullScratch::default());
             cull(&cloud, &pose, &region, 1, &mut scratch, &mut culled);
@@ -416,13 +405,7 @@ mod tests {
             let own = points.map(|p| pose.inverse_transform_point(p));
             let cloud = cloud(own.collect());
             let everything = cloud.bounds().transformed(&pose).loosened(1.0);
-            let region = Region {
-                overlap: everything,
-                other_from_frame: Pose3::IDENTITY,
-                other_bounds: everything,
-                ring: Ring::default(),
-                included: 0.0,
-            };
+            let region = Region::of_box(everything);
             let (mut culled, mut scratch) = (Survivors::default(), CullScratch::default());
             cull(&cloud, &pose, &region, 1, &mut scratch, &mut culled);
             let mut around = Surroundings::default();

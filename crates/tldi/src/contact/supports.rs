@@ -180,6 +180,10 @@ mod tests {
     use super::*;
     use fastrand::Rng;
 
+    fn point(middle: Vec3, gap: f32) -> ContactPoint {
+        ContactPoint::about(middle, gap, Vec3::Y)
+    }
+
     /// Feet under a table of noisy height: always the same four, however it is tilted.
     #[test]
     fn tilting_changes_nothing() {
@@ -195,15 +199,7 @@ mod tests {
             let points: Vec<ContactPoint> = feet
                 .iter()
                 .zip(&noise)
-                .map(|(&p, noise)| {
-                    let gap = noise + tilt.x * p.x + tilt.y * p.z;
-                    let apart = 0.5 * gap * Vec3::Y;
-                    ContactPoint {
-                        point_a: p - apart,
-                        point_b: p + apart,
-                        gap,
-                    }
-                })
+                .map(|(&p, noise)| point(p, noise + tilt.x * p.x + tilt.y * p.z))
                 .collect();
             let found = supports(&points, Vec3::Y, 0.001);
             let mut indices = found.indices;
@@ -219,10 +215,11 @@ mod tests {
         let cap = |bend: Vec2| {
             let points: Vec<ContactPoint> = (0..81)
                 .map(|k| Vec2::new((k % 9) as f32 - 4.0, (k / 9) as f32 - 4.0))
-                .map(|p| ContactPoint {
-                    point_a: Vec3::new(p.x, 0.0, p.y),
-                    point_b: Vec3::new(p.x, 0.0, p.y),
-                    gap: (bend * p * p).element_sum() + 0.1 * p.x,
+                .map(|p| {
+                    point(
+                        Vec3::new(p.x, 0.0, p.y),
+                        (bend * p * p).element_sum() + 0.1 * p.x,
+                    )
                 })
                 .collect();
             supports(&points, Vec3::Y, 1e-4)
@@ -256,11 +253,7 @@ mod tests {
             let places = (-4..=4).flat_map(|i| (-9..=9).map(move |j| (i, j)));
             let points: Vec<ContactPoint> = (places.filter(|(i, _)| is_seen(*i)))
                 .map(|(i, j)| Vec3::new(i as f32, 0.0, j as f32))
-                .map(|p| ContactPoint {
-                    point_a: p,
-                    point_b: p,
-                    gap: 0.05 * (p.x - 1.0).powi(2) + 0.01 * p.z,
-                })
+                .map(|p| point(p, 0.05 * (p.x - 1.0).powi(2) + 0.01 * p.z))
                 .collect();
             supports(&points, Vec3::Y, 1e-4)
         };
@@ -282,11 +275,7 @@ mod tests {
         let points_of = |gap: &dyn Fn(Vec2) -> f32| -> Vec<ContactPoint> {
             (0..144)
                 .map(|k| Vec2::new((k % 12) as f32 - 5.5, (k / 12) as f32 - 5.5))
-                .map(|p| ContactPoint {
-                    point_a: Vec3::new(p.x, 0.0, p.y),
-                    point_b: Vec3::new(p.x, 0.0, p.y),
-                    gap: gap(p),
-                })
+                .map(|p| point(Vec3::new(p.x, 0.0, p.y), gap(p)))
                 .collect()
         };
         let tilt = |p: Vec3| 0.02 * p.x - 0.01 * p.z;
@@ -336,12 +325,8 @@ mod tests {
                     } else {
                         sides.map(|s| s * rng.f32())
                     };
-                    let point = Vec3::new(0.004 * place[0], 0.0, 0.002 * place[1]);
-                    ContactPoint {
-                        point_a: point,
-                        point_b: point,
-                        gap: 0.01 * rng.f32(),
-                    }
+                    let middle = Vec3::new(0.004 * place[0], 0.0, 0.002 * place[1]);
+                    point(middle, 0.01 * rng.f32())
                 })
                 .collect();
             let found = supports(&points, Vec3::Y, 1e-5);
@@ -362,13 +347,7 @@ mod tests {
                 .map(|p| {
                     let jitter = Vec2::new(rng.f32(), rng.f32()) - 0.5;
                     let p = turn.rotate(p + 0.2 * jitter);
-                    let point = Vec3::new(p.x, 0.0, p.y);
-                    let gap = 0.02 * rng.f32();
-                    ContactPoint {
-                        point_a: point,
-                        point_b: point,
-                        gap,
-                    }
+                    point(Vec3::new(p.x, 0.0, p.y), 0.02 * rng.f32())
                 })
                 .collect();
             points[94].gap = -0.3;
@@ -386,11 +365,7 @@ mod tests {
     fn an_odd_one_out_leaves_the_corners() {
         let mut points: Vec<ContactPoint> = (0..81)
             .map(|k| Vec3::new((k % 9) as f32, 0.0, (k / 9) as f32))
-            .map(|p| ContactPoint {
-                point_a: p,
-                point_b: p,
-                gap: 0.0,
-            })
+            .map(|p| point(p, 0.0))
             .collect();
         points[39].gap = -1.0;
         let mut found = supports(&points, Vec3::Y, 0.01).indices;
@@ -402,11 +377,7 @@ mod tests {
     fn rows_and_single_points_are_enough() {
         let row: Vec<ContactPoint> = (0..5)
             .map(|k| Vec3::new(k as f32, 0.0, 0.0))
-            .map(|p| ContactPoint {
-                point_a: p,
-                point_b: p,
-                gap: 0.0,
-            })
+            .map(|p| point(p, 0.0))
             .collect();
         let mut ends = supports(&row, Vec3::Y, 0.01).indices;
         ends.sort();

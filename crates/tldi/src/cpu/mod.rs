@@ -27,13 +27,12 @@ mod splat_radius;
 pub(crate) mod sweep;
 pub(crate) mod zone;
 
-use crate::cloud::reach::Ring;
 use crate::{
-    Aabb, Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud,
-    Surface, Tldi, Variant, VirtualCamera, Work, paper,
+    Backend, BackendError, Impact, ImpactQuery, PairQuery, PairResult, Params, PointCloud, Surface,
+    Tldi, Variant, VirtualCamera, Work, paper,
 };
 use cull::Region;
-use glamx::{Pose3, Vec3};
+use glamx::Pose3;
 use rayon::prelude::*;
 use room::{Cost, Room};
 use scratch::Scratch;
@@ -268,38 +267,22 @@ pub fn build(
         return out;
     }
     if params.variant() == Variant::Paper {
+        let mut scratch = paper::Scratch::default();
         paper::build(
             cloud,
             frame_from_cloud,
             camera,
             params,
-            &mut paper::Scratch::default(),
+            &mut scratch,
             &mut out,
         );
         return out;
     }
     let mut side = Side::default();
-    let everything = Region {
-        overlap: cloud
-            .bounds()
-            .transformed(frame_from_cloud)
-            .loosened(f32::MAX.sqrt()),
-        other_from_frame: Pose3::IDENTITY,
-        other_bounds: Aabb {
-            min: Vec3::NEG_INFINITY,
-            max: Vec3::INFINITY,
-        },
-        ring: Ring::default(),
-        included: 0.0,
-    };
-    cull::cull(
-        cloud,
-        frame_from_cloud,
-        &everything,
-        1,
-        &mut side.cull,
-        &mut side.points,
-    );
+    let bounds = cloud.bounds().transformed(frame_from_cloud);
+    let everything = Region::of_box(bounds.loosened(f32::MAX.sqrt()));
+    let (scratch, points) = (&mut side.cull, &mut side.points);
+    cull::cull(cloud, frame_from_cloud, &everything, 1, scratch, points);
     let mut camera = *camera;
     let mut room = Room::default();
     loop {

@@ -148,14 +148,7 @@ mod tests {
         let point = |k: usize| Vec3::new((k % width) as f32, (k / width) as f32, 0.0);
         let points: Vec<Vec3> = (0..width * rows).map(point).collect();
         let cloud = PointCloud::builder(points).radius(1.0).build().unwrap();
-        let everything = cloud.bounds().loosened(1.0);
-        let region = Region {
-            overlap: everything,
-            other_from_frame: Pose3::IDENTITY,
-            other_bounds: everything,
-            ring: Ring::default(),
-            included: 0.0,
-        };
+        let region = Region::of_box(cloud.bounds().loosened(1.0));
         let (mut left, mut scratch) = (Survivors::default(), CullScratch::default());
         let frame = Pose3::IDENTITY;
         cull(&cloud, &frame, &region, stride, &mut scratch, &mut left);
@@ -185,11 +178,9 @@ mod tests {
         for frame_from_cloud in [Pose3::IDENTITY, turned] {
             for other_from_frame in [Pose3::IDENTITY, turned] {
                 let region = Region {
-                    overlap: aabb(0.6),
                     other_from_frame,
                     other_bounds: aabb(0.5),
-                    ring: Ring::default(),
-                    included: 0.0,
+                    ..Region::of_box(aabb(0.6))
                 };
                 let is_kept = |&p: &Vec3| {
                     let [p, q] = [p, other_from_frame * p].map(Vec3::abs);

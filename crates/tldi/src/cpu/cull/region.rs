@@ -25,6 +25,17 @@ pub struct Region {
 }
 
 impl Region {
+    /// All that is in a box in the frame of the query.
+    pub(crate) fn of_box(bounds: Aabb) -> Self {
+        Self {
+            overlap: bounds,
+            other_from_frame: Pose3::IDENTITY,
+            other_bounds: bounds,
+            ring: Ring::default(),
+            included: 0.0,
+        }
+    }
+
     /// The region of the points of a radius, metres.
     pub(super) fn of_radius(&self, radius: f32) -> Self {
         let beyond = self.ring.beyond(self.included, radius);
