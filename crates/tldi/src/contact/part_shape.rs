@@ -6,7 +6,7 @@ use crate::contact::links::Links;
 use crate::contact::main_plane::LEAST_PLANE;
 use crate::contact::point_axes::longest_axis;
 use crate::contact::smooth::{Smooth, common_normal};
-use crate::contact::supports::supports;
+use crate::contact::supports::{Supports, supports};
 use crate::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS, Params};
 use glamx::Vec3;
 
@@ -133,8 +133,7 @@ impl Shape {
         members.partition_point(|&m| !behind(m))
     }
 
-    /// The patch's support points. If its deepest point is clearly deeper, as a ball's is, it
-    /// replaces the highest of them.
+    /// The patch's points: the lowest of a bowl, the ends of a valley's floor, or support points.
     pub(crate) fn patch(
         &self,
         members: &[u32],
@@ -143,78 +142,141 @@ impl Shape {
         params: &Params,
     ) -> ContactPatch {
         let ShapeScratch { points, tangents } = scratch;
-        let Pixels {
-            contacts,
-            smooth,
-            links,
-        } = *pixels;
-        let can_support = |m: &u32| smooth[*m as usize].gap <= self.support_gap;
-        let in_band = || {
-            (members.iter().filter(|m| can_support(m)))
-                .map(|&m| (&contacts[m as usize], &smooth[m as usize]))
+        let part = Part {
+            shape: self,
+            members,
+            pixels,
+            pixel_size: params.pixel_size,
         };
+        let in_band = part.in_band();
         points.clear();
-        points.extend(in_band().map(|(contact, smooth)| self.point(contact.middle(), smooth.gap)));
+        points.extend(in_band.map(|(contact, smooth)| self.point(contact.middle(), smooth.gap)));
         let supports = supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
         let rises = supports.roughness >= LEAST_RISE * params.pixel_size;
-        let lowest_of_bowl = supports.lowest_of_bowl.filter(|_| rises);
         let roughness = supports.roughness_about_bowl;
-        // How much lower than the lowest of the fitted points faces meet.
-        let mut lower = |lowest: &ContactPoint| {
-            let frame = Frame {
-                origin: self.centre,
-                axes: [self.longest, self.normal.cross(self.longest)],
-                normal: self.normal,
-            };
-            let pixels = in_band().map(|(contact, _)| contact);
-            lower_by(pixels, &frame, lowest, params.pixel_size, tangents)
+        if rises && let Some(lowest) = &supports.lowest_of_bowl {
+            return part.on_bowl(lowest, roughness, tangents);
+        }
+        let valley = supports.floor_of_valley.filter(|_| rises);
+        valley
+            .and_then(|floor| part.on_valley(floor, roughness))
+            .unwrap_or_else(|| part.on_supports(supports, rises, points, tangents))
+    }
+
+    /// Mean of the points with the smallest gaps.
+    fn deepest(&self, points: &[ContactPoint], pixel_size: f32) -> ContactPoint {
+        let (mut middle, mut gap, mut total) = (Vec3::ZERO, 0.0, 0.0);
+        for point in points {
+            let w = falloff(point.gap - self.least_gap, DEEPEST_BAND * pixel_size);
+            middle += w * point.middle();
+            gap += w * point.gap;
+            total += w;
+        }
+        self.point(middle / total, gap / total)
+    }
+
+    fn point(&self, middle: Vec3, gap: f32) -> ContactPoint {
+        ContactPoint::about(middle, gap, self.normal)
+    }
+}
+
+/// The pixels of a part and its shape.
+struct Part<'a> {
+    shape: &'a Shape,
+    members: &'a [u32],
+    pixels: &'a Pixels<'a>,
+    pixel_size: f32,
+}
+
+impl Part<'_> {
+    fn can_support(&self, m: &u32) -> bool {
+        self.pixels.smooth[*m as usize].gap <= self.shape.support_gap
+    }
+
+    /// The pixels that can be support points.
+    fn in_band(&self) -> impl Iterator<Item = (&ContactPixel, &Smooth)> + Clone {
+        let Pixels {
+            contacts, smooth, ..
+        } = *self.pixels;
+        let members = self.members.iter().filter(|m| self.can_support(m));
+        members.map(|&m| (&contacts[m as usize], &smooth[m as usize]))
+    }
+
+    fn contacts_in_band(&self) -> impl Iterator<Item = &ContactPixel> + Clone {
+        self.in_band().map(|(contact, _)| contact)
+    }
+
+    /// How much lower than the lowest of the fitted points faces meet.
+    fn lower(&self, lowest: &ContactPoint, tangents: &mut Vec<Face>) -> f32 {
+        let Shape {
+            normal,
+            centre,
+            longest,
+            ..
+        } = *self.shape;
+        let frame = Frame {
+            origin: centre,
+            axes: [longest, normal.cross(longest)],
+            normal,
         };
-        if let Some(lowest) = lowest_of_bowl {
-            // Around it the surfaces have other normals: points there would stop what rolls. Where noise
-            // leaves open where it is, points as far apart let a ball lie that would otherwise roll about.
-            let off_fit = in_band().map(|(contact, smooth)| contact.gap - smooth.gap);
-            let slope_error = slope_error(off_fit, params.pixel_size);
-            let Lowest {
-                point,
-                aside,
-                radii,
-            } = lowest;
-            let relative_radii = radii.map(|radius| {
-                relative_radius(radius, self.centre, in_band().map(|(contact, _)| contact)).0
-            });
-            let point = self.point(point.middle(), point.gap - lower(&point));
-            let [u, v] = aside.map(|aside| slope_error * aside);
-            let points = if slope_error > 0.0 {
-                let moved = |aside: Vec3| self.point(point.middle() + aside, point.gap);
-                [u, v, -u, -v].into_iter().map(moved).collect()
-            } else {
-                [point].into_iter().collect()
-            };
-            return ContactPatch {
-                normal: self.normal,
-                points,
-                relative_radii: Some(relative_radii),
-                roughness: roughness.max(GAP_PER_SLOPE * slope_error),
-            };
+        let pixels = self.contacts_in_band();
+        lower_by(pixels, &frame, lowest, self.pixel_size, tangents)
+    }
+
+    /// The lowest point of a bowl. Around it the surfaces have other normals: points there would stop what rolls. Where noise
+    /// leaves open where it is, points as far apart let a ball lie that would otherwise roll about.
+    fn on_bowl(&self, lowest: &Lowest, roughness: f32, tangents: &mut Vec<Face>) -> ContactPatch {
+        let shape = self.shape;
+        let Lowest {
+            point,
+            aside,
+            radii,
+        } = lowest;
+        let off_fit = (self.in_band()).map(|(contact, smooth)| contact.gap - smooth.gap);
+        let slope_error = slope_error(off_fit, self.pixel_size);
+        let relative = |radius| relative_radius(radius, shape.centre, self.contacts_in_band()).0;
+        let relative_radii = radii.map(relative);
+        let point = shape.point(point.middle(), point.gap - self.lower(point, tangents));
+        let [u, v] = aside.map(|aside| slope_error * aside);
+        let moved = |aside: Vec3| shape.point(point.middle() + aside, point.gap);
+        ContactPatch {
+            normal: shape.normal,
+            points: match slope_error > 0.0 {
+                true => [u, v, -u, -v].into_iter().map(moved).collect(),
+                false => [point].into_iter().collect(),
+            },
+            relative_radii: Some(relative_radii),
+            roughness: roughness.max(GAP_PER_SLOPE * slope_error),
         }
-        if let Some(Floor { ends, radius }) = supports.floor_of_valley.filter(|_| rises) {
-            let (radius, steady) =
-                relative_radius(radius, self.centre, in_band().map(|(contact, _)| contact));
-            // Where two faces meet at an edge the normals turn at once.
-            if steady >= STEADY {
-                let on_plane = |end: ContactPoint| self.point(end.middle(), end.gap);
-                return ContactPatch {
-                    normal: self.normal,
-                    points: ends.into_iter().map(on_plane).collect(),
-                    relative_radii: Some([radius, Vec3::ZERO]),
-                    roughness,
-                };
-            }
-        }
+    }
+
+    /// The ends of a valley's floor; none where two faces meet at an edge, where the normals turn at once.
+    fn on_valley(&self, Floor { ends, radius }: Floor, roughness: f32) -> Option<ContactPatch> {
+        let shape = self.shape;
+        let (radius, steady) = relative_radius(radius, shape.centre, self.contacts_in_band());
+        let on_plane = |end: ContactPoint| shape.point(end.middle(), end.gap);
+        (steady >= STEADY).then(|| ContactPatch {
+            normal: shape.normal,
+            points: ends.into_iter().map(on_plane).collect(),
+            relative_radii: Some([radius, Vec3::ZERO]),
+            roughness,
+        })
+    }
+
+    /// The support points. If the deepest of the `points` is clearly deeper, it replaces the highest of them.
+    fn on_supports(
+        &self,
+        supports: Supports,
+        rises: bool,
+        points: &[ContactPoint],
+        tangents: &mut Vec<Face>,
+    ) -> ContactPatch {
+        let shape = self.shape;
+        let roughness = supports.roughness_about_bowl;
         // Chosen for being low, they are lower than the plane of a flat contact by what its gaps scatter by.
         // What bends, or is rougher than that, is as low as it is, but for the rim of a flat contact.
         let scatter = if rises { 0.0 } else { roughness };
-        let off_plane = OFF_PLANE * params.pixel_size;
+        let off_plane = OFF_PLANE * self.pixel_size;
         let scatter = scatter + supports.flatness * (off_plane - scatter).max(0.0);
         // A pixel at the rim of a face stands out beyond the points of the face, by half a pixel on average. The mean of it
         // and its linked neighbours is as far inwards, at a corner, too, and does not move pixels within.
@@ -227,27 +289,20 @@ impl Shape {
         };
         let in_plane = |(k, above): (usize, f32)| {
             let point = points[k];
-            let member = members.iter().filter(|m| can_support(m)).nth(k);
-            let neighbors = member.map_or(&[][..], |&m| links.neighbors(m));
-            let (mut sum, mut count) = (point.middle(), 1.0);
-            for &l in neighbors.iter().filter(|l| can_support(l)) {
-                sum += contacts[l as usize].middle();
-                count += 1.0;
-            }
-            let off = (sum / count - point.middle()).reject_from_normalized(self.normal);
-            let aside = inwards * off;
+            let off = self.mean_around(k, point.middle()) - point.middle();
+            let aside = inwards * off.reject_from_normalized(shape.normal);
             let gap = point.gap - above.clamp(-scatter, scatter) + supports.slope.dot(aside);
-            self.point(point.middle() + aside, gap)
+            shape.point(point.middle() + aside, gap)
         };
         let chosen = supports.indices.into_iter().zip(supports.above_plane);
         let mut patch = ContactPatch {
-            normal: self.normal,
+            normal: shape.normal,
             points: chosen.map(in_plane).collect(),
             relative_radii: None,
             roughness,
         };
         patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
-        let deepest = self.deepest(points, params);
+        let deepest = shape.deepest(points, self.pixel_size);
         // Where the gaps do not rise only a bump under the face counts.
         let of_rims = if rises { supports.flatness } else { 1.0 } * off_plane;
         let deeper = DEEPER * supports.roughness + of_rims;
@@ -255,27 +310,26 @@ impl Shape {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
         }
-        let lower = lower(&patch.points[0]);
+        let lower = self.lower(&patch.points[0], tangents);
         for point in &mut patch.points {
-            *point = self.point(point.middle(), point.gap - lower);
+            *point = shape.point(point.middle(), point.gap - lower);
         }
         patch
     }
 
-    /// Mean of the points with the smallest gaps.
-    fn deepest(&self, points: &[ContactPoint], params: &Params) -> ContactPoint {
-        let (mut middle, mut gap, mut total) = (Vec3::ZERO, 0.0, 0.0);
-        for point in points {
-            let w = falloff(point.gap - self.least_gap, DEEPEST_BAND * params.pixel_size);
-            middle += w * point.middle();
-            gap += w * point.gap;
-            total += w;
+    /// Mean of the `middle` of the k-th pixel that can be a support point, and of those of its linked neighbours that can.
+    fn mean_around(&self, k: usize, middle: Vec3) -> Vec3 {
+        let Pixels {
+            contacts, links, ..
+        } = *self.pixels;
+        let mut members = self.members.iter().filter(|m| self.can_support(m));
+        let neighbors = members.nth(k).map_or(&[][..], |&m| links.neighbors(m));
+        let (mut sum, mut count) = (middle, 1.0);
+        for &l in neighbors.iter().filter(|l| self.can_support(l)) {
+            sum += contacts[l as usize].middle();
+            count += 1.0;
         }
-        self.point(middle / total, gap / total)
-    }
-
-    fn point(&self, middle: Vec3, gap: f32) -> ContactPoint {
-        ContactPoint::about(middle, gap, self.normal)
+        sum / count
     }
 }
 
