@@ -112,18 +112,7 @@ pub enum TldiError {
 /// Why a collider passes through clouds.
 ///
 /// ```
-/// # use rapier3d::prelude::*;
-/// # use rapier3d_tldi::prelude::*;
-/// # let points: Vec<Vector> = (0..400)
-/// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-/// #     .collect();
-/// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-/// # let mut world = PhysicsWorld::default();
-/// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-/// # tldi.attach(&mut world);
-/// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-/// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-/// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+#[doc = example_world!()]
 /// // A segment has no surface: `step` says so once.
 /// use rapier3d_tldi::Passes;
 /// let body = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.01, 0.5));

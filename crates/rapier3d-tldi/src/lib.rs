@@ -54,6 +54,9 @@
 //! - A body wholly inside a cloud's volume, surfaces apart, is not in contact.
 //! - Rapier cannot serialise custom shapes, nor the state of pairs with clouds.
 
+#[macro_use]
+mod example_setup;
+
 mod config;
 mod corrections;
 mod debug_render;

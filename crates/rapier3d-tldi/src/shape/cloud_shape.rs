@@ -113,12 +113,7 @@ impl PointCloudShape {
     /// A shape over `cloud`, with the mass of the solid that it encloses.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// let shape = PointCloudShape::new(scan);
     /// assert_eq!(shape.mass_model(), MassModel::default());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -135,12 +130,7 @@ impl PointCloudShape {
     /// [`CloudError::BadParameter`] for a shell whose thickness is not finite, or not greater than 0.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// use rapier3d_tldi::MassModel;
     /// let shape = PointCloudShape::with_mass_model(scan, MassModel::Shell { thickness: 0.01 })?;
     /// let mass = ColliderBuilder::new(SharedShape::new(shape)).density(1000.0).build().mass();
@@ -160,12 +150,7 @@ impl PointCloudShape {
     /// The points, in the shape's own frame.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// let shape = PointCloudShape::new(scan);
     /// assert_eq!((shape.cloud().len(), shape.cloud().mean_radius()), (400, 0.1));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -177,12 +162,7 @@ impl PointCloudShape {
     /// What of the cloud has mass.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// let model = MassModel::Shell { thickness: 0.01 };
     /// assert_eq!(PointCloudShape::with_mass_model(scan, model)?.mass_model(), model);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -195,12 +175,7 @@ impl PointCloudShape {
     /// hold the same points, and new points bring a new revision.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// let mut shape = PointCloudShape::new(scan);
     /// let copy = shape.clone();
     /// assert_eq!(shape.revision(), copy.revision());
@@ -223,12 +198,7 @@ impl PointCloudShape {
     /// the change.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// let mut shape = PointCloudShape::new(scan);
     /// shape.set_points(&points[..300], None)?;
     /// assert_eq!(shape.cloud().len(), 300);
@@ -248,12 +218,7 @@ impl PointCloudShape {
     /// Those of `set_points`.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// let mut shape = PointCloudShape::new(scan);
     /// let moved: Vec<Vector> = points.iter().map(|p| *p + 0.1 * Vector::Y).collect();
     /// shape.move_points(&moved, None)?; // as many as before; radii stay
@@ -291,12 +256,7 @@ impl PointCloudShape {
     /// with [`set_points`](Self::set_points).
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// let (mut shape, former) = (PointCloudShape::new(scan), 400);
     /// shape.set_cloud(PointCloud::builder(points[..9].to_vec()).radius(0.2).build()?);
     /// assert_eq!((former, shape.cloud().len()), (400, 9));
@@ -311,12 +271,7 @@ impl PointCloudShape {
     /// Lets the mass properties follow the present points when they are asked for next.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// use rapier3d::parry::shape::Shape;
     /// let mut shape = PointCloudShape::with_mass_model(scan, MassModel::Shell { thickness: 0.01 })?;
     /// let mass_of = |shape: &PointCloudShape| shape.mass_properties(1000.0).mass();

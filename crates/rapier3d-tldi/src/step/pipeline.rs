@@ -33,12 +33,7 @@ use web_time::Instant;
 /// speeds of surfaces, by the handles of colliders).
 ///
 /// ```
-/// # use rapier3d::prelude::*;
-/// # use rapier3d_tldi::prelude::*;
-/// # let points: Vec<Vector> = (0..400)
-/// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-/// #     .collect();
-/// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+#[doc = example_scan!()]
 /// let mut world = PhysicsWorld::default();
 /// let mut tldi = TldiPipeline::new(TldiConfig::default())?;
 /// tldi.attach(&mut world);
@@ -122,12 +117,7 @@ impl TldiPipeline {
     /// [`PointCloudShape`] and give each a clone.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// let tldi = TldiPipeline::new(TldiConfig::default())?;
     /// let mut world = PhysicsWorld::default();
     /// world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan).friction(0.8));
@@ -149,18 +139,7 @@ impl TldiPipeline {
     /// taken then.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// // What `step` does, one call after the other.
     /// let integration = world.integration_parameters;
     /// let (bodies, colliders) = (&world.bodies, &world.colliders);
@@ -249,18 +228,7 @@ impl TldiPipeline {
     /// pushed: rapier corrects their penetration, at up to 3 m/s.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// let risen: Vec<Vector> = points.iter().map(|p| *p + 0.05 * Vector::Y).collect(); // 3 m/s
     /// tldi.deform(&mut world, scan, &risen, None)?;
     /// let integration = world.integration_parameters;
@@ -297,18 +265,7 @@ impl TldiPipeline {
     /// failed, and [`TldiError::PassesThrough`] where a collider of a kind that does not meet clouds came near one.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// let integration = world.integration_parameters;
     /// let (bodies, colliders) = (&world.bodies, &world.colliders);
     /// let joints = (&world.impulse_joints, &world.multibody_joints);
@@ -376,18 +333,7 @@ impl TldiPipeline {
     /// `finish`: it was.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// let report = tldi.step(&mut world)?;
     /// assert_eq!((report.pairs_batched, report.pairs_in_contact), (1, 1));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -402,18 +348,7 @@ impl TldiPipeline {
     /// Those of [`step`](Self::step).
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// use std::sync::mpsc::channel;
     /// let (collisions, started) = channel();
     /// let ((forces, _), (tears, _)) = (channel(), channel());
@@ -454,18 +389,7 @@ impl TldiPipeline {
     /// awake, at the colliders' present poses.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// tldi.step(&mut world)?;
     /// for contact in tldi.contacts(&world.narrow_phase, &world.colliders) {
     ///     assert!((contact.depth - 0.01).abs() < 0.01, "{} m at {}", contact.depth, contact.point);

@@ -9,19 +9,8 @@ use tldi::Backend;
 /// What one step of a [`TldiPipeline`](crate::TldiPipeline) did.
 ///
 /// ```
-/// # use rapier3d::prelude::*;
-/// # use rapier3d_tldi::prelude::*;
-/// # let points: Vec<Vector> = (0..441)
-/// #     .map(|i| 0.05 * Vector::new((i % 21) as f32 - 10.0, 0.0, (i / 21) as f32 - 10.0))
-/// #     .collect();
-/// # let mut world = PhysicsWorld::default();
-/// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-/// # tldi.attach(&mut world);
-/// # let floor = PointCloud::builder(points).radius(0.05).build()?;
-/// # world.insert(RigidBodyBuilder::fixed(), tldi.collider(floor));
-/// // A ball of 10 cm that is 1 mm deep in a floor of points.
-/// let body = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.099);
-/// world.insert(body, ColliderBuilder::ball(0.1));
+#[doc = example_world!()]
+/// // A ball is 1 cm deep in a scan.
 /// let report = tldi.step(&mut world)?;
 /// assert_eq!((report.pairs_batched, report.pairs_missed), (1, 0));
 /// assert_eq!(report.pairs_in_contact, 1);
@@ -91,23 +80,12 @@ impl ComparedBy {
 /// A contact point between two colliders, at least one of which holds a cloud.
 ///
 /// ```
-/// # use rapier3d::prelude::*;
-/// # use rapier3d_tldi::prelude::*;
-/// # let points: Vec<Vector> = (0..441)
-/// #     .map(|i| 0.05 * Vector::new((i % 21) as f32 - 10.0, 0.0, (i / 21) as f32 - 10.0))
-/// #     .collect();
-/// # let mut world = PhysicsWorld::default();
-/// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-/// # tldi.attach(&mut world);
-/// # let floor = PointCloud::builder(points).radius(0.05).build()?;
-/// # world.insert(RigidBodyBuilder::fixed(), tldi.collider(floor));
-/// // A ball of 10 cm that is 1 mm deep in a floor of points.
-/// let body = RigidBodyBuilder::dynamic().translation(Vector::Y * 0.099);
-/// world.insert(body, ColliderBuilder::ball(0.1));
+#[doc = example_world!()]
+/// // A ball is 1 cm deep in a scan.
 /// tldi.step(&mut world)?;
 /// for contact in tldi.contacts(&world.narrow_phase, &world.colliders) {
 ///     // Below the ball, to within the radius of a point.
-///     assert!(contact.point.length() < 0.05, "{}", contact.point);
+///     assert!(contact.point.distance(Vector::new(1.0, 0.0, 1.0)) < 0.1, "{}", contact.point);
 ///     assert!(contact.normal.y.abs() > 0.99, "{}", contact.normal);
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -46,12 +46,7 @@ impl TldiPipeline {
     /// before rapier's default one.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
+    #[doc = example_scan!()]
     /// // Distances without a world. The pose is that of the second shape in the frame of the first.
     /// use rapier3d::parry::query::QueryDispatcher;
     /// let tldi = TldiPipeline::new(TldiConfig::default())?;
@@ -89,18 +84,7 @@ impl TldiPipeline {
     /// for a step with split sets.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// let moved: Vec<Vector> = points.iter().map(|p| *p + 0.01 * Vector::X).collect(); // 0.6 m/s
     /// tldi.deform(&mut world, scan, &moved, None)?;
     /// let integration = world.integration_parameters;

@@ -23,18 +23,7 @@ impl TldiPipeline {
     /// points are refused: the collider then keeps the old ones.
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// let sunk: Vec<Vector> = points.iter().map(|p| *p - 0.5 * Vector::Y).collect();
     /// tldi.set_points(&mut world, scan, &sunk, None)?;
     /// for _ in 0..60 {
@@ -59,18 +48,7 @@ impl TldiPipeline {
     /// Those of [`set_points`](Self::set_points).
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// let sunk: Vec<Vector> = points.iter().map(|p| *p - 0.5 * Vector::Y).collect();
     /// tldi.set_collider_points(&mut world.colliders, scan, &sunk, None)?;
     /// assert!((world.colliders[scan].compute_aabb().center().y + 0.5).abs() < 1e-6);
@@ -104,18 +82,7 @@ impl TldiPipeline {
     /// [`TldiError::NoSuchCollider`], [`TldiError::NotACloud`].
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// let half = PointCloud::builder(points[..200].to_vec()).radius(0.1).build()?;
     /// tldi.set_cloud(&mut world, scan, half)?;
     /// tldi.step(&mut world)?;
@@ -136,18 +103,7 @@ impl TldiPipeline {
     /// Those of [`set_cloud`](Self::set_cloud).
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// let half = PointCloud::builder(points[..200].to_vec()).radius(0.1).build()?;
     /// tldi.set_collider_cloud(&mut world.colliders, scan, half)?;
     /// assert!(world.colliders[scan].compute_aabb().center().z < 0.5);
@@ -250,18 +206,7 @@ impl TldiPipeline {
     /// Those of [`deform`](Self::deform).
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::prelude::*;
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
     /// let moved: Vec<Vector> = points.iter().map(|p| *p + 0.01 * Vector::X).collect(); // 0.6 m/s
     /// tldi.deform_collider(&mut world.colliders, scan, &moved, None, 1.0 / 60.0)?;
     /// assert!(world.colliders[scan].active_hooks().contains(ActiveHooks::MODIFY_SOLVER_CONTACTS));
