@@ -1,9 +1,7 @@
 //! Pictures of what the pipeline sees, through rapier's debug renderer.
 
 use crate::narrow_phase::manifolds;
-use crate::narrow_phase::parts::{
-    PartPair, ShapePair, cloud_of, has_cloud, part, part_count, within_reach,
-};
+use crate::narrow_phase::parts::{PartPair, ShapePair, cloud_of, has_cloud, part, part_count};
 use crate::step::candidates::{contact_reach, pose_of};
 use crate::step::prepared::Spot;
 use crate::step::report::cloud_pairs;
@@ -141,15 +139,8 @@ impl TldiPipeline {
         mode: TldiDebugRenderMode,
     ) -> Result<(), TldiError> {
         let (bodies, colliders) = (&world.bodies, &world.colliders);
-        let integration = &world.integration_parameters;
-        self.debug_render_sets(
-            integration,
-            bodies,
-            colliders,
-            &world.narrow_phase,
-            backend,
-            mode,
-        )
+        let (integration, pairs) = (&world.integration_parameters, &world.narrow_phase);
+        self.debug_render_sets(integration, bodies, colliders, pairs, backend, mode)
     }
 
     /// [`debug_render`](Self::debug_render) for split sets.
@@ -158,18 +149,8 @@ impl TldiPipeline {
     /// Those of [`debug_render`](Self::debug_render).
     ///
     /// ```
-    /// # use rapier3d::prelude::*;
-    /// # use rapier3d_tldi::{TldiDebugRenderMode, prelude::*};
-    /// # let points: Vec<Vector> = (0..400)
-    /// #     .map(|i| 0.1 * Vector::new((i % 20) as f32, 0.0, (i / 20) as f32))
-    /// #     .collect();
-    /// # let scan = PointCloud::builder(&points).radius(0.1).build()?.into_owned();
-    /// # let mut world = PhysicsWorld::default();
-    /// # let mut tldi = TldiPipeline::new(TldiConfig::default())?;
-    /// # tldi.attach(&mut world);
-    /// # let (_, scan) = world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
-    /// # let ball = RigidBodyBuilder::dynamic().translation(Vector::new(1.0, 0.19, 1.0));
-    /// # let (ball, _) = world.insert(ball, ColliderBuilder::ball(0.2));
+    #[doc = example_world!()]
+    /// # use rapier3d_tldi::TldiDebugRenderMode;
     /// # use rapier3d::pipeline::{DebugColor, DebugRenderBackend, DebugRenderObject};
     /// # struct Lines(Vec<[Vector; 2]>);
     /// # impl DebugRenderBackend for Lines {
@@ -222,18 +203,10 @@ impl TldiPipeline {
                 continue;
             }
             let pose1 = pose_of(collider1, bodies);
-            let shapes = ShapePair {
-                shape1: collider1.shape(),
-                shape2: collider2.shape(),
-                pos12: pose1.inv_mul(&pose_of(collider2, bodies)),
-                prediction: contact_reach(collider1, collider2, bodies, integration),
-            };
-            if !within_reach(
-                shapes.shape1,
-                shapes.shape2,
-                &shapes.pos12,
-                shapes.prediction,
-            ) {
+            let pos12 = pose1.inv_mul(&pose_of(collider2, bodies));
+            let reach = contact_reach(collider1, collider2, bodies, integration);
+            let shapes = ShapePair::new(collider1.shape(), collider2.shape(), pos12, reach);
+            if !shapes.is_within_reach() {
                 continue;
             }
             spot.compare(shapes, &self.config(), CpuBackend::compare)
@@ -299,7 +272,7 @@ impl<B: DebugRenderBackend> Drawing<'_, B> {
 
     /// See [`TldiDebugRenderMode::CONTACT_ZONE`]; in the frame of the first part.
     fn zone(&self, part_pair: &PartPair) -> Aabb {
-        let [index1, index2] = part_pair.parts;
+        let [index1, index2] = part_pair.indices;
         let (_, part1) = part(self.shapes.shape1, index1);
         let (_, part2) = part(self.shapes.shape2, index2);
         let bounds1 = part1.compute_local_aabb().loosened(self.shapes.prediction);

@@ -9,6 +9,7 @@
 //! | `sweeps` | a sweep does not know the contacts of its pair: it holds a body at a sheet that these push it out of | sweeps get the pair's contacts |
 //! | `impulses` | only contacts change velocities, and a body that a sweep holds may have none | `sweeps` and `surface_push` are gone |
 
+mod blocks;
 pub(crate) mod impulses;
 pub(crate) mod rolling;
 pub(crate) mod sampled_motion;

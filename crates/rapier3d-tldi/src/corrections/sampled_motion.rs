@@ -4,10 +4,11 @@
 //! normal of a contact. If the rise exceeds the noise of the samples twice in a row, it is the surface's speed. A surface
 //! that stands still, or is replaced by another one, has no speed.
 
+use crate::corrections::blocks;
 use nalgebra::{SMatrix, SVector};
 use rapier3d::glamx::Vec3;
 use rapier3d::math::{Pose, Vector};
-use tldi::{Aabb, BLOCK, PointCloud};
+use tldi::{Aabb, PointCloud};
 
 /// Radius about a contact, in mean radii, whose points tell the height of the surface: some thirty. Half: 13 of 636
 /// stability rows fail instead of 3, all new ones of streamed walls; twice: no change in any suite.
@@ -87,13 +88,11 @@ impl Probe {
         let (u, v) = self.normal.any_orthonormal_pair();
         let about = self.radius.hypot(reach);
         let mut near = Vec::new();
-        for (block, bounds) in blocks.iter().enumerate() {
-            let nearest = self.point.clamp(bounds.min, bounds.max);
-            if nearest.distance_squared(self.point) > about * about {
+        for (squared, indices) in blocks::by_distance(blocks, count, self.point) {
+            if squared > about * about {
                 continue;
             }
-            let first = block * BLOCK;
-            near.extend((first..(first + BLOCK).min(count)).filter_map(|i| {
+            near.extend(indices.filter_map(|i| {
                 let from = (point(i) - self.point) / self.radius;
                 let (a, b) = (from.dot(u), from.dot(v));
                 let height = from.dot(self.normal) * self.radius;

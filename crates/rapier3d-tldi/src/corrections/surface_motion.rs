@@ -8,6 +8,7 @@
 //! speed of new samples is measured (`sampled_motion.rs`).
 
 use crate::PointCloudShape;
+use crate::corrections::blocks;
 use crate::corrections::sampled_motion::{Snapshot, way_along};
 use crate::step::candidates::{parent_of, pose_of};
 use crate::step::prepared::Shared;
@@ -300,13 +301,10 @@ fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector
     let points = cloud.points();
     let (mut sum, mut total) = (Vector::ZERO, 0.0);
     let mut nearest = (f32::INFINITY, Vector::ZERO);
-    for (block, bounds) in cloud.blocks().iter().enumerate() {
-        let distance = point.clamp(bounds.min, bounds.max).distance_squared(point);
+    for (distance, indices) in blocks::by_distance(cloud.blocks(), values.len(), point) {
         if distance > nearest.0.max(reach * reach) {
             continue;
         }
-        let first = block * tldi::BLOCK;
-        let indices = first..(first + tldi::BLOCK).min(values.len());
         for i in indices.filter(|&i| values[i].is_finite()) {
             let squared = points[i].distance_squared(point);
             if squared < nearest.0 {

@@ -60,7 +60,7 @@ impl Batch {
     ) -> Option<Penetration> {
         let (pair, order) = self.swept(swept)?;
         let parts = order.map(|k| parts[k]);
-        let part = (self.parts[pair.parts.clone()].iter()).find(|part| part.parts == parts)?;
+        let part = (self.parts[pair.parts.clone()].iter()).find(|part| part.indices == parts)?;
         let comparison = part.comparison.as_ref()?;
         let normal = -comparison.last_axis()?;
         let depth = (self.results[comparison.query].patches.iter())
@@ -129,7 +129,6 @@ mod tests {
     use crate::{PointCloudShape, TldiConfig};
     use rapier3d::prelude::*;
     use std::sync::Mutex;
-    use std::sync::atomic::AtomicBool;
     use tldi::{ContactPatch, ContactPoint, PairResult, PointCloud};
 
     /// Rapier sweeps bodies of other solver groups, too, but does not stop them.
@@ -143,25 +142,17 @@ mod tests {
             let [ground, ball] = [SharedShape::ball(1.0), SharedShape::ball(0.1)];
             let floor = ColliderBuilder::new(ground.clone()).solver_groups(first);
             let of_ball = ColliderBuilder::new(ball.clone()).solver_groups(of_body);
+            let handles = [
+                colliders.insert(floor),
+                colliders.insert_with_parent(of_ball, body, &mut bodies),
+            ];
+            let (poses, question) = ([Pose::IDENTITY; 2], Question::Contacts(0.1));
             let pair = PreparedPair {
-                colliders: [
-                    colliders.insert(floor),
-                    colliders.insert_with_parent(of_ball, body, &mut bodies),
-                ],
-                bodies: [None, Some(body)],
-                has_link: false,
-                poses: [Pose::IDENTITY; 2],
-                question: Question::Contacts(0.1),
-                parts: 0..0,
-                used: AtomicBool::new(true),
                 blocked: Mutex::new(Some(Blocked {
                     point: Vector::ZERO,
                     normal: Vector::Y,
                 })),
-                is_let_through: AtomicBool::new(false),
-                is_kept: false,
-                measured: None,
-                shapes: [ground, ball],
+                ..PreparedPair::without_bodies(handles, [ground, ball], poses, question, 0..0)
             };
             bodies[body].recompute_mass_properties_from_colliders(&colliders);
             let mut batch = Batch::default();
@@ -189,12 +180,7 @@ mod tests {
                 2 => Question::Crossing,
                 _ => Question::Contacts(0.1),
             };
-            let pair = ShapePair {
-                shape1: &*tile.0,
-                shape2: &*body.0,
-                pos12: pose.inv_mul(&at),
-                prediction: 0.1,
-            };
+            let pair = ShapePair::new(&*tile.0, &*body.0, pose.inv_mul(&at), 0.1);
             let hint = |_, _: Option<&Pose>, _| Hint {
                 motion: Vector::ZERO,
                 last_axis: Some(-Vector::Y),
@@ -214,20 +200,10 @@ mod tests {
                 }],
                 ..PairResult::default()
             });
-            let prepared = PreparedPair {
-                colliders: [k as u32, 9].map(|i| ColliderHandle::from_raw_parts(i, 0)),
-                bodies: [None; 2],
-                has_link: false,
-                poses: [pose, at],
-                question,
-                parts: first..batch.parts.len(),
-                used: AtomicBool::new(true),
-                blocked: Mutex::default(),
-                is_let_through: AtomicBool::new(false),
-                is_kept: false,
-                measured: None,
-                shapes: [tile.clone(), body.clone()],
-            };
+            let handles = [k as u32, 9].map(|i| ColliderHandle::from_raw_parts(i, 0));
+            let (shapes, parts) = ([tile.clone(), body.clone()], first..batch.parts.len());
+            let prepared =
+                PreparedPair::without_bodies(handles, shapes, [pose, at], question, parts);
             batch.push(prepared, &pair.pos12);
         }
         for (pose, depth) in [(tiles[0], 0.01), (tiles[1], 0.02)] {

@@ -117,12 +117,7 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for TldiDispatc
         workspace: &mut Option<ContactManifoldsWorkspace>,
     ) -> Result<(), Unsupported> {
         Self::accept(shape1, shape2).inspect_err(|_| manifolds::leave(manifolds, workspace))?;
-        let pair = ShapePair {
-            shape1,
-            shape2,
-            pos12: *pos12,
-            prediction,
-        };
+        let pair = ShapePair::new(shape1, shape2, *pos12, prediction);
         let batch = self.shared.batch();
         let key = PairKey::new(Question::Contacts(prediction), [shape1, shape2], pos12);
         let bodies = manifolds.first().map(|manifold| {
@@ -180,25 +175,20 @@ impl QueryDispatcher for TldiDispatcher {
         shape2: &dyn Shape,
     ) -> Result<ShapeIntersection, Unsupported> {
         Self::accept(shape1, shape2)?;
-        let pair = ShapePair {
-            shape1,
-            shape2,
-            pos12: *pos12,
-            prediction: 0.0,
-        };
+        let pair = ShapePair::new(shape1, shape2, *pos12, 0.0);
         let crosses = |pair: &PartPair, results: &[PairResult]| match pair.result(results) {
             Some(result) => result.collides || result.gap.is_some_and(|gap| gap <= 0.0),
             None => DefaultQueryDispatcher
                 .intersection_test(
                     &pair.a_from_b,
-                    part(shape1, pair.parts[0]).1,
-                    part(shape2, pair.parts[1]).1,
+                    part(shape1, pair.indices[0]).1,
+                    part(shape2, pair.indices[1]).1,
                 )
                 .is_ok_and(|answer| answer.intersecting),
         };
         let first_crossing = |parts: &[PartPair], results: &[PairResult]| {
             let crossing = parts.iter().find(|pair| crosses(pair, results));
-            crossing.map(|pair| pair.parts)
+            crossing.map(|pair| pair.indices)
         };
         let batch = self.shared.batch();
         let key = PairKey::new(Question::Crossing, [shape1, shape2], pos12);
@@ -246,12 +236,7 @@ impl QueryDispatcher for TldiDispatcher {
         prediction: f32,
     ) -> Result<Option<Contact>, Unsupported> {
         Self::accept(shape1, shape2)?;
-        let pair = ShapePair {
-            shape1,
-            shape2,
-            pos12: *pos12,
-            prediction,
-        };
+        let pair = ShapePair::new(shape1, shape2, *pos12, prediction);
         queries::contact(&self.shared, pair)
     }
 
@@ -283,12 +268,7 @@ impl QueryDispatcher for TldiDispatcher {
         options: ShapeCastOptions,
     ) -> Result<Option<ShapeCastHit>, Unsupported> {
         Self::accept(shape1, shape2)?;
-        let pair = ShapePair {
-            shape1,
-            shape2,
-            pos12: *pos12,
-            prediction: 0.0,
-        };
+        let pair = ShapePair::new(shape1, shape2, *pos12, 0.0);
         shape_casts::cast_shapes(&self.shared, &pair, local_velocity12, options)
     }
 

@@ -132,7 +132,7 @@ pub(crate) fn fill(
 
 /// Moves a manifold from the frames of the parts to those of the colliders.
 fn place(manifold: &mut ContactManifold, parts: &PartPair) {
-    [manifold.subshape1, manifold.subshape2] = parts.parts;
+    [manifold.subshape1, manifold.subshape2] = parts.indices;
     if let Some(pose1) = parts.poses[0] {
         manifold.local_n1 = pose1.rotation * manifold.local_n1;
         for point in &mut manifold.points {
@@ -208,8 +208,8 @@ fn append_exact(pair: &ShapePair<'_>, parts: &PartPair, manifolds: &mut Vec<Cont
     let mut found: Vec<ContactManifold> = Vec::new();
     let answer = DefaultQueryDispatcher.contact_manifolds(
         &parts.a_from_b,
-        part(pair.shape1, parts.parts[0]).1,
-        part(pair.shape2, parts.parts[1]).1,
+        part(pair.shape1, parts.indices[0]).1,
+        part(pair.shape2, parts.indices[1]).1,
         pair.prediction,
         &mut found,
         &mut None,

@@ -109,20 +109,6 @@ pub(crate) fn rigid(pose: Pose) -> Pose {
     }
 }
 
-/// Whether contacts up to a gap of `prediction` metres are possible: the bounds meet in the frames
-/// of both shapes. `pos12` maps from the frame of shape 2 into that of shape 1.
-pub(crate) fn within_reach(
-    shape1: &dyn Shape,
-    shape2: &dyn Shape,
-    pos12: &Pose,
-    prediction: f32,
-) -> bool {
-    let local1 = shape1.compute_local_aabb().loosened(prediction);
-    let local2 = shape2.compute_local_aabb().loosened(prediction);
-    local1.intersects(&shape2.compute_aabb(pos12))
-        && local2.intersects(&shape1.compute_aabb(&pos12.inverse()))
-}
-
 /// Two shapes as rapier's narrow phase sees them.
 #[derive(Clone, Copy)]
 pub(crate) struct ShapePair<'a> {
@@ -132,6 +118,30 @@ pub(crate) struct ShapePair<'a> {
     pub(crate) pos12: Pose,
     /// Contacts up to this gap are wanted, metres.
     pub(crate) prediction: f32,
+}
+
+impl<'a> ShapePair<'a> {
+    pub(crate) fn new(
+        shape1: &'a dyn Shape,
+        shape2: &'a dyn Shape,
+        pos12: Pose,
+        prediction: f32,
+    ) -> Self {
+        Self {
+            shape1,
+            shape2,
+            pos12,
+            prediction,
+        }
+    }
+
+    /// Whether such contacts are possible: the bounds meet in the frames of both shapes.
+    pub(crate) fn is_within_reach(&self) -> bool {
+        let local1 = self.shape1.compute_local_aabb().loosened(self.prediction);
+        let local2 = self.shape2.compute_local_aabb().loosened(self.prediction);
+        local1.intersects(&self.shape2.compute_aabb(&self.pos12))
+            && local2.intersects(&self.shape1.compute_aabb(&self.pos12.inverse()))
+    }
 }
 
 /// What the caller knows about a pair of parts beyond their shapes.
@@ -146,8 +156,8 @@ pub(crate) struct Hint {
 
 /// A pair of parts within reach of each other.
 pub(crate) struct PartPair {
-    /// Indices of the parts in their compounds; 0 where the shape is not one.
-    pub(crate) parts: [u32; 2],
+    /// Of the parts in their compounds; 0 where the shape is not one.
+    pub(crate) indices: [u32; 2],
     /// Poses of the parts in the frames of their colliders; none where they are the same.
     pub(crate) poses: [Option<Pose>; 2],
     /// From the frame of the second part into that of the first.
@@ -261,8 +271,8 @@ pub(crate) fn append_part_pairs<'a>(
             a_from_b = pose1.inv_mul(&a_from_b);
         }
         let a_from_b = rigid(a_from_b);
-        let is_near = within_reach(part1, part2, &a_from_b, prediction);
-        if !(is_near && has_surface(part1) && has_surface(part2)) {
+        let part_pair = ShapePair::new(part1, part2, a_from_b, prediction);
+        if !(part_pair.is_within_reach() && has_surface(part1) && has_surface(part2)) {
             continue;
         }
         let comparison = config.params([part1, part2], prediction).map(|params| {
@@ -283,7 +293,7 @@ pub(crate) fn append_part_pairs<'a>(
             }
         });
         parts.push(PartPair {
-            parts: indices,
+            indices,
             poses: [pose1.copied(), pose2.copied()],
             a_from_b,
             comparison,

@@ -175,8 +175,8 @@ fn deepest(pair: &ShapePair<'_>, parts: &[PartPair], results: &[PairResult]) -> 
             }
             None => {
                 let [part1, part2] = [
-                    part(pair.shape1, part_pair.parts[0]).1,
-                    part(pair.shape2, part_pair.parts[1]).1,
+                    part(pair.shape1, part_pair.indices[0]).1,
+                    part(pair.shape2, part_pair.indices[1]).1,
                 ];
                 let a_from_b = &part_pair.a_from_b;
                 let contact =
@@ -193,7 +193,7 @@ fn deepest(pair: &ShapePair<'_>, parts: &[PartPair], results: &[PairResult]) -> 
             points,
             normal,
             distance,
-            part_pair.parts,
+            part_pair.indices,
         ))
     });
     contacts.min_by(|p, q| p.dist.total_cmp(&q.dist))

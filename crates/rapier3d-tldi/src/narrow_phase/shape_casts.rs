@@ -90,12 +90,7 @@ pub(crate) fn cast_shapes_nonlinear(
         });
         return Ok(None);
     }
-    let pair = ShapePair {
-        shape1: shapes[0],
-        shape2: shapes[1],
-        pos12: pos12_at(start),
-        prediction: 0.0,
-    };
+    let pair = ShapePair::new(shapes[0], shapes[1], pos12_at(start), 0.0);
     if stop_at_penetration && let Some(mut hit) = overlap(shared, &pair, 0.0)? {
         hit.time_of_impact = start;
         return Ok(Some(hit));

@@ -213,12 +213,8 @@ impl Turning<'_> {
             .map(|corner| way_of(before * corner).as_dvec3().length() as f32);
         // What is farther than the part is large, its motion brings it to and not its turning.
         let diameter = 2.0 * bounds.half_extents().length();
-        let pair = ShapePair {
-            shape1: moving.parts[0],
-            shape2: moving.parts[1],
-            pos12: before,
-            prediction: touching + longest.fold(0.0, f32::max).min(diameter),
-        };
+        let prediction = touching + longest.fold(0.0, f32::max).min(diameter);
+        let pair = ShapePair::new(moving.parts[0], moving.parts[1], before, prediction);
         let room = &mut self.room.borrow_mut();
         shared.contacts_on_the_way(pair, &shared.config(), room, |patches| {
             let meetings = patches.iter().flat_map(|patch| {

@@ -1,7 +1,7 @@
 //! From candidate pairs to the entries of a batch.
 
 use crate::TldiConfig;
-use crate::narrow_phase::parts::{Hint, ShapePair, append_part_pairs, within_reach};
+use crate::narrow_phase::parts::{Hint, ShapePair, append_part_pairs};
 use crate::shape::exact::ExactShape;
 use crate::step::candidates::{Candidate, contact_reach, effective_prediction, parent_of, pose_of};
 use crate::step::measured::Measured;
@@ -39,17 +39,14 @@ impl<'a> Frame<'a> {
         let pose2 = pose_of(collider2, self.bodies);
         let pos12 = pose1.inv_mul(&pose2);
         let prediction = effective_prediction(collider1, collider2, self.bodies, self.integration);
-        let (shape1, shape2) = (collider1.shape(), collider2.shape());
-        let reach = contact_reach(collider1, collider2, self.bodies, self.integration);
-        if !within_reach(shape1, shape2, &pos12, reach) {
+        let pair = ShapePair::new(collider1.shape(), collider2.shape(), pos12, prediction);
+        let looked_for = ShapePair {
+            prediction: contact_reach(collider1, collider2, self.bodies, self.integration),
+            ..pair
+        };
+        if !looked_for.is_within_reach() {
             return;
         }
-        let pair = ShapePair {
-            shape1,
-            shape2,
-            pos12,
-            prediction,
-        };
         self.warn_of_recycling(collider1, collider2);
         let has_sensor = collider1.is_sensor() || collider2.is_sensor();
         let question = match has_sensor {
@@ -64,10 +61,6 @@ impl<'a> Frame<'a> {
             .filter(|measured| !is_measured_anew && measured.holds(&pair));
         let first_part = batch.parts.len();
         if kept.is_none() {
-            let looked_for = ShapePair {
-                prediction: reach,
-                ..pair
-            };
             self.push_parts(looked_for, candidate, &pose1, batch, sides);
         }
         batch.push(
@@ -218,9 +211,10 @@ impl LastAxis {
     }
 }
 
-fn axis_of(axes: &[(PartsId, LastAxis)], key: PartsId) -> Option<LastAxis> {
-    let at = axes.binary_search_by_key(&key, |(key, _)| *key).ok()?;
-    Some(axes[at].1)
+/// What an ascending list holds for a key.
+fn found<K: Ord + Copy, T: Copy>(list: &[(K, T)], key: K) -> Option<T> {
+    let at = list.binary_search_by_key(&key, |(key, _)| *key).ok()?;
+    Some(list[at].1)
 }
 
 /// What is remembered about pairs from step to step, until they separate. All in ascending order.
@@ -242,15 +236,13 @@ impl PairMemory {
         pair: &ShapePair,
         pose1: &Pose,
     ) -> Option<Vector> {
-        axis_of(&self.axes, (pair_id(colliders), parts))
+        found(&self.axes, (pair_id(colliders), parts))
             .filter(|last| !last.is_outdated(pair, pose1))
             .map(|last| last.axis)
     }
 
     fn measured(&self, colliders: [ColliderHandle; 2]) -> Option<Measured> {
-        let key = pair_id(colliders);
-        let found = self.measured.binary_search_by_key(&key, |(key, _)| *key);
-        found.ok().map(|at| self.measured[at].1)
+        found(&self.measured, pair_id(colliders))
     }
 
     /// After a step: what its batch measured, if rapier took it. What sleeps stays as it is.
@@ -268,9 +260,8 @@ impl PairMemory {
         for candidate in candidates.iter().filter(|candidate| candidate.asleep) {
             let id = pair_id([candidate.collider1, candidate.collider2]);
             self.retain_axes(id);
-            let found = self.older_measured.binary_search_by_key(&id, |(id, _)| *id);
-            self.measured
-                .extend(found.ok().map(|at| self.older_measured[at]));
+            let measured = found(&self.older_measured, id);
+            (self.measured).extend(measured.map(|measured| (id, measured)));
         }
         for pair in &batch.pairs {
             let [Some(collider1), Some(collider2)] = pair.colliders.map(|c| colliders.get(c))
@@ -281,8 +272,7 @@ impl PairMemory {
             let id = pair_id(pair.colliders);
             let was_used = pair.used.load(Ordering::Relaxed);
             let measured = pair.measured.filter(|_| was_used);
-            self.measured
-                .extend(measured.map(|measured| (id, measured)));
+            (self.measured).extend(measured.map(|measured| (id, measured)));
             if pair.is_kept {
                 let first = self.axes.len();
                 self.retain_axes(id);
@@ -295,7 +285,7 @@ impl PairMemory {
                 let Some(result) = part.result(&batch.results) else {
                     continue;
                 };
-                let key = (id, part.parts);
+                let key = (id, part.indices);
                 // An axis without contact may be that of the few points that came near first.
                 let axis = match result.contacts.is_empty() {
                     false => result.axes.first().map(|&axis| {
@@ -306,7 +296,7 @@ impl PairMemory {
                             lost_for: 0,
                         }
                     }),
-                    true => axis_of(&self.older_axes, key).and_then(|last| last.lost(pos12)),
+                    true => found(&self.older_axes, key).and_then(|last| last.lost(pos12)),
                 };
                 self.axes.extend(axis.map(|axis| (key, axis)));
             }
@@ -346,12 +336,7 @@ mod tests {
         let turned = Pose::rotation(0.5 * std::f32::consts::PI * Vector::Z);
         let mut memory = PairMemory::default();
         let mut remembered = |axis: Vector, contacts: Vec<ContactPixel>| {
-            let pair = ShapePair {
-                shape1: &*shape.0,
-                shape2: &*shape.0,
-                pos12: Pose::IDENTITY,
-                prediction: 0.1,
-            };
+            let pair = ShapePair::new(&*shape.0, &*shape.0, Pose::IDENTITY, 0.1);
             let mut batch = Batch::default();
             let hint = |_, _: Option<&Pose>, _| Hint::default();
             let mut sides = Vec::new();
@@ -362,20 +347,10 @@ mod tests {
                 contacts,
                 ..PairResult::default()
             });
-            let prepared = PreparedPair {
-                colliders,
-                bodies: [None; 2],
-                has_link: false,
-                poses: [turned; 2],
-                question: Question::Contacts(pair.prediction),
-                parts: 0..1,
-                used: AtomicBool::new(true),
-                blocked: Mutex::default(),
-                is_let_through: AtomicBool::new(false),
-                is_kept: false,
-                measured: None,
-                shapes: [shape.clone(), shape.clone()],
-            };
+            let shapes = [shape.clone(), shape.clone()];
+            let question = Question::Contacts(pair.prediction);
+            let prepared =
+                PreparedPair::without_bodies(colliders, shapes, [turned; 2], question, 0..1);
             batch.push(prepared, &pair.pos12);
             memory.update(&[], &batch, &RigidBodySet::new(), &set);
             memory.axis(colliders, [0, 0], &pair, &turned)

@@ -2,7 +2,7 @@
 //! workspaces for pairs that are not in it, and the errors that rapier would drop.
 
 use crate::narrow_phase::parts::{
-    Hint, PartPair, ShapePair, append_part_pairs, append_queries, results_of, within_reach,
+    Hint, PartPair, ShapePair, append_part_pairs, append_queries, results_of,
 };
 use crate::step::measured::{Measured, rolls};
 use crate::{TldiConfig, TldiError};
@@ -95,6 +95,33 @@ pub(crate) struct PreparedPair {
     /// Keeps the shapes alive, so that no other can come to lie at their addresses, and shared, so
     /// that a change of theirs in place moves them to other ones.
     pub(crate) shapes: [SharedShape; 2],
+}
+
+#[cfg(test)]
+impl PreparedPair {
+    /// A pair without bodies that rapier asked for.
+    pub(crate) fn without_bodies(
+        colliders: [ColliderHandle; 2],
+        shapes: [SharedShape; 2],
+        poses: [Pose; 2],
+        question: Question,
+        parts: Range<usize>,
+    ) -> Self {
+        Self {
+            colliders,
+            bodies: [None; 2],
+            has_link: false,
+            poses,
+            question,
+            parts,
+            used: AtomicBool::new(true),
+            blocked: Mutex::default(),
+            is_let_through: AtomicBool::new(false),
+            is_kept: false,
+            measured: None,
+            shapes,
+        }
+    }
 }
 
 /// The pairs of a step and their results.
@@ -300,7 +327,7 @@ impl Shared {
         config: &TldiConfig,
         read: impl FnOnce(&[PartPair], &[PairResult]) -> R,
     ) -> Option<R> {
-        if !within_reach(pair.shape1, pair.shape2, &pair.pos12, pair.prediction) {
+        if !pair.is_within_reach() {
             return Some(read(&[], &[]));
         }
         self.spot_pairs.fetch_add(1, Ordering::Relaxed);
@@ -322,7 +349,7 @@ impl Shared {
         room: &mut Room,
         read: impl FnOnce(&[ContactPatch]) -> Option<R>,
     ) -> Option<R> {
-        if !within_reach(pair.shape1, pair.shape2, &pair.pos12, pair.prediction) {
+        if !pair.is_within_reach() {
             return None;
         }
         self.on_the_spot(|spot| {
