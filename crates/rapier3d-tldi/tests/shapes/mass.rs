@@ -1,20 +1,12 @@
 //! Mass properties of clouds against closed formulas and the exact integrals over meshes.
 
+use crate::exact::unit;
 use crate::skip::test_data;
 use rapier3d::glamx::Vec3;
 use rapier3d::prelude::{Cuboid, MassProperties, Shape, SharedShape};
 use rapier3d_tldi::{CloudError, MassModel, PointCloud, PointCloudShape};
 
 type Samples = (Vec<Vec3>, Vec<Vec3>);
-
-fn unit(rng: &mut fastrand::Rng) -> Vec3 {
-    loop {
-        let v = Vec3::from_array([(); 3].map(|()| 2.0 * rng.f32() - 1.0));
-        if v.length_squared() <= 1.0 && v.length_squared() > 1e-3 {
-            return v.normalize();
-        }
-    }
-}
 
 /// Random points of a sphere of radius 0.5 about `center`, with outward normals.
 fn sphere(count: usize, center: Vec3, seed: u64) -> Samples {

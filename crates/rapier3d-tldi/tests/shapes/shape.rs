@@ -1,19 +1,11 @@
 //! `PointCloudShape` as a shape of parry's: metadata, rays, projections, copies.
 
+use crate::exact::unit;
 use rapier3d::glamx::{Pose3, Vec3};
 use rapier3d::parry::query::{PointQuery, Ray, RayCast};
 use rapier3d::parry::shape::{FeatureId, Shape, ShapeType};
 use rapier3d::prelude::{ColliderBuilder, PhysicsWorld, RigidBodyBuilder, SharedShape};
 use rapier3d_tldi::{CloudError, MassModel, PointCloud, PointCloudShape, sample_shape};
-
-fn unit(rng: &mut fastrand::Rng) -> Vec3 {
-    loop {
-        let v = Vec3::from_array([(); 3].map(|()| 2.0 * rng.f32() - 1.0));
-        if v.length_squared() <= 1.0 && v.length_squared() > 1e-3 {
-            return v.normalize();
-        }
-    }
-}
 
 /// Random points of the unit sphere, with outward normals if asked for.
 fn sphere(count: usize, with_normals: bool) -> PointCloud<'static> {

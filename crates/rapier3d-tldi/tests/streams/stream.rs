@@ -24,6 +24,26 @@ fn cloud_of<'a>(world: &'a PhysicsWorld, stream: &CloudStream) -> &'a PointCloud
         .cloud()
 }
 
+/// Gives a frame to the stream of a world.
+fn see<'a>(
+    stream: &mut CloudStream,
+    world: &mut PhysicsWorld,
+    tldi: &mut TldiPipeline,
+    seen: impl Into<SeenPoints<'a>>,
+    world_from_sensor: &Pose,
+) -> Result<StreamFrame, TldiError> {
+    let (bodies, colliders) = (&world.bodies, &mut world.colliders);
+    stream.frame(tldi, bodies, colliders, seen, world_from_sensor)
+}
+
+/// Why the points of a frame were refused.
+fn refusal(outcome: Result<StreamFrame, TldiError>) -> CloudError {
+    match outcome {
+        Err(TldiError::Cloud { source, .. }) => source,
+        other => panic!("{other:?}"),
+    }
+}
+
 /// Square grids of another size and spacing in every frame, seen from other places by a sensor that is turned:
 /// radii are 0.8 × the spacing away from the rim, and normals point to the sensor.
 #[test]
@@ -41,10 +61,10 @@ fn every_frame_is_made_as_it_was_asked_for() -> TestResult {
         let sensor_from_world = world_from_sensor.inverse();
         let mut seen: Vec<Vector> = in_world.iter().map(|p| sensor_from_world * *p).collect();
         seen.push(Vector::splat(f32::NAN));
-        let taken = stream.frame(
+        let taken = see(
+            &mut stream,
+            &mut world,
             &mut tldi,
-            &world.bodies,
-            &mut world.colliders,
             &seen,
             &world_from_sensor,
         )?;
@@ -90,10 +110,10 @@ fn given_normals_are_turned_to_the_sensor() -> TestResult {
     let normals: Vec<Vector> = (0..points.len())
         .map(|i| sensor_from_world.rotation * if i % 2 == 0 { Vector::Y } else { -Vector::Y })
         .collect();
-    stream.frame(
+    see(
+        &mut stream,
+        &mut world,
         &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
         SeenPoints {
             normals: Some(&normals),
             ..SeenPoints::from(&points)
@@ -104,26 +124,20 @@ fn given_normals_are_turned_to_the_sensor() -> TestResult {
     let found = cloud.normals().expect("given");
     assert!(found.iter().all(|n| n.distance(Vector::Y) < 1e-5) && cloud.normals_oriented());
     let few = &normals[1..];
-    let refused = stream.frame(
+    let refused = see(
+        &mut stream,
+        &mut world,
         &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
         SeenPoints {
             normals: Some(few),
             ..SeenPoints::from(&points)
         },
         &world_from_sensor,
     );
-    assert!(
-        matches!(
-            refused,
-            Err(TldiError::Cloud {
-                source: CloudError::LengthMismatch { .. },
-                ..
-            })
-        ),
-        "{refused:?}"
-    );
+    assert!(matches!(
+        refusal(refused),
+        CloudError::LengthMismatch { .. }
+    ));
     Ok(())
 }
 
@@ -146,26 +160,14 @@ fn an_empty_frame_holds_nothing() -> TestResult {
         tldi.contacts(&w.narrow_phase, &w.colliders).count()
     };
 
-    stream.frame(
-        &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
-        &floor(0.0),
-        &sensor,
-    )?;
+    see(&mut stream, &mut world, &mut tldi, &floor(0.0), &sensor)?;
     settle(&mut world, &mut tldi)?;
     assert!((world.bodies[ball].translation().y - 0.1).abs() < REST_TOLERANCE);
     assert!(world.bodies[ball].is_sleeping() && contacts(&tldi, &world) > 0);
 
     let nothing = [Vector::splat(f32::NAN); 3];
     for empty in [&nothing[..0], &nothing[..]] {
-        let taken = stream.frame(
-            &mut tldi,
-            &world.bodies,
-            &mut world.colliders,
-            empty,
-            &sensor,
-        )?;
+        let taken = see(&mut stream, &mut world, &mut tldi, empty, &sensor)?;
         assert_eq!((taken.points, taken.dropped), (0, empty.len()));
         assert!(!world.colliders[stream.collider()].is_enabled());
         assert_eq!(cloud_of(&world, &stream).len(), 1, "no point is kept");
@@ -178,13 +180,7 @@ fn an_empty_frame_holds_nothing() -> TestResult {
     }
     // 20 steps of free fall are 0.57 m: the floor is back below it.
     assert!(world.bodies[ball].translation().y < -0.3);
-    stream.frame(
-        &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
-        &floor(-1.0),
-        &sensor,
-    )?;
+    see(&mut stream, &mut world, &mut tldi, &floor(-1.0), &sensor)?;
     settle(&mut world, &mut tldi)?;
     assert!((world.bodies[ball].translation().y + 0.9).abs() < REST_TOLERANCE);
     Ok(())
@@ -199,8 +195,13 @@ fn what_the_user_disables_stays_so() -> TestResult {
         if disables {
             world.colliders[stream.collider()].set_enabled(false);
         }
-        let (bodies, colliders) = (&world.bodies, &mut world.colliders);
-        stream.frame(&mut tldi, bodies, colliders, &square(0.8), &Pose::IDENTITY)?;
+        see(
+            &mut stream,
+            &mut world,
+            &mut tldi,
+            &square(0.8),
+            &Pose::IDENTITY,
+        )?;
         assert_eq!(world.colliders[stream.collider()].is_enabled(), is_enabled);
     }
     Ok(())
@@ -213,38 +214,11 @@ fn a_single_point_is_taken() -> TestResult {
     let mut stream = CloudStream::new(&mut world.colliders, RECIPE)?;
     let sensor = Pose::from_translation(2.0 * Vector::Y);
     let one = [-2.0 * Vector::Y];
-    let refused = stream.frame(
-        &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
-        &one[..],
-        &sensor,
-    );
-    assert!(
-        matches!(
-            refused,
-            Err(TldiError::Cloud {
-                source: CloudError::NoSpacing { .. },
-                ..
-            })
-        ),
-        "{refused:?}"
-    );
-    stream.frame(
-        &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
-        &square(0.4),
-        &sensor,
-    )?;
+    let refused = see(&mut stream, &mut world, &mut tldi, &one[..], &sensor);
+    assert!(matches!(refusal(refused), CloudError::NoSpacing { .. }));
+    see(&mut stream, &mut world, &mut tldi, &square(0.4), &sensor)?;
     let mean = cloud_of(&world, &stream).mean_radius();
-    let taken = stream.frame(
-        &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
-        &one[..],
-        &sensor,
-    )?;
+    let taken = see(&mut stream, &mut world, &mut tldi, &one[..], &sensor)?;
     assert_eq!(taken.points, 1);
     let cloud = cloud_of(&world, &stream);
     assert_eq!((cloud.len(), cloud.mean_radius()), (1, mean));
@@ -276,13 +250,7 @@ fn own_links_are_left_out_where_they_are() -> TestResult {
             seen.push(on_link);
         }
         seen.iter_mut().for_each(|p| *p -= 2.0 * Vector::Y);
-        let taken = stream.frame(
-            &mut tldi,
-            &world.bodies,
-            &mut world.colliders,
-            &seen,
-            &sensor,
-        )?;
+        let taken = see(&mut stream, &mut world, &mut tldi, &seen, &sensor)?;
         assert_eq!(
             taken,
             StreamFrame {
@@ -293,13 +261,7 @@ fn own_links_are_left_out_where_they_are() -> TestResult {
         );
     }
     world.remove_body(link);
-    let refused = stream.frame(
-        &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
-        &square(0.8),
-        &sensor,
-    );
+    let refused = see(&mut stream, &mut world, &mut tldi, &square(0.8), &sensor);
     assert_eq!(refused, Err(TldiError::NoSuchCollider(collider)));
     Ok(())
 }
@@ -318,10 +280,10 @@ fn own_links_that_were_moved_are_left_out() -> TestResult {
     world.bodies[link].set_translation(2.0 * Vector::Y, true);
     let [now, before] = [2.0, 0.0].map(|y| Vector::new(0.2, y, 0.0));
     let seen = [now, before];
-    let taken = stream.frame(
+    let taken = see(
+        &mut stream,
+        &mut world,
         &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
         &seen[..],
         &Pose::IDENTITY,
     )?;
@@ -343,23 +305,8 @@ fn what_cannot_be_followed_is_refused() -> TestResult {
     ));
     let mut stream = CloudStream::new(&mut world.colliders, CloudRecipe::default())?;
     let nowhere = Pose::from_translation(Vector::new(0.0, f32::NAN, 0.0));
-    let refused = stream.frame(
-        &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
-        &square(0.4),
-        &nowhere,
-    );
-    assert!(
-        matches!(
-            refused,
-            Err(TldiError::Cloud {
-                source: CloudError::BadParameter { .. },
-                ..
-            })
-        ),
-        "{refused:?}"
-    );
+    let refused = see(&mut stream, &mut world, &mut tldi, &square(0.4), &nowhere);
+    assert!(matches!(refusal(refused), CloudError::BadParameter { .. }));
     Ok(())
 }
 
@@ -377,13 +324,7 @@ fn radii_may_come_with_a_frame() -> TestResult {
         radii: Some(&radii),
         ..SeenPoints::from(&points)
     };
-    let taken = stream.frame(
-        &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
-        seen,
-        &Pose::IDENTITY,
-    )?;
+    let taken = see(&mut stream, &mut world, &mut tldi, seen, &Pose::IDENTITY)?;
     assert!(taken.own > 0 && taken.dropped == 1);
     let cloud = cloud_of(&world, &stream);
     assert!(cloud.normals().is_some());
@@ -398,33 +339,15 @@ fn radii_may_come_with_a_frame() -> TestResult {
         radii: Some(&radii[1..]),
         ..SeenPoints::from(&points)
     };
-    let refused = stream.frame(
-        &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
-        few,
-        &Pose::IDENTITY,
-    );
-    assert!(
-        matches!(
-            refused,
-            Err(TldiError::Cloud {
-                source: CloudError::LengthMismatch {
-                    attribute: "radii",
-                    ..
-                },
-                ..
-            })
-        ),
-        "{refused:?}"
-    );
-    stream.frame(
-        &mut tldi,
-        &world.bodies,
-        &mut world.colliders,
-        &points,
-        &Pose::IDENTITY,
-    )?;
+    let refused = see(&mut stream, &mut world, &mut tldi, few, &Pose::IDENTITY);
+    assert!(matches!(
+        refusal(refused),
+        CloudError::LengthMismatch {
+            attribute: "radii",
+            ..
+        }
+    ));
+    see(&mut stream, &mut world, &mut tldi, &points, &Pose::IDENTITY)?;
     assert!(cloud_of(&world, &stream).max_radius() < 0.1);
     Ok(())
 }
@@ -451,13 +374,7 @@ fn speed_seen_from_a_camera(floor_speed: f32) -> Result<f32, Box<dyn std::error:
         let floor = square(1.2);
         let seen: Vec<Vector> = (floor.iter().map(|p| sensor_from_world * (*p + moved))).collect();
         world.colliders[stream.collider()].set_position(camera);
-        stream.frame(
-            &mut tldi,
-            &world.bodies,
-            &mut world.colliders,
-            &seen,
-            &camera,
-        )?;
+        see(&mut stream, &mut world, &mut tldi, &seen, &camera)?;
         tldi.step(&mut world)?;
         fastest = fastest.max(world.bodies[body].linvel().length());
     }
