@@ -273,18 +273,18 @@ fn contact_pixels(
         let ka = select(kb, kf, is_other_side);
         let of_b = select(kf, kb, is_other_side);
         atomicStore(&found[at], view);
-        atomicStore(&found[at + 1u], u32(pixel.x));
-        atomicStore(&found[at + 2u], u32(pixel.y));
-        atomicStore(&found[at + 3u], bitcast<u32>(layers[ka].depth));
-        atomicStore(&found[at + 4u], bitcast<u32>(layers[of_b].depth));
-        atomicStore(&found[at + 5u], bitcast<u32>(gap));
+        atomicStore(&found[at + CONTACT_PIXEL], u32(pixel.x));
+        atomicStore(&found[at + CONTACT_PIXEL + 1u], u32(pixel.y));
+        atomicStore(&found[at + CONTACT_DEPTHS], bitcast<u32>(layers[ka].depth));
+        atomicStore(&found[at + CONTACT_DEPTHS + 1u], bitcast<u32>(layers[of_b].depth));
+        atomicStore(&found[at + CONTACT_GAP], bitcast<u32>(gap));
         let shortened_back = share_of(kb, -1.0) * normal_back;
         let shortened_front = share_of(kf, 1.0) * normal_front;
         let shortened_a = select(shortened_back, shortened_front, is_other_side);
         let shortened_b = select(shortened_front, shortened_back, is_other_side);
         for (var k = 0u; k < 3u; k++) {
-            atomicStore(&found[at + 6u + k], bitcast<u32>(shortened_a[k]));
-            atomicStore(&found[at + 9u + k], bitcast<u32>(shortened_b[k]));
+            atomicStore(&found[at + CONTACT_NORMALS + k], bitcast<u32>(shortened_a[k]));
+            atomicStore(&found[at + CONTACT_NORMALS + 3u + k], bitcast<u32>(shortened_b[k]));
         }
     }
 }

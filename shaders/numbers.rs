@@ -87,8 +87,16 @@ numbers! {
     VIEWS = 3;
     /// Word of a pair: the first view's axis, and those of the others behind it.
     AXES = 4;
-    /// Words of a contact pixel in what is read back.
+    /// Words of a contact pixel in what is read back. The first one is the number of its view among those of all pairs.
     CONTACT_WORDS = 12;
+    /// Words of a contact pixel: column and row.
+    CONTACT_PIXEL = 1;
+    /// Words of a contact pixel: depths of both surfaces.
+    CONTACT_DEPTHS = 3;
+    /// Word of a contact pixel: the gap.
+    CONTACT_GAP = 5;
+    /// Words of a contact pixel: normals of both surfaces.
+    CONTACT_NORMALS = 6;
 
     /// Word of the indirect dispatch over tiles.
     TILE_GROUPS = 0;

@@ -20,6 +20,10 @@ const GAP: usize = numbers::GAP as usize;
 const CROWDED: usize = numbers::CROWDED as usize;
 const VIEWS: usize = numbers::VIEWS as usize;
 const AXES: usize = numbers::AXES as usize;
+const CONTACT_PIXEL: usize = numbers::CONTACT_PIXEL as usize;
+const CONTACT_DEPTHS: usize = numbers::CONTACT_DEPTHS as usize;
+const CONTACT_GAP: usize = numbers::CONTACT_GAP as usize;
+const CONTACT_NORMALS: usize = numbers::CONTACT_NORMALS as usize;
 
 impl<'a> Readback<'a> {
     /// The words of a batch with so many pairs.
@@ -144,20 +148,20 @@ impl<'a> Readback<'a> {
                 View::Aim { .. } => VirtualCamera::along(*axis, query.params.pixel_size),
             };
             let number = |at: usize| f32::from_bits(words[at]);
-            all_finite((3..12).map(number))
+            all_finite((CONTACT_DEPTHS..words.len()).map(number))
                 .ok_or_else(|| format!("contact {at} has a place or a normal that is no number"))?;
             let vector = |at: usize| Vec3::new(number(at), number(at + 1), number(at + 2));
-            let pixel = [words[1] as i32, words[2] as i32];
+            let pixel = [0, 1].map(|axis| words[CONTACT_PIXEL + axis] as i32);
             let [u, v] = pixel.map(|c| c as f32 + 0.5);
             let frame_from_view = camera.view_from_frame.rotation.inverse();
             result.contacts.push(ContactPixel {
                 pixel,
                 view,
-                point_a: camera.point_at(u, v, number(3)),
-                point_b: camera.point_at(u, v, number(4)),
-                normal_a: frame_from_view * vector(6),
-                normal_b: frame_from_view * vector(9),
-                gap: number(5),
+                point_a: camera.point_at(u, v, number(CONTACT_DEPTHS)),
+                point_b: camera.point_at(u, v, number(CONTACT_DEPTHS + 1)),
+                normal_a: frame_from_view * vector(CONTACT_NORMALS),
+                normal_b: frame_from_view * vector(CONTACT_NORMALS + 3),
+                gap: number(CONTACT_GAP),
             });
         }
         Ok(())
@@ -231,9 +235,9 @@ mod tests {
             (CONTACT, 1, "contact 0 is in view 1 of 1"),
             (CONTACT, 3, "contact 0 is of pair 1 of 1"),
             (CONTACT, u32::MAX, "contact 0 is of pair"),
-            (CONTACT + 3, nan, "contact 0 has a place"),
+            (CONTACT + CONTACT_DEPTHS, nan, "contact 0 has a place"),
             (
-                CONTACT + 11,
+                CONTACT + CONTACT_NORMALS + 5,
                 f32::INFINITY.to_bits(),
                 "contact 0 has a place",
             ),
