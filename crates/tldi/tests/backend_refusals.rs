@@ -6,12 +6,15 @@ use tldi::{
     Projection, Surface, View, VirtualCamera, build,
 };
 
-/// The reason why two clouds of two points, 1 m apart with radii of 1 cm, are not compared.
+/// Two points, 1 m apart with radii of 1 cm.
+fn two_points() -> PointCloud<'static> {
+    let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.01);
+    cloud.build().expect("the points are valid")
+}
+
+/// The reason why two clouds of two points are not compared.
 fn refusal(view: View, params: Params) -> Option<&'static str> {
-    let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X])
-        .radius(0.01)
-        .build()
-        .expect("the points are valid");
+    let cloud = two_points();
     let query = PairQuery {
         a: Surface::Cloud(&cloud),
         b: Surface::Cloud(&cloud),
@@ -58,19 +61,13 @@ fn perspective_images_without_a_size() {
     assert_eq!(refusal(View::Fixed(camera), Params::for_radius(0.01)), None);
     camera.size = None;
     for params in [Params::for_radius(0.01), Params::paper(0.01)] {
-        let reason = refusal(View::Fixed(camera), params);
-        assert!(
-            reason.is_some_and(|r| r.contains("fixed size")),
-            "{reason:?}"
-        );
+        refused(refusal(View::Fixed(camera), params), "fixed size");
     }
 }
 
 fn refused(reason: Option<&str>, word: &str) {
-    assert!(
-        reason.is_some_and(|r| r.contains(word)),
-        "{word}: {reason:?}"
-    );
+    let is_meant = reason.is_some_and(|r| r.contains(word));
+    assert!(is_meant, "{word}: {reason:?}");
 }
 
 #[test]
@@ -85,10 +82,8 @@ fn fixed_cameras_that_show_nothing() {
             ..camera
         };
         refused(of_camera(camera), "pixel_size");
-        let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.01);
-        let cloud = cloud.build().expect("the points are valid");
         let params = Params::for_radius(0.01);
-        let image = build(&cloud, &Pose3::IDENTITY, &camera, &params);
+        let image = build(&two_points(), &Pose3::IDENTITY, &camera, &params);
         assert_eq!(image.pixel_count(), 0);
     }
     for pose in [
@@ -171,8 +166,7 @@ fn shares_are_from_0_to_1() {
 /// Poses that scale, of pairs and of casts.
 #[test]
 fn poses_that_are_not_rigid() {
-    let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.01);
-    let cloud = cloud.build().expect("the points are valid");
+    let cloud = two_points();
     let (a, b) = (Surface::Cloud(&cloud), Surface::Cloud(&cloud));
     let params = Params::for_radius(0.01);
     for w in [1.001, 0.0, f32::NAN] {
@@ -204,8 +198,7 @@ fn poses_that_are_not_rigid() {
 
 #[test]
 fn penetrations_are_finite() {
-    let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.01);
-    let cloud = cloud.build().expect("the points are valid");
+    let cloud = two_points();
     let cast = |normal, depth| {
         let query = ImpactQuery {
             a: Surface::Cloud(&cloud),

@@ -185,48 +185,30 @@ fn failing_leaves_the_cloud_unchanged() {
 
         let mut bad = random_points(&mut rng, 600);
         bad[20].y = f32::NAN;
-        let error = cloud.set_points(&bad, Some(&normals)).expect_err("refused");
-        assert_eq!(
-            error,
-            CloudError::NonFinite {
-                index: 20,
-                count: 1
-            }
-        );
-        assert_eq!(state(&cloud), before);
-
+        let mut refused = |points: &[Vec3], normals: Option<&[Vec3]>, expected: CloudError| {
+            assert_eq!(cloud.set_points(points, normals), Err(expected));
+            assert_eq!(state(&cloud), before);
+        };
+        let (index, count) = (20, 1);
+        let not_finite = CloudError::NonFinite { index, count };
+        refused(&bad, Some(&normals), not_finite);
         bad[20].y = 1e9;
-        let error = cloud
-            .set_points(&bad, Some(&normals))
-            .expect_err("too large");
-        assert!(
-            matches!(error, CloudError::CoordinateTooLarge { index: 20, .. }),
-            "{error}"
-        );
-        assert_eq!(state(&cloud), before);
-
+        let too_large = CloudError::CoordinateTooLarge {
+            index,
+            coordinate: 1e9,
+            radius: if global { 1.0 } else { radii[index] },
+        };
+        refused(&bad, Some(&normals), too_large);
         bad[20].y = 0.0;
-        let error = cloud
-            .set_points(&bad, Some(&normals[1..]))
-            .expect_err("one short");
-        assert!(matches!(
-            error,
-            CloudError::LengthMismatch {
-                attribute: "normals",
-                ..
-            }
-        ));
-        assert_eq!(state(&cloud), before);
-        let useless = vec![Vec3::ZERO; 600];
-        let error = cloud
-            .set_points(&bad, Some(&useless))
-            .expect_err("no normal");
-        assert_eq!(error, CloudError::NoUsableNormal { count: 600 });
-        assert_eq!(state(&cloud), before);
-
-        let error = cloud.set_points(&[], None).expect_err("empty");
-        assert_eq!(error, CloudError::Empty { dropped: 0 });
-        assert_eq!(state(&cloud), before);
+        let one_short = CloudError::LengthMismatch {
+            attribute: "normals",
+            expected: 600,
+            actual: 599,
+        };
+        refused(&bad, Some(&normals[1..]), one_short);
+        let useless = CloudError::NoUsableNormal { count: 600 };
+        refused(&bad, Some(&vec![Vec3::ZERO; 600]), useless);
+        refused(&[], None, CloudError::Empty { dropped: 0 });
         for bad in [
             Radii::Global(0.0),
             Radii::Global(1e-9),
@@ -303,7 +285,6 @@ fn points_that_move_keep_radii_from_neighbours() {
     assert!((cloud.radius(39) - 2.4).abs() < 1e-6);
 }
 
-/// One place has no spacing: the cloud stays as it was.
 /// Radii that neighbours tell are held to the limits that given ones are.
 #[test]
 fn points_too_far_apart_for_a_radius_are_refused() {
@@ -319,6 +300,7 @@ fn points_too_far_apart_for_a_radius_are_refused() {
     assert_eq!(cloud.mean_radius(), 0.65);
 }
 
+/// One place has no spacing: the cloud stays as it was.
 #[test]
 fn points_without_a_spacing_are_refused() {
     let mut cloud = PointCloud::builder(grid(9, 1.0)).build().expect("valid");

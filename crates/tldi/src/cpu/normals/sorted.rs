@@ -126,11 +126,12 @@ impl Sorted {
         for coordinate in &mut *coordinates {
             coordinate.resize(support.len() + RUN, 0.0);
         }
-        let in_cells = cells.iter().enumerate().rev().map(|(k, cell)| (*cell, k));
-        sort_by_bin(in_cells, grid.cells(), offsets, |place, k| {
+        let in_cells = support.iter().zip(&*cells).enumerate().rev();
+        let items = in_cells.map(|(k, (&id, &cell))| (cell, (k, id, cell)));
+        sort_by_bin(items, grid.cells(), offsets, |place, (k, id, cell)| {
             entries[place] = Entry {
-                id: support[k],
-                cell: cells[k],
+                id,
+                cell,
                 wanted: wanted(k),
             };
             for (to, from) in coordinates.iter_mut().zip(&*points) {
