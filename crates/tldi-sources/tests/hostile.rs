@@ -87,6 +87,14 @@ fn kind(bytes: &[u8], format: Format) -> SourceErrorKind {
     parse(bytes, format).expect_err("damaged").kind
 }
 
+/// Fails unless what was found is of this kind.
+macro_rules! assert_kind {
+    ($kind:ident, $found:expr $(, $of:expr)?) => {{
+        let found = $found;
+        assert!(matches!(found, SourceErrorKind::$kind { .. }), "{found}: {:?}", ($($of)?));
+    }};
+}
+
 fn ply(body: &str) -> Vec<u8> {
     let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
                   property float z\nelement face 1\nproperty list char int vertex_index\n\
@@ -109,18 +117,13 @@ fn ply_faces_that_are_wrong() {
         "3 0 1 2.5\n",
         "99999999999999999999 0\n",
     ] {
-        let found = kind(&ply(body), Format::Ply);
-        assert!(
-            matches!(found, SourceErrorKind::Value { .. }),
-            "{body}: {found}"
-        );
+        assert_kind!(Value, kind(&ply(body), Format::Ply), body);
     }
     let header = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty char x\n\
                   property char y\nproperty char z\nelement face 1\n\
                   property list char char vertex_index\nend_header\n";
     let negative = [header.as_bytes(), &[0, 0, 0, 0xff, 0]].concat();
-    let found = kind(&negative, Format::Ply);
-    assert!(matches!(found, SourceErrorKind::Value { .. }), "{found}");
+    assert_kind!(Value, kind(&negative, Format::Ply));
 }
 
 #[test]
@@ -140,15 +143,10 @@ fn bad_headers_are_told_apart() {
             .to_owned(),
     ];
     for header in headers {
-        let found = kind(header.as_bytes(), Format::Ply);
-        assert!(
-            matches!(found, SourceErrorKind::Header { .. }),
-            "{header}: {found}"
-        );
+        assert_kind!(Header, kind(header.as_bytes(), Format::Ply), header);
     }
     let not_text = b"ply\nformat ascii 1.0\nelement v\xff 1\nend_header\n";
-    let found = kind(not_text, Format::Ply);
-    assert!(matches!(found, SourceErrorKind::Header { .. }), "{found}");
+    assert_kind!(Header, kind(not_text, Format::Ply));
 
     let good = common::pcd_header("ascii");
     for (from, to) in [
@@ -167,25 +165,13 @@ fn bad_headers_are_told_apart() {
     ] {
         let bad = good.replace(from, to);
         assert_ne!(bad, good);
-        let found = kind(bad.as_bytes(), Format::Pcd);
-        assert!(
-            matches!(found, SourceErrorKind::Header { .. }),
-            "{to}: {found}"
-        );
+        assert_kind!(Header, kind(bad.as_bytes(), Format::Pcd), to);
     }
     for bad in ["hello world\n", "x y\n1 2\n", "x y z\nx y z\n"] {
-        let found = kind(bad.as_bytes(), Format::Text);
-        assert!(
-            matches!(found, SourceErrorKind::Header { .. }),
-            "{bad}: {found}"
-        );
+        assert_kind!(Header, kind(bad.as_bytes(), Format::Text), bad);
     }
     for bad in ["1 2\n", "1 2 3 4 5\n"] {
-        let found = kind(bad.as_bytes(), Format::Text);
-        assert!(
-            matches!(found, SourceErrorKind::UnnamedColumns { .. }),
-            "{bad}: {found}"
-        );
+        assert_kind!(UnnamedColumns, kind(bad.as_bytes(), Format::Text), bad);
     }
     for bad in [
         "1 2 3\n1 2\n",
@@ -193,11 +179,7 @@ fn bad_headers_are_told_apart() {
         "x y z\n1 2\n",
         "1 2 3\n1 2 word\n",
     ] {
-        let found = kind(bad.as_bytes(), Format::Text);
-        assert!(
-            matches!(found, SourceErrorKind::Value { .. }),
-            "{bad}: {found}"
-        );
+        assert_kind!(Value, kind(bad.as_bytes(), Format::Text), bad);
     }
 }
 
@@ -224,9 +206,11 @@ fn lzf_that_is_wrong() {
         ("cut run", [&literals[..33], &[31, 0]].concat(), length),
     ];
     for (name, packed, unpacked) in cases {
-        let found = kind(&pcd_compressed(&packed, unpacked), Format::Pcd);
-        let compression = matches!(found, SourceErrorKind::Compression { .. });
-        assert!(compression, "{name}: {found}");
+        assert_kind!(
+            Compression,
+            kind(&pcd_compressed(&packed, unpacked), Format::Pcd),
+            name
+        );
     }
 }
 
@@ -241,8 +225,7 @@ fn files_without_points_are_errors() {
         ("", Format::Text),
         ("x y z\n", Format::Text),
     ] {
-        let found = kind(bytes.as_bytes(), format);
-        assert!(matches!(found, SourceErrorKind::NoPoints), "{found}");
+        assert_kind!(NoPoints, kind(bytes.as_bytes(), format));
     }
 }
 
@@ -260,7 +243,5 @@ fn damaged_gzip_checksum_is_found() {
     let mut damaged = sound;
     let checksum = damaged.len() - 8;
     damaged[checksum] ^= 1;
-    let found = kind(&damaged, Format::Ply);
-    let compression = matches!(found, SourceErrorKind::Compression { .. });
-    assert!(compression, "{found}");
+    assert_kind!(Compression, kind(&damaged, Format::Ply));
 }
