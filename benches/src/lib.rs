@@ -4,6 +4,7 @@ pub mod accuracy;
 pub mod args;
 pub mod charts;
 pub mod contact_quality;
+mod distinct;
 pub mod floor;
 pub mod gpu_day;
 pub mod mesh_truth;

@@ -42,10 +42,7 @@ impl Words {
     }
 }
 
-impl<B: DrawingBackend> Canvas<'_, B>
-where
-    B::ErrorType: 'static,
-{
+impl<B: DrawingBackend<ErrorType: 'static>> Canvas<'_, B> {
     fn pixel(&self, at: At) -> At {
         (self.scale * at.0, self.scale * at.1)
     }
@@ -124,15 +121,10 @@ where
     pub(super) fn mark(&self, (x, y): At, look: &Look) -> Outcome {
         match look.mark {
             Mark::None => Ok(()),
-            Mark::Disc => self.circle((x, y), look.color),
+            Mark::Disc => self.circle((x, y), 9, look.color),
             Mark::Ring => {
-                self.circle((x, y), look.color)?;
-                self.area.draw(&Circle::new(
-                    self.pixel((x, y)),
-                    5 * self.scale / 2,
-                    WHITE.filled(),
-                ))?;
-                Ok(())
+                self.circle((x, y), 9, look.color)?;
+                self.circle((x, y), 5, [255; 3])
             }
             Mark::Square => self.polygon((x, y), &[(-4, -4), (4, -4), (4, 4), (-4, 4)], look.color),
             Mark::Triangle => self.polygon((x, y), &[(-5, 4), (5, 4), (0, -5)], look.color),
@@ -155,9 +147,9 @@ where
         }
     }
 
-    fn circle(&self, at: At, [r, g, b]: Color) -> Outcome {
+    fn circle(&self, at: At, diameter: i32, [r, g, b]: Color) -> Outcome {
         let style = RGBColor(r, g, b).filled();
-        let circle = Circle::new(self.pixel(at), 9 * self.scale / 2, style);
+        let circle = Circle::new(self.pixel(at), diameter * self.scale / 2, style);
         self.area.draw(&circle)?;
         Ok(())
     }

@@ -1,9 +1,10 @@
 //! Contact quality against time: every method that tells its deepest contact.
 
-use super::figure::{Axis, Curve, Entry, Figure, Level, Panel, Point};
+use super::figure::{Axis, Curve, Entry, Figure, Level, Panel, Point, lines, numbered};
 use super::front::{front, steps};
 use super::looks;
 use super::origin::origin;
+use crate::distinct::distinct;
 use crate::stored::{ContactRow, Stored};
 use tldi_tests::Regime;
 
@@ -58,12 +59,11 @@ struct Placed<'a> {
 
 /// A chart for each run that has rows of all pairs.
 pub(super) fn figures(runs: &[Run]) -> Vec<Figure> {
-    let drawn = runs.iter().filter(|run| of_all_pairs(run).next().is_some());
-    let named = drawn.enumerate().map(|(k, run)| match k {
-        0 => figure(run, "contact_quality".to_owned()),
-        _ => figure(run, format!("contact_quality_{}", k + 1)),
-    });
-    named.collect()
+    let mut all = Vec::new();
+    for run in runs.iter().filter(|run| of_all_pairs(run).next().is_some()) {
+        all.push(numbered(&all, figure(run)));
+    }
+    all
 }
 
 fn of_all_pairs(run: &Run) -> impl Iterator<Item = &ContactRow> {
@@ -72,12 +72,7 @@ fn of_all_pairs(run: &Run) -> impl Iterator<Item = &ContactRow> {
 
 /// Names of methods, ours last, so that it is painted above the others.
 fn methods(run: &Run) -> Vec<&str> {
-    let mut all: Vec<&str> = Vec::new();
-    for row in of_all_pairs(run) {
-        if !all.contains(&&*row.variant) {
-            all.push(&row.variant);
-        }
-    }
+    let mut all = distinct(of_all_pairs(run).map(|row| &*row.variant));
     all.sort_by_key(|method| looks::look(method) == looks::OURS);
     all
 }
@@ -86,7 +81,7 @@ fn setting_label(row: &ContactRow) -> Option<String> {
     row.pixel_scale.map(|scale| format!("pixel {scale} r"))
 }
 
-fn figure(run: &Run, name: String) -> Figure {
+fn figure(run: &Run) -> Figure {
     let methods = methods(run);
     let mut panels = Vec::new();
     for regime in Regime::ALL {
@@ -94,46 +89,34 @@ fn figure(run: &Run, name: String) -> Figure {
             panels.push(panel(run, &methods, regime, quantity));
         }
     }
-    let entry = |method: &&str| Entry {
-        look: looks::look(method),
-        label: looks::title(method),
-    };
+    let entry = |method: &&str| Entry::new(looks::look(method), looks::title(method));
     let mut legend: Vec<Entry> = methods.iter().rev().map(entry).collect();
-    legend.push(Entry {
-        look: looks::FRONT,
-        label: "Pareto front (points alone)".to_owned(),
-    });
+    legend.push(Entry::new(looks::FRONT, "Pareto front (points alone)"));
     Figure {
-        name,
+        name: "contact_quality".to_owned(),
         title: "How wrong are the normal and the depth of a contact, and how long does it take?"
             .to_owned(),
-        subtitle: vec![
+        subtitle: lines([
             "Spheres, boxes, edges and corners in each other, in planes and on ramps, sampled without \
-             normals: the deepest contact that a method tells, held against the shapes' own."
-                .to_owned(),
+             normals: the deepest contact that a method tells, held against the shapes' own.",
             "Every case is a frame of new points: building and finding the contacts is counted, in \
-             processor time of one thread. Lower left is better."
-                .to_owned(),
-        ],
+             processor time of one thread. Lower left is better.",
+        ]),
         columns: QUANTITIES.len(),
         panels,
         panel_size: [640, 400],
         legend,
-        notes: vec![
+        notes: lines([
             "r: spacing of the points. Along a curve varies, of this project: the pixel's edge; of the \
-             grid of balls: their radius; of voxels: half their edge."
-                .to_owned(),
+             grid of balls: their radius; of voxels: half their edge.",
             "Balls: the pair that is deepest in each other, its normal from centre to centre, its depth \
-             2 radii less the distance. Voxels and meshes: the deepest point of rapier's manifolds."
-                .to_owned(),
+             2 radii less the distance. Voxels and meshes: the deepest point of rapier's manifolds.",
             "Marks: the median of all cases; bars, on the front: what 95 % of the cases are below. A missed \
-             contact is infinitely wrong; what misses half is not drawn."
-                .to_owned(),
-            given_note(run),
-            "On the front no other method that is given points alone is both faster and less wrong."
-                .to_owned(),
-            origin([&run.provenance]),
-        ],
+             contact is infinitely wrong; what misses half is not drawn.",
+            &given_note(run),
+            "On the front no other method that is given points alone is both faster and less wrong.",
+            &origin([&run.provenance]),
+        ]),
     }
 }
 
@@ -185,11 +168,9 @@ fn panel(run: &Run, methods: &[&str], regime: Regime, quantity: &Quantity) -> Pa
                 && best.last().is_some_and(is);
             let most = (quantity.p95)(p.row).unwrap_or(y.range[1]);
             Point {
-                x: p.row.median_ms,
-                y: p.error,
-                x_spread: None,
                 y_spread: is_on_front.then_some([p.error, most]),
                 label: is_said.then(|| setting_label(p.row)).flatten(),
+                ..Point::new(p.row.median_ms, p.error)
             }
         };
         curves.push(Curve {
@@ -199,14 +180,10 @@ fn panel(run: &Run, methods: &[&str], regime: Regime, quantity: &Quantity) -> Pa
     }
     let [low, high] = regime.depths();
     let cases = placed.iter().map(|p| p.row.cases).max().unwrap_or(0);
+    let title = quantity.title;
+    let title = format!("{title}, contacts {low} to {high} r deep, {cases} cases");
     Panel {
-        title: format!(
-            "{}, contacts {low} to {high} r deep, {cases} cases",
-            quantity.title
-        ),
-        x,
-        y,
-        curves,
         levels: vec![blind],
+        ..Panel::new(title, x, y, curves)
     }
 }

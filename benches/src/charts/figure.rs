@@ -103,7 +103,74 @@ pub(super) struct Entry {
     pub(super) label: String,
 }
 
+impl Look {
+    /// Marks that no line joins.
+    pub(super) fn marks(color: Color, mark: Mark) -> Self {
+        Self {
+            color,
+            mark,
+            line: Line::None,
+        }
+    }
+}
+
+impl Point {
+    /// Without spread and label.
+    pub(super) fn new(x: f64, y: f64) -> Self {
+        Self {
+            x,
+            y,
+            ..Self::default()
+        }
+    }
+}
+
+/// Points without spread and label.
+pub(super) fn points(places: impl IntoIterator<Item = (f64, f64)>) -> Vec<Point> {
+    let places = places.into_iter();
+    places.map(|(x, y)| Point::new(x, y)).collect()
+}
+
+impl Entry {
+    pub(super) fn new(look: Look, label: impl Into<String>) -> Self {
+        let label = label.into();
+        Self { look, label }
+    }
+}
+
+impl Panel {
+    /// Without levels.
+    pub(super) fn new(title: impl Into<String>, x: Axis, y: Axis, curves: Vec<Curve>) -> Self {
+        Self {
+            title: title.into(),
+            x,
+            y,
+            curves,
+            levels: Vec::new(),
+        }
+    }
+}
+
 impl Axis {
+    /// A linear axis that shows just this range.
+    pub(super) fn over(label: &str, range: [f64; 2]) -> Self {
+        Self {
+            label: label.to_owned(),
+            is_log: false,
+            range,
+            has_zero: false,
+            ticks: None,
+        }
+    }
+
+    /// A linear axis over these values and one more on both sides.
+    pub(super) fn around(label: &str, values: impl Iterator<Item = f64>) -> Self {
+        let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), value| {
+            (low.min(value), high.max(value))
+        });
+        Self::over(label, [low - 1.0, high + 1.0])
+    }
+
     /// A logarithmic axis over the positive ones of these values, a little wider.
     pub(super) fn log(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (mut low, mut high, mut has_zero) = (f64::MAX, f64::MIN, false);
@@ -117,13 +184,10 @@ impl Axis {
         if low > high {
             (low, high) = (0.1, 1.0);
         }
-        let factor = 1.25;
         Self {
-            label: label.to_owned(),
             is_log: true,
-            range: [low / factor, high * factor],
             has_zero,
-            ticks: None,
+            ..Self::over(label, [low / 1.25, high * 1.25])
         }
     }
 
@@ -135,13 +199,8 @@ impl Axis {
                 (f64::min(low, value), f64::max(high, value))
             });
         let high = if high > low { high } else { low + 1.0 };
-        Self {
-            label: label.to_owned(),
-            is_log: false,
-            range: [low - 0.03 * (high - low), high + 0.03 * (high - low)],
-            has_zero: false,
-            ticks: None,
-        }
+        let margin = 0.03 * (high - low);
+        Self::over(label, [low - margin, high + margin])
     }
 
     /// Where a value is between the ends of the axis, 0 to 1.
@@ -164,6 +223,11 @@ impl Axis {
 
 /// Share of a logarithmic axis that is left for zero.
 pub(super) const ZERO_SHARE: f64 = 0.08;
+
+/// Texts, each in a line of its own.
+pub(super) fn lines<const N: usize>(texts: [&str; N]) -> Vec<String> {
+    texts.map(str::to_owned).to_vec()
+}
 
 /// `figure` with a number where others have its name: of two runs of one model.
 pub(super) fn numbered(others: &[Figure], figure: Figure) -> Figure {

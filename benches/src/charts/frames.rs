@@ -1,8 +1,9 @@
 //! What a frame of new points costs, by placement and number of points.
 
-use super::figure::{Axis, Curve, Entry, Figure, Panel, Point, numbered};
+use super::figure::{Axis, Curve, Entry, Figure, Panel, Point, lines, numbered};
 use super::looks;
 use super::origin::origin;
+use crate::distinct::{distinct, rising};
 use crate::stored::{FrameRow, Stored};
 
 /// How the names of peers in their best form end.
@@ -14,29 +15,7 @@ type Run = Stored<FrameRow>;
 pub(super) fn figures(runs: &[Run]) -> Vec<Figure> {
     let mut all: Vec<Figure> = Vec::new();
     for run in runs.iter().filter(|run| rows(run).next().is_some()) {
-        let figure = match sizes(run).len() {
-            1 => by_placement(run),
-            _ => by_points(run),
-        };
-        all.push(numbered(&all, figure));
-    }
-    all
-}
-
-/// Numbers of points, rising.
-fn sizes(run: &Run) -> Vec<usize> {
-    let mut all: Vec<usize> = run.rows.iter().map(|row| row.points).collect();
-    all.sort_unstable();
-    all.dedup();
-    all
-}
-
-fn placements(run: &Run) -> Vec<&str> {
-    let mut all: Vec<&str> = Vec::new();
-    for row in &run.rows {
-        if !all.contains(&&*row.placement) {
-            all.push(&row.placement);
-        }
+        all.push(numbered(&all, figure(run)));
     }
     all
 }
@@ -47,178 +26,105 @@ fn rows(run: &Run) -> impl Iterator<Item = &FrameRow> {
     run.rows.iter().filter(|row| row.threads == 1)
 }
 
-/// Names of methods, whichever form is faster.
-fn methods(run: &Run) -> Vec<&str> {
-    let mut all: Vec<&str> = Vec::new();
-    for row in rows(run) {
-        let method = method(row);
-        if !all.contains(&method) {
-            all.push(method);
-        }
-    }
-    all
-}
-
+/// The method of a row, in whichever form.
 fn method(row: &FrameRow) -> &str {
     row.method.strip_suffix(CULLED).unwrap_or(&row.method)
 }
 
-fn entries(run: &Run) -> Vec<Entry> {
-    methods(run)
-        .iter()
-        .map(|method| Entry {
-            look: looks::look(method),
-            label: looks::title(method),
+fn methods(run: &Run) -> Vec<&str> {
+    distinct(rows(run).map(method))
+}
+
+/// A curve for each method, by the faster form of its rows. A curve has a point at each of `places` along x, of the rows
+/// that `is_at` finds to be of that place, by its number.
+fn curves(run: &Run, places: &[f64], is_at: impl Fn(&FrameRow, usize) -> bool) -> Vec<Curve> {
+    let point = |wanted: &str, k: usize| {
+        let here = rows(run).filter(|row| method(row) == wanted && is_at(row, k));
+        let row = here.min_by(|a, b| a.total_ms.total_cmp(&b.total_ms))?;
+        Some(Point {
+            y_spread: Some([row.least_ms, row.most_ms]),
+            ..Point::new(places[k], row.total_ms)
         })
-        .collect()
+    };
+    let curve = |wanted: &&str| Curve {
+        look: looks::look(wanted),
+        points: (0..places.len()).filter_map(|k| point(wanted, k)).collect(),
+    };
+    // Ours, which come first, above the others.
+    methods(run).iter().rev().map(curve).collect()
 }
 
-/// The faster form of a method's rows.
-fn fastest<'a>(rows: impl Iterator<Item = &'a FrameRow>) -> Option<&'a FrameRow> {
-    rows.min_by(|a, b| a.total_ms.total_cmp(&b.total_ms))
+fn panel(title: &str, x: Axis, curves: Vec<Curve>) -> Panel {
+    let points = curves.iter().flat_map(|curve| &curve.points);
+    let times = points.flat_map(|p| p.y_spread.unwrap_or([p.y; 2]));
+    let y = Axis::log("ms for one frame", times);
+    Panel::new(title, x, y, curves)
 }
 
-fn point(x: f64, row: &FrameRow) -> Point {
-    Point {
-        x,
-        y: row.total_ms,
-        x_spread: None,
-        y_spread: Some([row.least_ms, row.most_ms]),
-        label: None,
+/// A panel for each placement, over the numbers of points.
+fn by_points(run: &Run, placements: &[&str], sizes: &[usize]) -> Vec<Panel> {
+    let places: Vec<f64> = sizes.iter().map(|n| *n as f64).collect();
+    let of = |placement: &&str| {
+        let is_at =
+            |row: &FrameRow, k: usize| row.placement == *placement && row.points == sizes[k];
+        let x = Axis::log("points of each body (of the scan)", places.iter().copied());
+        panel(placement, x, curves(run, &places, is_at))
+    };
+    placements.iter().map(of).collect()
+}
+
+/// One panel over the placements.
+fn by_placement(run: &Run, placements: &[&str]) -> Panel {
+    let places: Vec<f64> = (0..placements.len()).map(|k| k as f64).collect();
+    let names = placements.iter().map(|name| (*name).to_owned());
+    let x = Axis {
+        ticks: Some(places.iter().copied().zip(names).collect()),
+        ..Axis::over("how the bodies lie", [-0.5, placements.len() as f64 - 0.5])
+    };
+    let is_at = |row: &FrameRow, k: usize| row.placement == placements[k];
+    panel("", x, curves(run, &places, is_at))
+}
+
+fn figure(run: &Run) -> Figure {
+    let sizes = rising(run.rows.iter().map(|row| row.points));
+    let placements = distinct(run.rows.iter().map(|row| &*row.placement));
+    let title = format!("What a frame of new points costs: {}", run.rows[0].model);
+    let (title, panels, columns, panel_size) = match sizes[..] {
+        [size] => {
+            let title = format!("{title}, 2 × {size} points");
+            (title, vec![by_placement(run, &placements)], 1, [980, 560])
+        }
+        _ => (title, by_points(run, &placements, &sizes), 3, [430, 420]),
+    };
+    let entry = |method: &&str| Entry::new(looks::look(method), looks::title(method));
+    Figure {
+        name: name(run),
+        title,
+        subtitle: lines([
+            "From points to contacts, all points new: building what the method needs, and the query. \
+             Processor time of one thread.",
+        ]),
+        panels,
+        columns,
+        panel_size,
+        legend: methods(run).iter().map(entry).collect(),
+        notes: lines([
+            &format!(
+                "Medians of {} frames; bars from the fastest to the slowest. Peers as they are, or culled \
+                 to the overlap of both bounds, whichever is faster.",
+                run.rows[0].frames
+            ),
+            "Peers pair balls or voxels, this project finds surfaces, gaps and contact patches: the chart \
+             of speed against accuracy says what each answer is worth.",
+            &origin([&run.provenance]),
+        ]),
     }
 }
 
 fn name(run: &Run) -> String {
-    let model: String = run.rows[0]
+    let model = run.rows[0]
         .model
-        .chars()
-        .map(|c| if c.is_alphanumeric() { c } else { '_' })
-        .collect();
-    format!(
-        "frame_cost_{}",
-        model.trim_end_matches('_').replace("__", "_")
-    )
-}
-
-fn notes(run: &Run) -> Vec<String> {
-    vec![
-        format!(
-            "Medians of {} frames; bars from the fastest to the slowest. Peers as they are, or culled \
-             to the overlap of both bounds, whichever is faster.",
-            run.rows[0].frames
-        ),
-        "Peers pair balls or voxels, this project finds surfaces, gaps and contact patches: the chart \
-         of speed against accuracy says what each answer is worth."
-            .to_owned(),
-        origin([&run.provenance]),
-    ]
-}
-
-const ABOUT: &str = "From points to contacts, all points new: building what the method needs, and the query. \
-                     Processor time of one thread.";
-
-fn by_points(run: &Run) -> Figure {
-    let panels = placements(run)
-        .into_iter()
-        .map(|placement| {
-            let curves: Vec<Curve> = methods(run)
-                .iter()
-                .rev() // ours, which come first, above the others
-                .map(|wanted| Curve {
-                    look: looks::look(wanted),
-                    points: sizes(run)
-                        .into_iter()
-                        .filter_map(|points| {
-                            let rows = rows(run).filter(|row| {
-                                row.placement == placement
-                                    && row.points == points
-                                    && method(row) == *wanted
-                            });
-                            fastest(rows).map(|row| point(points as f64, row))
-                        })
-                        .collect(),
-                })
-                .collect();
-            Panel {
-                title: placement.to_owned(),
-                x: Axis::log(
-                    "points of each body (of the scan)",
-                    sizes(run).into_iter().map(|n| n as f64),
-                ),
-                y: Axis::log("ms for one frame", values(&curves)),
-                curves,
-                levels: Vec::new(),
-            }
-        })
-        .collect();
-    Figure {
-        name: name(run),
-        title: format!("What a frame of new points costs: {}", run.rows[0].model),
-        subtitle: vec![ABOUT.to_owned()],
-        panels,
-        columns: 3,
-        panel_size: [430, 420],
-        legend: entries(run),
-        notes: notes(run),
-    }
-}
-
-fn values(curves: &[Curve]) -> Vec<f64> {
-    let points = curves.iter().flat_map(|curve| &curve.points);
-    points
-        .flat_map(|p| p.y_spread.unwrap_or([p.y; 2]))
-        .collect()
-}
-
-fn by_placement(run: &Run) -> Figure {
-    let placements = placements(run);
-    let curves: Vec<Curve> = methods(run)
-        .iter()
-        .rev()
-        .map(|wanted| Curve {
-            look: looks::look(wanted),
-            points: placements
-                .iter()
-                .enumerate()
-                .filter_map(|(k, placement)| {
-                    let rows = rows(run)
-                        .filter(|row| row.placement == *placement && method(row) == *wanted);
-                    fastest(rows).map(|row| point(k as f64, row))
-                })
-                .collect(),
-        })
-        .collect();
-    let x = Axis {
-        label: "how the bodies lie".to_owned(),
-        is_log: false,
-        range: [-0.5, placements.len() as f64 - 0.5],
-        has_zero: false,
-        ticks: Some(
-            placements
-                .iter()
-                .enumerate()
-                .map(|(k, placement)| (k as f64, (*placement).to_owned()))
-                .collect(),
-        ),
-    };
-    Figure {
-        name: name(run),
-        title: format!(
-            "What a frame of new points costs: {}, 2 × {} points",
-            run.rows[0].model,
-            sizes(run)[0]
-        ),
-        subtitle: vec![ABOUT.to_owned()],
-        panels: vec![Panel {
-            title: String::new(),
-            x,
-            y: Axis::log("ms for one frame", values(&curves)),
-            curves,
-            levels: Vec::new(),
-        }],
-        columns: 1,
-        panel_size: [980, 560],
-        legend: entries(run),
-        notes: notes(run),
-    }
+        .replace(|c: char| !c.is_alphanumeric(), "_");
+    let model = model.trim_end_matches('_').replace("__", "_");
+    format!("frame_cost_{model}")
 }

@@ -26,11 +26,7 @@ pub(super) fn steps(on_front: impl IntoIterator<Item = [f64; 2]>) -> Vec<Point> 
     for [x, y] in on_front {
         let corner = steps.last().map(|last| last.y);
         for y in corner.into_iter().chain([y]) {
-            steps.push(Point {
-                x,
-                y,
-                ..Point::default()
-            });
+            steps.push(Point::new(x, y));
         }
     }
     steps

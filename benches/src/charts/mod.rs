@@ -78,10 +78,7 @@ fn json_files(folder: &Path) -> Result<Vec<PathBuf>, ChartError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        if path
-            .extension()
-            .is_some_and(|extension| extension == "json")
-        {
+        if path.extension().is_some_and(|kind| kind == "json") {
             files.push(path);
         }
     }
@@ -102,13 +99,11 @@ pub fn draw_all(results: &Path, out: &Path) -> Result<Drawn, ChartError> {
     let all = Results::read(results)?;
     let mut drawn = Drawn::default();
     let mut frames = frames::figures(&all.frames);
-    match work::figures(&all.frames) {
-        Ok(work) => frames.extend(work),
-        Err(missing) => drawn.skipped.push(missing),
-    }
-    match stages::figures(&all.frames) {
-        Ok(stages) => frames.extend(stages),
-        Err(missing) => drawn.skipped.push(missing),
+    for told in [work::figures(&all.frames), stages::figures(&all.frames)] {
+        match told {
+            Ok(figures) => frames.extend(figures),
+            Err(missing) => drawn.skipped.push(missing),
+        }
     }
     let figures = [
         speed_accuracy::figures(&all.accuracy),

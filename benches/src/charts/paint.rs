@@ -34,27 +34,17 @@ pub(super) fn save(figure: &Figure, folder: &Path) -> Result<[PathBuf; 2], Chart
     let fonts = epaint_default_fonts::UBUNTU_LIGHT;
     plotters::style::register_font(FONT, FontStyle::Normal, fonts)
         .map_err(|_| failed(&png)("the built-in font cannot be read".into()))?;
-    let size = |scale: i32| {
-        let [w, h] = size(figure);
-        ((scale * w) as u32, (scale * h) as u32)
-    };
-    {
-        let area = SVGBackend::new(&svg, size(1)).into_drawing_area();
-        let canvas = Canvas {
-            area: &area,
-            scale: 1,
-        };
-        paint(figure, &canvas).map_err(failed(&svg))?;
-    }
-    {
-        let area = BitMapBackend::new(&png, size(PNG_SCALE)).into_drawing_area();
-        let canvas = Canvas {
-            area: &area,
-            scale: PNG_SCALE,
-        };
-        paint(figure, &canvas).map_err(failed(&png))?;
-    }
+    let [width, height] = size(figure);
+    let pixels = |scale: i32| ((scale * width) as u32, (scale * height) as u32);
+    draw(figure, SVGBackend::new(&svg, pixels(1)), 1).map_err(failed(&svg))?;
+    let bitmap = BitMapBackend::new(&png, pixels(PNG_SCALE));
+    draw(figure, bitmap, PNG_SCALE).map_err(failed(&png))?;
     Ok([svg, png])
+}
+
+fn draw<B: DrawingBackend<ErrorType: 'static>>(figure: &Figure, backend: B, scale: i32) -> Outcome {
+    let area = backend.into_drawing_area();
+    paint(figure, &Canvas { area: &area, scale })
 }
 
 /// As wide as the panels, or as the longest line if that is wider.
@@ -93,10 +83,7 @@ fn size(figure: &Figure) -> [i32; 2] {
     [width(figure), height]
 }
 
-fn paint<B: DrawingBackend>(figure: &Figure, canvas: &Canvas<B>) -> Outcome
-where
-    B::ErrorType: 'static,
-{
+fn paint<B: DrawingBackend<ErrorType: 'static>>(figure: &Figure, canvas: &Canvas<B>) -> Outcome {
     canvas.area.fill(&WHITE)?;
     let left = |size, color| Words::new(size, color, HPos::Left, VPos::Top);
     canvas.text(&figure.title, left(23, DARK), (MARGIN, MARGIN))?;
@@ -170,10 +157,11 @@ impl<'a> Plot<'a> {
     }
 }
 
-fn paint_panel<B: DrawingBackend>(panel: &Panel, plot: &Plot, canvas: &Canvas<B>) -> Outcome
-where
-    B::ErrorType: 'static,
-{
+fn paint_panel<B: DrawingBackend<ErrorType: 'static>>(
+    panel: &Panel,
+    plot: &Plot,
+    canvas: &Canvas<B>,
+) -> Outcome {
     paint_axes(panel, plot, canvas)?;
     for level in &panel.levels {
         let y = plot.y(level.y);
@@ -191,10 +179,11 @@ where
     Ok(())
 }
 
-fn paint_words<B: DrawingBackend>(curve: &Curve, plot: &Plot, canvas: &Canvas<B>) -> Outcome
-where
-    B::ErrorType: 'static,
-{
+fn paint_words<B: DrawingBackend<ErrorType: 'static>>(
+    curve: &Curve,
+    plot: &Plot,
+    canvas: &Canvas<B>,
+) -> Outcome {
     if let (Line::Bar, [start, .., end]) = (curve.look.line, &curve.points[..]) {
         let at = plot.at(0.5 * (start.x + end.x), 0.5 * (start.y + end.y));
         let look = Words::new(
@@ -229,10 +218,11 @@ fn readable_on([r, g, b]: Color) -> Color {
     if light > 140.0 { DARK } else { [255; 3] }
 }
 
-fn paint_axes<B: DrawingBackend>(panel: &Panel, plot: &Plot, canvas: &Canvas<B>) -> Outcome
-where
-    B::ErrorType: 'static,
-{
+fn paint_axes<B: DrawingBackend<ErrorType: 'static>>(
+    panel: &Panel,
+    plot: &Plot,
+    canvas: &Canvas<B>,
+) -> Outcome {
     let middle = (plot.low.0 + plot.high.0) / 2;
     let title = Words::new(17, DARK, HPos::Left, VPos::Bottom);
     canvas.text(&panel.title, title, (plot.low.0, plot.low.1 - 6))?;
@@ -264,10 +254,11 @@ where
     canvas.text(&panel.y.label, upright, (plot.low.0 - FRAME[0] + 6, height))
 }
 
-fn paint_curve<B: DrawingBackend>(curve: &Curve, plot: &Plot, canvas: &Canvas<B>) -> Outcome
-where
-    B::ErrorType: 'static,
-{
+fn paint_curve<B: DrawingBackend<ErrorType: 'static>>(
+    curve: &Curve,
+    plot: &Plot,
+    canvas: &Canvas<B>,
+) -> Outcome {
     let at: Vec<At> = curve.points.iter().map(|p| plot.at(p.x, p.y)).collect();
     canvas.line(&at, &curve.look)?;
     for (point, at) in curve.points.iter().zip(at) {

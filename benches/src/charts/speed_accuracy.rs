@@ -1,9 +1,10 @@
 //! Speed against accuracy: every method on the accuracy protocol.
 
-use super::figure::{Axis, Curve, Entry, Figure, Panel, Point};
+use super::figure::{Axis, Curve, Entry, Figure, Panel, Point, lines};
 use super::front::{front, steps};
 use super::looks;
 use super::origin::origin;
+use crate::distinct::distinct;
 use crate::stored::{AccuracyRow, Provenance, Stored};
 
 /// Models in the main chart: those with the most points.
@@ -73,33 +74,24 @@ fn is_peer(row: &AccuracyRow) -> bool {
 /// Whether two rows are of one method with one setting.
 fn is_same(a: &AccuracyRow, b: &AccuracyRow) -> bool {
     let settings = |row: &AccuracyRow| {
-        let AccuracyRow {
-            rho,
-            resolution,
-            pixel_scale,
-            radius_scale,
-            ..
-        } = *row;
-        (rho, resolution, pixel_scale, radius_scale)
+        let radii = (row.pixel_scale, row.radius_scale);
+        (row.rho, row.resolution, radii)
     };
     a.variant == b.variant && settings(a) == settings(b)
 }
 
 /// Rows of each method, in the order of their settings.
 fn by_method<'a>(model: &Model<'a>) -> Vec<(&'a str, Vec<&'a AccuracyRow>)> {
-    let mut all: Vec<(&str, Vec<&AccuracyRow>)> = Vec::new();
-    for &row in &model.rows {
-        match all.iter_mut().find(|(method, _)| *method == row.variant) {
-            Some((_, rows)) => rows.push(row),
-            None => all.push((&row.variant, vec![row])),
-        }
-    }
-    for (_, rows) in &mut all {
-        rows.sort_by(|a, b| setting(a).total_cmp(&setting(b)));
-    }
+    let mut methods = distinct(model.rows.iter().map(|row| &*row.variant));
     // Ours last, so that it is painted above the others.
-    all.sort_by_key(|(method, _)| (looks::look(method) == looks::OURS, *method == "paper"));
-    all
+    methods.sort_by_key(|method| (looks::look(method) == looks::OURS, *method == "paper"));
+    let with_rows = |method: &'a str| {
+        let own = model.rows.iter().filter(|row| row.variant == method);
+        let mut rows: Vec<&AccuracyRow> = own.copied().collect();
+        rows.sort_by(|a, b| setting(a).total_cmp(&setting(b)));
+        (method, rows)
+    };
+    methods.into_iter().map(with_rows).collect()
 }
 
 /// Whether a method is given points alone: meshes have no radius.
@@ -126,90 +118,55 @@ fn setting_label(row: &AccuracyRow) -> String {
 }
 
 fn figure(models: &[Model], name: String) -> Figure {
-    let mut methods: Vec<&str> = Vec::new();
-    let mut panels = Vec::new();
-    for model in models {
-        let grouped = by_method(model);
-        for (method, _) in &grouped {
-            if !methods.contains(method) {
-                methods.push(method);
-            }
-        }
-        panels.push(panel(&grouped));
-    }
+    let grouped: Vec<_> = models.iter().map(by_method).collect();
+    let panels: Vec<Panel> = grouped.iter().map(|grouped| panel(grouped)).collect();
+    let mut methods = distinct(grouped.iter().flatten().map(|(method, _)| *method));
     methods.sort_by_key(|method| looks::look(method) != looks::OURS);
-    let mut legend: Vec<Entry> = methods
-        .iter()
-        .map(|method| Entry {
-            look: looks::look(method),
-            label: looks::title(method),
-        })
-        .collect();
-    legend.push(Entry {
-        look: looks::FRONT,
-        label: "Pareto front (points alone)".to_owned(),
-    });
+    let entry = |method: &&str| Entry::new(looks::look(method), looks::title(method));
+    let mut legend: Vec<Entry> = methods.iter().map(entry).collect();
+    legend.push(Entry::new(looks::FRONT, "Pareto front (points alone)"));
     Figure {
         name,
         title: "How often is the answer \"they touch\" wrong, and how long does it take?"
             .to_owned(),
-        subtitle: vec![
+        subtitle: lines([
             "Two copies of a model at 31 distances and 900 rotations, judged from their points \
-             alone; the truth is exact tests of the mesh's triangles."
-                .to_owned(),
+             alone; the truth is exact tests of the mesh's triangles.",
             "Every case is a frame of new points: building what the method needs and finding all \
-             contacts is counted, in processor time of one thread. Lower left is better."
-                .to_owned(),
-        ],
+             contacts is counted, in processor time of one thread. Lower left is better.",
+        ]),
         columns: panels.len().min(2),
         panels,
         panel_size: [640, 520],
         legend,
-        notes: vec![
-            settings_note(models),
-            RADIUS_NOTE.to_owned(),
+        notes: lines([
+            &settings_note(models),
+            RADIUS_NOTE,
             "Thin bars, on the front: the middle half of the cases. \"culled\": points outside of the overlap of \
              both bounds are dropped first. Meshes are given their triangles, the others only \
-             points."
-                .to_owned(),
-            origin(provenances(models)),
-        ],
+             points.",
+            &origin(provenances(models)),
+        ]),
     }
 }
 
 /// What is varied along the curves.
 fn settings_note(models: &[Model]) -> String {
-    let span = |values: Vec<f32>| {
-        let low = values.iter().copied().fold(f32::MAX, f32::min);
-        let high = values.iter().copied().fold(0.0, f32::max);
-        format!("{low} to {high}")
-    };
     let rows = || models.iter().flat_map(|model| &model.rows).copied();
-    let of = |value: fn(&AccuracyRow) -> Option<f32>| rows().filter_map(value).collect::<Vec<_>>();
-    let mut parts = Vec::new();
-    let balls = of(
-        |row| match row.variant == "default" || row.variant == "paper" {
-            true => None,
-            false => row.radius_scale,
-        },
-    );
-    if !balls.is_empty() {
-        parts.push(format!(
-            "peers: the radius of balls or half edge of voxels, {} r",
-            span(balls)
-        ));
-    }
-    let pixels = of(|row| row.pixel_scale);
-    if !pixels.is_empty() {
-        parts.push(format!("this project: the pixel, {} r", span(pixels)));
-    }
-    let images = of(|row| row.resolution.map(|pixels| pixels as f32));
-    if !images.is_empty() {
-        parts.push(format!(
-            "the paper: the image's edge, {} pixels",
-            span(images)
-        ));
-    }
+    let part = |of_what: &str, unit: &str, value: fn(&AccuracyRow) -> Option<f32>| {
+        let low = rows().filter_map(value).reduce(f32::min)?;
+        let high = rows().filter_map(value).reduce(f32::max)?;
+        Some(format!("{of_what}, {low} to {high} {unit}"))
+    };
+    let balls = "peers: the radius of balls or half edge of voxels";
+    let parts = [
+        part(balls, "r", |row| row.radius_scale.filter(|_| is_peer(row))),
+        part("this project: the pixel", "r", |row| row.pixel_scale),
+        part("the paper: the image's edge", "pixels", |row| {
+            row.resolution.map(|pixels| pixels as f32)
+        }),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
     format!("Along a curve varies, of {}.", parts.join("; of "))
 }
 
@@ -221,40 +178,26 @@ fn panel(grouped: &[(&str, Vec<&AccuracyRow>)]) -> Panel {
         front(&points).into_iter().map(|i| rows[i]).collect()
     };
     let is_on_front = |row: &AccuracyRow| on_front.iter().any(|other| std::ptr::eq(*other, row));
-    let curve = |(method, rows): &(&str, Vec<&AccuracyRow>)| Curve {
-        look: looks::look(method),
-        points: rows
-            .iter()
-            .map(|row| Point {
-                x: row.median_ms,
-                y: row.error_pct,
-                x_spread: is_on_front(row)
-                    .then_some([row.lower_quartile_ms, row.upper_quartile_ms]),
-                y_spread: None,
-                label: is_on_front(row).then(|| setting_label(row)),
-            })
-            .collect(),
+    let quartiles = |row: &AccuracyRow| [row.lower_quartile_ms, row.upper_quartile_ms];
+    let point = |row: &&AccuracyRow| Point {
+        x_spread: is_on_front(row).then(|| quartiles(row)),
+        label: is_on_front(row).then(|| setting_label(row)),
+        ..Point::new(row.median_ms, row.error_pct)
     };
-    let on_front_at = on_front.iter().map(|row| [row.median_ms, row.error_pct]);
     let mut curves = vec![Curve {
         look: looks::FRONT,
-        points: steps(on_front_at),
+        points: steps(on_front.iter().map(|row| [row.median_ms, row.error_pct])),
     }];
-    curves.extend(grouped.iter().map(curve));
-    let spreads = on_front
-        .iter()
-        .flat_map(|row| [row.lower_quartile_ms, row.upper_quartile_ms])
-        .chain(rows.iter().map(|row| row.median_ms));
-    Panel {
-        title: panel_title(&rows),
-        x: Axis::log("time for one frame, ms (median of all cases)", spreads),
-        y: Axis::log(
-            "wrong answers, % of all cases",
-            rows.iter().map(|r| r.error_pct),
-        ),
-        curves,
-        levels: Vec::new(),
-    }
+    curves.extend(grouped.iter().map(|(method, rows)| Curve {
+        look: looks::look(method),
+        points: rows.iter().map(point).collect(),
+    }));
+    let spreads = on_front.iter().flat_map(|row| quartiles(row));
+    let times = spreads.chain(rows.iter().map(|row| row.median_ms));
+    let x = Axis::log("time for one frame, ms (median of all cases)", times);
+    let errors = rows.iter().map(|row| row.error_pct);
+    let y = Axis::log("wrong answers, % of all cases", errors);
+    Panel::new(panel_title(&rows), x, y, curves)
 }
 
 fn panel_title(rows: &[&AccuracyRow]) -> String {
@@ -272,92 +215,75 @@ fn provenances<'a>(models: &[Model<'a>]) -> impl Iterator<Item = &'a Provenance>
     models.iter().flat_map(|model| model.provenances.clone())
 }
 
+/// Contacts that a row invents, and those that it misses, in % of the cases.
+fn kinds(row: &AccuracyRow) -> [f64; 2] {
+    [row.false_positive_pct, row.false_negative_pct]
+}
+
 /// What is said where the curve begins and ends, if it goes anywhere.
 fn end_label(rows: &[&AccuracyRow], index: usize) -> Option<String> {
-    let place = |row: &AccuracyRow| [row.false_positive_pct, row.false_negative_pct];
     let (first, last) = (rows.first()?, rows.last()?);
     let is_end = index == 0 || index + 1 == rows.len();
-    let goes_anywhere = place(first) != place(last);
+    let goes_anywhere = kinds(first) != kinds(last);
     (is_end && goes_anywhere).then(|| setting_label(rows[index]))
 }
 
-/// Missed against invented contacts.
-fn kinds_figure(models: &[Model], name: String) -> Figure {
-    let mut legend: Vec<Entry> = Vec::new();
-    let mut panels = Vec::new();
-    for model in models {
-        let answers = |rows: &[&AccuracyRow]| -> Vec<[f64; 2]> {
-            let of = |row: &&AccuracyRow| [row.false_positive_pct, row.false_negative_pct];
-            rows.iter().map(of).collect()
-        };
-        // Methods that answer alike share a curve: all that test balls do.
-        let mut alike: Vec<(Vec<&str>, &Vec<&AccuracyRow>)> = Vec::new();
-        let grouped = by_method(model);
-        for (method, rows) in &grouped {
-            match alike
-                .iter_mut()
-                .find(|(_, other)| answers(other) == answers(rows))
-            {
-                Some((methods, _)) => methods.push(method),
-                None => alike.push((vec![method], rows)),
-            }
+/// Missed against invented contacts of one model; new looks get an entry in the legend.
+fn kinds_panel(model: &Model, legend: &mut Vec<Entry>) -> Panel {
+    let answers = |rows: &[&AccuracyRow]| -> Vec<_> { rows.iter().map(|row| kinds(row)).collect() };
+    // Methods that answer alike share a curve: all that test balls do.
+    let mut alike: Vec<(Vec<&str>, Vec<&AccuracyRow>)> = Vec::new();
+    for (method, rows) in by_method(model) {
+        let is_alike = |(_, other): &&mut (_, Vec<_>)| answers(other) == answers(&rows);
+        match alike.iter_mut().find(is_alike) {
+            Some((methods, _)) => methods.push(method),
+            None => alike.push((vec![method], rows)),
         }
-        let mut curves = Vec::new();
-        for (methods, rows) in &alike {
-            let look = looks::look(methods[0]);
+    }
+    let mut curves = Vec::new();
+    for (methods, rows) in &alike {
+        let look = looks::look(methods[0]);
+        if !legend.iter().any(|entry| entry.look == look) {
             let label = match methods.len() {
                 1 => looks::title(methods[0]),
                 more => format!("{} and {} that answer alike", methods[0], more - 1),
             };
-            if !legend.iter().any(|entry| entry.look == look) {
-                legend.push(Entry { look, label });
-            }
-            curves.push(Curve {
-                look,
-                points: rows
-                    .iter()
-                    .enumerate()
-                    .map(|(k, row)| Point {
-                        x: row.false_positive_pct,
-                        y: row.false_negative_pct,
-                        label: end_label(rows, k),
-                        ..Point::default()
-                    })
-                    .collect(),
-            });
+            legend.push(Entry::new(look, label));
         }
-        let all = || grouped.iter().flat_map(|(_, rows)| rows);
-        panels.push(Panel {
-            title: panel_title(&model.rows),
-            x: Axis::log(
-                "invented: said to touch, but do not, % of all cases",
-                all().map(|row| row.false_positive_pct),
-            ),
-            y: Axis::log(
-                "missed: touch, but said not to, % of all cases",
-                all().map(|row| row.false_negative_pct),
-            ),
-            curves,
-            levels: Vec::new(),
-        });
+        let point = |(k, row): (usize, &&AccuracyRow)| Point {
+            label: end_label(rows, k),
+            ..Point::new(row.false_positive_pct, row.false_negative_pct)
+        };
+        let points = rows.iter().enumerate().map(point).collect();
+        curves.push(Curve { look, points });
     }
+    let all = |k: usize| model.rows.iter().map(move |row| kinds(row)[k]);
+    let x = "invented: said to touch, but do not, % of all cases";
+    let y = "missed: touch, but said not to, % of all cases";
+    let (x, y) = (Axis::log(x, all(0)), Axis::log(y, all(1)));
+    Panel::new(panel_title(&model.rows), x, y, curves)
+}
+
+fn kinds_figure(models: &[Model], name: String) -> Figure {
+    let mut legend: Vec<Entry> = Vec::new();
+    let panels = models.iter().map(|model| kinds_panel(model, &mut legend));
+    let panels: Vec<Panel> = panels.collect();
     Figure {
         name,
         title: "Which errors are made: contacts that are missed, contacts that are invented"
             .to_owned(),
-        subtitle: vec![
+        subtitle: lines([
             "The same cases as in the chart of speed against accuracy. Lower left is better; \
-             missed contacts let bodies sink into each other."
-                .to_owned(),
-        ],
+             missed contacts let bodies sink into each other.",
+        ]),
         columns: panels.len().min(2),
         panels,
         panel_size: [640, 500],
         legend,
-        notes: vec![
-            settings_note(models),
-            RADIUS_NOTE.to_owned(),
-            origin(provenances(models)),
-        ],
+        notes: lines([
+            &settings_note(models),
+            RADIUS_NOTE,
+            &origin(provenances(models)),
+        ]),
     }
 }

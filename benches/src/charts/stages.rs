@@ -1,9 +1,10 @@
 //! On which stages this project spends a frame, by placement and number of points.
 
-use super::figure::{Axis, Curve, Entry, Figure, Line, Look, Mark, Panel, Point};
+use super::figure::{Axis, Curve, Entry, Figure, Line, Look, Mark, Panel, Point, lines};
 use super::looks;
 use super::origin::origin;
 use super::ticks::label;
+use crate::distinct::{distinct, rising};
 use crate::stored::{FrameRow, StageRow, Stored};
 use std::cmp::Reverse;
 
@@ -18,7 +19,7 @@ const BAR_TOP: f64 = 0.24;
 const LETTER: f64 = 1.4;
 
 /// A chart of the run over most numbers of points of those that tell stages; why there is none.
-pub(super) fn figures(runs: &[Run]) -> Result<Option<Figure>, String> {
+pub(super) fn figures(runs: &[Run]) -> Result<Vec<Figure>, String> {
     let telling = runs.iter().filter(|run| rows(run).next().is_some());
     let run = telling.min_by_key(|run| Reverse(sizes(run).len()));
     match run {
@@ -26,36 +27,26 @@ pub(super) fn figures(runs: &[Run]) -> Result<Option<Figure>, String> {
             "stages: no chart, since no run of bvh_vs_tldi told its stages; run it again with --json"
                 .to_owned(),
         ),
-        run => Ok(run.map(figure)),
+        run => Ok(run.map(figure).into_iter().collect()),
     }
 }
 
 /// Rows that tell stages which took some time.
 fn rows(run: &Run) -> impl Iterator<Item = (&FrameRow, &[StageRow])> {
-    let told = run
-        .rows
-        .iter()
-        .filter_map(|row| Some((row, row.stages.as_deref()?)));
+    let all = run.rows.iter();
+    let told = all.filter_map(|row| Some((row, row.stages.as_deref()?)));
     told.filter(|(_, stages)| stages.iter().any(|stage| stage.ms > 0.0))
 }
 
 /// Numbers of points, rising.
 fn sizes(run: &Run) -> Vec<usize> {
-    let mut all: Vec<usize> = rows(run).map(|(row, _)| row.points).collect();
-    all.sort_unstable();
-    all.dedup();
-    all
+    rising(rows(run).map(|(row, _)| row.points))
 }
 
 /// Stages of all rows in the order of their looks, which is that in which they run.
 fn names(run: &Run) -> Vec<&str> {
     let stages = rows(run).flat_map(|(_, stages)| stages);
-    let mut all: Vec<&str> = Vec::new();
-    for stage in stages {
-        if !all.contains(&&*stage.name) {
-            all.push(&stage.name);
-        }
-    }
+    let mut all = distinct(stages.map(|stage| &*stage.name));
     all.sort_by_key(|name| looks::stage(name).0);
     all
 }
@@ -66,14 +57,7 @@ fn figure(run: &Run) -> Figure {
     let panels: Vec<Panel> = sizes.iter().map(|size| panel(run, *size, &names)).collect();
     let most = panels.iter().map(|panel| panel.y.range[1]);
     let bars = most.fold(0.0, f64::max);
-    let entry = |name: &&str| Entry {
-        look: Look {
-            color: looks::stage(name).1,
-            mark: Mark::Square,
-            line: Line::None,
-        },
-        label: (*name).to_owned(),
-    };
+    let entry = |name: &&str| Entry::new(Look::marks(looks::stage(name).1, Mark::Square), *name);
     Figure {
         name: "stages".to_owned(),
         title: "What a frame spends its time on".to_owned(),
@@ -85,15 +69,13 @@ fn figure(run: &Run) -> Figure {
         panels,
         panel_size: [620, 84 + (54.0 * bars) as i32],
         legend: names.iter().map(entry).collect(),
-        notes: vec![
+        notes: lines([
             "Medians by the clock, of frames that are compared once more for their stages. The time beside a placement \
-             is that of the frames that were timed."
-                .to_owned(),
+             is that of the frames that were timed.",
             "\"points\": both clouds take their points. \"cells\" and \"windows\": the first look. \"rest\": what is \
-             outside of all stages."
-                .to_owned(),
-            origin([&run.provenance]),
-        ],
+             outside of all stages.",
+            &origin([&run.provenance]),
+        ]),
     }
 }
 
@@ -113,32 +95,22 @@ fn panel(run: &Run, size: usize, names: &[&str]) -> Panel {
             curves.push(part(name, [start, end], y));
             start = end;
         }
+        let words = Point {
+            label: Some(format!("{}: {} ms", row.placement, short(row.total_ms))),
+            ..Point::new(0.0, y + BAR_TOP)
+        };
         curves.push(Curve {
-            look: Look {
-                color: looks::BLACK,
-                mark: Mark::None,
-                line: Line::None,
-            },
-            points: vec![Point {
-                y: y + BAR_TOP,
-                label: Some(format!("{}: {} ms", row.placement, short(row.total_ms))),
-                ..Point::default()
-            }],
+            look: Look::marks(looks::BLACK, Mark::None),
+            points: vec![words],
         });
     }
-    Panel {
-        title: format!("{} points of each cloud (of the scan)", label(size as f64)),
-        x: Axis::linear("share of a frame's time, %", [0.0, 100.0]),
-        y: Axis {
-            label: String::new(),
-            is_log: false,
-            range: [0.5, here.len() as f64 + 0.75],
-            has_zero: false,
-            ticks: Some(Vec::new()),
-        },
-        curves,
-        levels: Vec::new(),
-    }
+    let y = Axis {
+        ticks: Some(Vec::new()),
+        ..Axis::over("", [0.5, here.len() as f64 + 0.75])
+    };
+    let x = Axis::linear("share of a frame's time, %", [0.0, 100.0]);
+    let title = format!("{} points of each cloud (of the scan)", label(size as f64));
+    Panel::new(title, x, y, curves)
 }
 
 /// A stage's part of a bar, with its name where there is room.
@@ -146,19 +118,16 @@ fn part(name: &str, [start, end]: [f64; 2], y: f64) -> Curve {
     let share = end - start;
     let words = [format!("{name} {share:.0} %"), name.to_owned()];
     let fits = |words: &String| LETTER * (words.len() + 1) as f64 <= share;
-    let point = |x, label| Point {
-        x,
-        y,
-        label,
-        ..Point::default()
+    let from = Point {
+        label: words.into_iter().find(fits),
+        ..Point::new(start, y)
     };
     Curve {
         look: Look {
-            color: looks::stage(name).1,
-            mark: Mark::None,
             line: Line::Bar,
+            ..Look::marks(looks::stage(name).1, Mark::None)
         },
-        points: vec![point(start, words.into_iter().find(fits)), point(end, None)],
+        points: vec![from, Point::new(end, y)],
     }
 }
 

@@ -1,9 +1,10 @@
 //! How much of two clouds this project models, by placement and number of points.
 
-use super::figure::{Axis, Curve, Figure, Line, Look, Mark, Panel, Point, numbered};
+use super::figure::{Axis, Curve, Figure, Line, Look, Mark, Panel, Point, lines, numbered, points};
 use super::looks;
 use super::origin::origin;
 use super::ticks::label;
+use crate::distinct::{distinct, rising};
 use crate::stored::{FrameRow, Stored, WorkRow};
 
 type Run = Stored<FrameRow>;
@@ -41,56 +42,42 @@ fn rows(run: &Run) -> impl Iterator<Item = (&FrameRow, WorkRow)> {
 
 /// Numbers of points, rising.
 fn sizes(run: &Run) -> Vec<f64> {
-    let mut all: Vec<usize> = rows(run).map(|(row, _)| row.points).collect();
-    all.sort_unstable();
-    all.dedup();
+    let all = rising(rows(run).map(|(row, _)| row.points));
     all.into_iter().map(|n| n as f64).collect()
 }
 
+/// How much is modelled in each placement, and all points that there are: what the curve is of, and the curve.
+fn named_curves(run: &Run, sizes: &[f64]) -> Vec<(String, Curve)> {
+    let names = distinct(rows(run).map(|(row, _)| &*row.placement));
+    let of = |(k, name): (usize, &str)| {
+        let here = rows(run).filter(|(row, _)| row.placement == name);
+        let modelled = here.map(|(row, work)| (row.points as f64, work.modelled() as f64));
+        let mut points = points(modelled);
+        points.sort_by(|p, q| p.x.total_cmp(&q.x));
+        let look = looks::placement_look(k);
+        (name.to_owned(), Curve { look, points })
+    };
+    let mut named: Vec<(String, Curve)> = names.into_iter().enumerate().map(of).collect();
+    let look = Look {
+        line: Line::Dashed,
+        ..Look::marks(looks::BLACK, Mark::None)
+    };
+    let points = points(sizes.iter().map(|n| (*n, 2.0 * n)));
+    named.push(("points of both clouds".to_owned(), Curve { look, points }));
+    named
+}
+
 fn figure(run: &Run, sizes: &[f64]) -> Figure {
-    let mut names: Vec<&str> = Vec::new();
-    for (row, _) in rows(run) {
-        if !names.contains(&&*row.placement) {
-            names.push(&row.placement);
-        }
-    }
-    let given = Curve {
-        look: Look {
-            color: looks::BLACK,
-            mark: Mark::None,
-            line: Line::Dashed,
-        },
-        points: points(sizes.iter().map(|n| (*n, 2.0 * n))),
-    };
-    let of = |(k, name): (usize, &&str)| {
-        let here = rows(run).filter(|(row, _)| row.placement == **name);
-        let mut modelled: Vec<(f64, f64)> = here
-            .map(|(row, work)| (row.points as f64, work.modelled() as f64))
-            .collect();
-        modelled.sort_by(|p, q| p.0.total_cmp(&q.0));
-        let curve = Curve {
-            look: looks::placement_look(k),
-            points: points(modelled.into_iter()),
-        };
-        ((*name).to_owned(), curve)
-    };
-    let mut named: Vec<(String, Curve)> = names.iter().enumerate().map(of).collect();
-    named.push(("points of both clouds".to_owned(), given));
+    let named = named_curves(run, sizes);
     let mut x = Axis::log("points of each cloud (of the scan)", sizes.iter().copied());
     let [low, high] = x.range;
     x.range[1] = low * (high / low).powf(1.0 / (1.0 - WORDS));
     x.ticks = Some(sizes.iter().map(|n| (*n, label(*n))).collect());
-    let values = named
-        .iter()
-        .flat_map(|(_, curve)| &curve.points)
-        .map(|p| p.y);
-    let y = Axis::log("points and pixels modelled", values);
-    let beside = words(&named, &y);
-    let curves = named
-        .into_iter()
-        .map(|(_, curve)| curve)
-        .chain(beside)
-        .collect();
+    let values = named.iter().flat_map(|(_, curve)| &curve.points);
+    let y = Axis::log("points and pixels modelled", values.map(|p| p.y));
+    let words = words(&named, &y);
+    let curves = named.into_iter().map(|(_, curve)| curve);
+    let curves = curves.chain(words).collect();
     Figure {
         name: "work".to_owned(),
         title: "No more than the scene needs: what is modelled of two clouds".to_owned(),
@@ -98,32 +85,16 @@ fn figure(run: &Run, sizes: &[f64]) -> Figure {
             "{}, all points new: points that become part of an image, and pixels of the images.",
             run.rows[0].model
         )],
-        panels: vec![Panel {
-            title: String::new(),
-            x,
-            y,
-            curves,
-            levels: Vec::new(),
-        }],
+        panels: vec![Panel::new("", x, y, curves)],
         columns: 1,
         panel_size: [900, 560],
         legend: Vec::new(),
-        notes: vec![
+        notes: lines([
             "Sums over all views and over looks with large pixels, through windows and with small pixels, of both \
-             clouds. Counted, not timed."
-                .to_owned(),
-            origin([&run.provenance]),
-        ],
+             clouds. Counted, not timed.",
+            &origin([&run.provenance]),
+        ]),
     }
-}
-
-fn points(values: impl Iterator<Item = (f64, f64)>) -> Vec<Point> {
-    let plain = values.map(|(x, y)| Point {
-        x,
-        y,
-        ..Point::default()
-    });
-    plain.collect()
 }
 
 /// The names of curves, each beside its last point or, where others are there, below them.
@@ -140,18 +111,13 @@ fn words(curves: &[(String, Curve)], y: &Axis) -> Vec<Curve> {
     let beside = ends.into_iter().map(|(name, look, x, end)| {
         // Words stand above their place: half a line lower their middle is there.
         above = (end / line.sqrt()).min(above / line);
+        let words = Point {
+            label: Some(format!("{name}: {}", short(end))),
+            ..Point::new(x, above)
+        };
         Curve {
-            look: Look {
-                mark: Mark::None,
-                line: Line::None,
-                ..look
-            },
-            points: vec![Point {
-                x,
-                y: above,
-                label: Some(format!("{name}: {}", short(end))),
-                ..Point::default()
-            }],
+            look: Look::marks(look.color, Mark::None),
+            points: vec![words],
         }
     });
     beside.collect()
