@@ -1,10 +1,11 @@
 //! Charts of a run of `gpu_day`.
 
 use super::error::ChartError;
-use super::figure::{Axis, Color, Curve, Entry, Figure, Line, Look, Mark, Panel, Point};
-use super::gpu_figure::{figure, points};
+use super::figure::{Axis, Color, Curve, Entry, Figure, Look, Mark, Panel, Point, points};
+use super::gpu_figure::figure;
 use super::gpu_layers::layers;
 use super::{looks, paint};
+use crate::distinct::distinct;
 use crate::gpu_day::{Bin, Dispatches, Moved, Report, Shown, Workload};
 use std::path::{Path, PathBuf};
 use tldi::ContactPixel;
@@ -27,35 +28,33 @@ pub(crate) fn draw(report: &Report, shown: &Shown, out: &Path) -> Result<Vec<Pat
     Ok(files)
 }
 
+/// Of most panels.
+const PANEL: [i32; 2] = [400, 330];
+
 fn look(index: usize) -> Look {
     looks::placement_look(index)
 }
 
 /// A panel of curves with both axes logarithmic.
-fn log_log(title: &str, x: &str, y: &str, curves: Vec<Vec<(f64, f64)>>) -> Panel {
+fn log_log(title: &str, [x, y]: [&str; 2], curves: Vec<Vec<(f64, f64)>>) -> Panel {
     let all = || curves.iter().flatten();
-    Panel {
-        title: title.to_owned(),
-        x: Axis::log(x, all().map(|p| p.0)),
-        y: Axis::log(y, all().map(|p| p.1)),
-        levels: Vec::new(),
-        curves: curves
-            .iter()
-            .enumerate()
-            .map(|(k, values)| Curve {
-                look: look(k),
-                points: points(values.iter().copied()),
-            })
-            .collect(),
-    }
+    let (x, y) = (
+        Axis::log(x, all().map(|p| p.0)),
+        Axis::log(y, all().map(|p| p.1)),
+    );
+    let curve = |(k, values): (usize, &Vec<(f64, f64)>)| Curve {
+        look: look(k),
+        points: points(values.iter().copied()),
+    };
+    let curves = curves.iter().enumerate().map(curve).collect();
+    Panel::new(title, x, y, curves)
 }
 
-fn entries(labels: &[&str]) -> Vec<Entry> {
-    let entry = |(k, label): (usize, &&str)| Entry {
-        look: look(k),
-        label: (*label).to_owned(),
-    };
-    labels.iter().enumerate().map(entry).collect()
+fn entries<const N: usize>(labels: [&str; N]) -> Vec<Entry> {
+    let labels = labels.into_iter().enumerate();
+    labels
+        .map(|(k, label)| Entry::new(look(k), label))
+        .collect()
 }
 
 fn floors(report: &Report) -> Option<Figure> {
@@ -68,164 +67,101 @@ fn floors(report: &Report) -> Option<Figure> {
         let of = |d: &Dispatches| (f64::from(d.count), ms(d) * 1e3);
         floors.dispatches.iter().map(of).collect()
     };
-    let panels = vec![
-        log_log(
-            "Bytes moved",
-            "MB",
-            "GB/s",
-            vec![
-                rate(&floors.copies),
-                rate(&floors.uploads),
-                rate(&floors.readbacks),
-            ],
-        ),
-        log_log(
-            "Dependent dispatches until done",
-            "dispatches in a submission",
-            "microseconds",
-            vec![
-                dispatches(|d| d.direct.p50_ms),
-                dispatches(|d| d.indirect.p50_ms),
-            ],
-        ),
+    let rates = [&floors.copies, &floors.uploads, &floors.readbacks].map(|all| rate(all));
+    let times = [
+        dispatches(|d| d.direct.p50_ms),
+        dispatches(|d| d.indirect.p50_ms),
     ];
-    let figure = figure(
-        report,
-        "floors",
-        "Floors: what the device cannot do faster",
-        panels,
-    )?;
-    Some(Figure {
-        legend: entries(&[
-            "left: copy on the device, read + written; right: direct",
-            "left: upload; right: indirect",
-            "left: readback",
-        ]),
-        ..figure
-    })
+    let of_times = ["dispatches in a submission", "microseconds"];
+    let panels = vec![
+        log_log("Bytes moved", ["MB", "GB/s"], rates.into()),
+        log_log("Dependent dispatches until done", of_times, times.into()),
+    ];
+    let legend = entries([
+        "left: copy on the device, read + written; right: direct",
+        "left: upload; right: indirect",
+        "left: readback",
+    ]);
+    let title = "Floors: what the device cannot do faster";
+    figure(report, "floors", title, panels, PANEL, legend)
+}
+
+/// Whether a row is of a pair of clouds without normals and noise.
+fn is_bare_pair(row: &Workload) -> bool {
+    row.kind == "bare" && row.pairs == 1
 }
 
 fn workloads(report: &Report) -> Option<Figure> {
-    // A batch of one pair is a scene once more.
-    let scene = |w: &Workload| (w.placement.clone(), w.kind.clone(), w.points);
-    let mut single: Vec<&Workload> = Vec::new();
-    for row in report.workloads.iter().filter(|w| w.pairs == 1) {
-        if !single.iter().any(|other| scene(other) == scene(row)) {
-            single.push(row);
-        }
-    }
-    let mut placements: Vec<&str> = Vec::new();
-    for row in &single {
-        if !placements.contains(&&*row.placement) {
-            placements.push(&row.placement);
-        }
-    }
+    let all = || report.workloads.iter();
+    let placements = distinct(all().filter(|w| w.pairs == 1).map(|w| &*w.placement));
     let panel = |placement: &&str| {
-        let rows =
-            || (single.iter()).filter(move |w| w.placement == *placement && w.kind == "bare");
-        let curve = |ms: &dyn Fn(&Workload) -> Option<f64>| -> Vec<(f64, f64)> {
-            let of = |w: &&&Workload| Some((w.points as f64, ms(w)?));
-            rows().collect::<Vec<_>>().iter().filter_map(of).collect()
+        let here = all().filter(|w| is_bare_pair(w) && w.placement == *placement);
+        // A batch of one pair is a scene once more.
+        let sizes = distinct(here.clone().map(|w| w.points));
+        let first = |size| here.clone().find(|w| w.points == size);
+        let rows: Vec<&Workload> = sizes.into_iter().filter_map(first).collect();
+        let curve = |ms: fn(&Workload) -> Option<f64>| -> Vec<(f64, f64)> {
+            let of = |w: &&Workload| Some((w.points as f64, ms(w)?));
+            rows.iter().filter_map(of).collect()
         };
         let curves = vec![
-            curve(&|w| Some(w.resident.p50_ms)),
-            curve(&|w| Some(w.uploaded.p50_ms)),
-            curve(&|w| Some(w.cpu?.p50_ms)),
-            curve(&|w| Some(w.cpu_one_core?.p50_ms)),
+            curve(|w| Some(w.resident.p50_ms)),
+            curve(|w| Some(w.uploaded.p50_ms)),
+            curve(|w| Some(w.cpu?.p50_ms)),
+            curve(|w| Some(w.cpu_one_core?.p50_ms)),
         ];
-        log_log(placement, "points of each body", "ms (median)", curves)
+        log_log(placement, ["points of each body", "ms (median)"], curves)
     };
-    let panels: Vec<Panel> = placements.iter().map(panel).collect();
-    let figure = figure(
-        report,
-        "workloads",
-        "From the call to the contacts on the host, bare clouds",
-        panels,
-    )?;
-    Some(Figure {
-        legend: entries(&[
-            "device, points are there",
-            "device, points are new",
-            "CPU, all cores",
-            "CPU, one core",
-        ]),
-        ..figure
-    })
+    let panels = placements.iter().map(panel).collect();
+    let legend = entries([
+        "device, points are there",
+        "device, points are new",
+        "CPU, all cores",
+        "CPU, one core",
+    ]);
+    let title = "From the call to the contacts on the host, bare clouds";
+    figure(report, "workloads", title, panels, PANEL, legend)
 }
 
 fn stages(report: &Report) -> Option<Figure> {
     // Of the largest scenes of both.
     let largest = |placement: &str| {
-        let measured = report.workloads.iter().filter(|w| {
-            w.placement == placement && w.kind == "bare" && w.pairs == 1 && !w.stages.is_empty()
-        });
+        let measured = (report.workloads.iter())
+            .filter(|w| w.placement == placement && is_bare_pair(w) && !w.stages.is_empty());
         measured.max_by_key(|w| w.points)
     };
+    let [taken_look, floor_look] = [look(1), look(0)];
     let panel = |row: &Workload| {
-        let place = |k: usize| (row.stages.len() - k) as f64;
+        // Shorter times are at the end of the axis.
+        let point = |k: usize, ms: f64| Point::new(ms.max(1e-5), (row.stages.len() - k) as f64);
         let (mut taken, mut floor) = (Vec::new(), Vec::new());
-        // Shorter ones are at the end of the axis.
-        let shown = |ms: f64| ms.max(1e-5);
         for (k, stage) in row.stages.iter().enumerate() {
-            if let Some(ms) = stage.ms {
-                taken.push(Point {
-                    x: shown(ms),
-                    y: place(k),
-                    label: Some(stage.stage.clone()),
-                    ..Point::default()
-                });
-            }
-            if let Some(ms) = stage.floor_ms {
-                floor.push((shown(ms), place(k)));
-            }
+            taken.extend(stage.ms.map(|ms| Point {
+                label: Some(stage.stage.clone()),
+                ..point(k, ms)
+            }));
+            floor.extend(stage.floor_ms.map(|ms| point(k, ms)));
         }
-        let x = taken.iter().map(|p| p.x).chain(floor.iter().map(|p| p.0));
+        let x = Axis::log("ms", taken.iter().chain(&floor).map(|p| p.x));
         let mut y = Axis::linear("stages in order", [0.0, row.stages.len() as f64 + 1.0]);
         y.ticks = Some(Vec::new());
-        Panel {
-            title: format!("{}, {} points", row.placement, row.points),
-            x: Axis::log("ms", x),
-            y,
-            curves: vec![
-                Curve {
-                    look: Look {
-                        line: Line::None,
-                        ..look(1)
-                    },
-                    points: taken,
-                },
-                Curve {
-                    look: Look {
-                        line: Line::None,
-                        ..look(0)
-                    },
-                    points: points(floor.into_iter()),
-                },
-            ],
-            levels: Vec::new(),
-        }
+        let curves = [(taken_look, taken), (floor_look, floor)];
+        let curves = curves.map(|(look, points)| Curve {
+            look: Look::marks(look.color, look.mark),
+            points,
+        });
+        let title = format!("{}, {} points", row.placement, row.points);
+        Panel::new(title, x, y, curves.into())
     };
     let rows = ["slight", "deep"].into_iter().filter_map(largest);
-    let figure = figure(
-        report,
-        "stages",
-        "Stages beside the bytes that they must move",
-        rows.map(panel).collect(),
-    )?;
-    Some(Figure {
-        panel_size: [480, 640],
-        legend: vec![
-            Entry {
-                look: look(1),
-                label: "device time (median)".to_owned(),
-            },
-            Entry {
-                look: look(0),
-                label: "its bytes at the bandwidth of the largest copies".to_owned(),
-            },
-        ],
-        ..figure
-    })
+    let floor = "its bytes at the bandwidth of the largest copies";
+    let legend = vec![
+        Entry::new(taken_look, "device time (median)"),
+        Entry::new(floor_look, floor),
+    ];
+    let title = "Stages beside the bytes that they must move";
+    let panels = rows.map(panel).collect();
+    figure(report, "stages", title, panels, [480, 640], legend)
 }
 
 fn differences(report: &Report) -> Option<Figure> {
@@ -238,16 +174,12 @@ fn differences(report: &Report) -> Option<Figure> {
         let mut x = Axis::linear("difference", [0.0, 6.0]);
         x.ticks = Some(labels.into_iter().enumerate().map(tick).collect());
         let counts = bins.iter().map(|bin| bin.count as f64);
-        Panel {
-            title: title.to_owned(),
-            x,
-            y: Axis::linear("number", counts.clone()),
-            curves: vec![Curve {
-                look: look(1),
-                points: points(counts.enumerate().map(|(k, count)| (k as f64, count))),
-            }],
-            levels: Vec::new(),
-        }
+        let y = Axis::linear("number", counts.clone());
+        let curve = Curve {
+            look: look(1),
+            points: points(counts.enumerate().map(|(k, count)| (k as f64, count))),
+        };
+        Panel::new(title, x, y, vec![curve])
     };
     let panels = vec![
         panel("Least gap of a pair, mean radii", &parity.gaps),
@@ -257,16 +189,16 @@ fn differences(report: &Report) -> Option<Figure> {
         "Differences from the CPU over {} random pairs",
         parity.pairs
     );
-    figure(report, "differences", &title, panels)
+    figure(report, "differences", &title, panels, PANEL, Vec::new())
 }
 
 /// From blue for the deepest to red for the widest gap.
-const OF_GAPS: [Color; 5] = [
-    [33, 60, 158],
-    [60, 140, 200],
-    [150, 190, 150],
-    [230, 160, 60],
-    [200, 60, 40],
+const OF_GAPS: [(Color, &str); 5] = [
+    ([33, 60, 158], "deeper than 1 mean radius"),
+    ([60, 140, 200], "0.25 to 1 deep"),
+    ([150, 190, 150], "within 0.25"),
+    ([230, 160, 60], "0.25 to 1 apart"),
+    ([200, 60, 40], "farther apart"),
 ];
 
 fn contact_pixels(
@@ -274,70 +206,37 @@ fn contact_pixels(
     contacts: &[(&str, Vec<ContactPixel>)],
     radius: f32,
 ) -> Option<Figure> {
-    let first_view = |all: &'_ [ContactPixel]| -> Vec<ContactPixel> {
+    let of_first_view = |all: &'_ [ContactPixel]| -> Vec<ContactPixel> {
         all.iter().filter(|c| c.view == 0).copied().collect()
     };
-    let shown: Vec<_> = contacts
-        .iter()
-        .map(|(title, all)| (title, first_view(all)))
+    let shown: Vec<_> = (contacts.iter())
+        .map(|(title, all)| (title, of_first_view(all)))
         .collect();
-    let all = || shown.iter().flat_map(|(_, contacts)| contacts);
-    let range = |k: usize| {
-        let at = || all().map(move |c| f64::from(c.pixel[k]));
-        let (low, high) = (at().fold(f64::MAX, f64::min), at().fold(f64::MIN, f64::max));
-        [low - 1.0, high + 1.0]
-    };
-    let axis = |label: &str, k: usize| Axis {
-        label: label.to_owned(),
-        is_log: false,
-        range: range(k),
-        has_zero: false,
-        ticks: None,
+    let axis = |label: &str, k: usize| {
+        let all = shown.iter().flat_map(|(_, contacts)| contacts);
+        Axis::around(label, all.map(|c| f64::from(c.pixel[k])))
     };
     // Bounds of the colours, in mean radii.
     let edges = [-1.0, -0.25, 0.25, 1.0];
     let color_of = |c: &ContactPixel| edges.partition_point(|edge| c.gap / radius > *edge);
-    let dot = |k: usize| Look {
-        color: OF_GAPS[k],
-        mark: Mark::Square,
-        line: Line::None,
+    let looks = OF_GAPS.map(|(color, _)| Look::marks(color, Mark::Square));
+    let panel = |(title, contacts): &(&&str, Vec<ContactPixel>)| {
+        let curve = |(k, look): (usize, Look)| {
+            let own = contacts.iter().filter(|c| color_of(c) == k);
+            let at = own.map(|c| c.pixel.map(f64::from));
+            let points = points(at.map(|[x, y]| (x, y)));
+            Curve { look, points }
+        };
+        let title = format!("{title}: {} pixels", contacts.len());
+        let curves = looks.into_iter().enumerate().map(curve).collect();
+        Panel::new(title, axis("column", 0), axis("row", 1), curves)
     };
-    let panel = |(title, contacts): &(&&str, Vec<ContactPixel>)| Panel {
-        title: format!("{title}: {} pixels", contacts.len()),
-        x: axis("column", 0),
-        y: axis("row", 1),
-        curves: (0..OF_GAPS.len())
-            .map(|k| {
-                let own = contacts.iter().filter(|c| color_of(c) == k);
-                let at = own.map(|c| c.pixel.map(f64::from));
-                Curve {
-                    look: dot(k),
-                    points: points(at.map(|[x, y]| (x, y))),
-                }
-            })
-            .collect(),
-        levels: Vec::new(),
-    };
-    let figure = figure(
-        report,
-        "contacts",
-        "Contact pixels of one view",
-        shown.iter().map(panel).collect(),
-    )?;
-    let labels = [
-        "deeper than 1 mean radius",
-        "0.25 to 1 deep",
-        "within 0.25",
-        "0.25 to 1 apart",
-        "farther apart",
-    ];
-    let entry = |(k, label): (usize, &str)| Entry {
-        look: dot(k),
-        label: label.to_owned(),
-    };
-    Some(Figure {
-        panel_size: [560, 560],
-        legend: labels.into_iter().enumerate().map(entry).collect(),
-        ..figure
-    })
+    let panels = shown.iter().map(panel).collect();
+    let labels = OF_GAPS.map(|(_, label)| label);
+    let legend = looks.into_iter().zip(labels);
+    let legend = legend
+        .map(|(look, label)| Entry::new(look, label))
+        .collect();
+    let title = "Contact pixels of one view";
+    figure(report, "contacts", title, panels, [560, 560], legend)
 }

@@ -1,15 +1,17 @@
 //! What all figures of `gpu_day` share.
 
-use super::figure::{Figure, Panel, Point};
+use super::figure::{Entry, Figure, Panel};
 use super::origin::origin;
 use crate::gpu_day::Report;
 
-/// A figure of these panels, unless none of them has a point.
+/// A figure of these panels, each of such a size, unless none of them has a point.
 pub(super) fn figure(
     report: &Report,
     name: &str,
     title: &str,
     panels: Vec<Panel>,
+    panel_size: [i32; 2],
+    legend: Vec<Entry>,
 ) -> Option<Figure> {
     let has_points = |panel: &Panel| panel.curves.iter().any(|curve| !curve.points.is_empty());
     panels.iter().any(has_points).then(|| Figure {
@@ -21,18 +23,8 @@ pub(super) fn figure(
         )],
         columns: panels.len().min(3),
         panels,
-        panel_size: [400, 330],
-        legend: Vec::new(),
+        panel_size,
+        legend,
         notes: vec![origin([&report.provenance])],
     })
-}
-
-/// Points of curves without ranges.
-pub(super) fn points(values: impl Iterator<Item = (f64, f64)>) -> Vec<Point> {
-    let plain = values.map(|(x, y)| Point {
-        x,
-        y,
-        ..Point::default()
-    });
-    plain.collect()
 }

@@ -1,10 +1,11 @@
 //! The figures of the paper that vary one thing: ρ, distance, resolution, noise, size of splats.
 
-use super::figure::{Axis, Curve, Entry, Figure, Level, Line, Look, Mark, Panel, Point};
+use super::figure::{Axis, Curve, Entry, Figure, Level, Look, Mark, Panel, Point, lines, points};
 use super::looks;
 use super::origin::origin;
 use crate::accuracy::TOLD;
-use crate::stored::{AccuracyRow, Provenance, Stored};
+use crate::distinct::{distinct, rising};
+use crate::stored::{AccuracyRow, Stored};
 
 type Run = Stored<AccuracyRow>;
 
@@ -23,6 +24,10 @@ const PAPER_TABLE_1: [(&str, u32, f64); 4] = [
 /// "Error below 3 % at any distance, and below 3 % with noise of σ up to the mean radius."
 const PAPER_LIMIT: f64 = 3.0;
 
+/// Whose method a curve is of.
+const PAPERS: &str = "the paper's";
+const OURS: &str = "this project";
+
 const ERROR: &str = "wrong answers, % of all cases";
 const RUN_HERE: &str =
     "The paper's method is run here, on the CPU, as this project understands it.";
@@ -40,14 +45,8 @@ pub(super) fn figures(runs: &[Run]) -> Vec<Figure> {
 /// Of each model the run with the most different values of one setting, at least two.
 fn varying(runs: &[Run], setting: impl Fn(&AccuracyRow) -> Option<f32>) -> Vec<&Run> {
     let count = |run: &Run| {
-        let mut values: Vec<u32> = run
-            .rows
-            .iter()
-            .filter_map(|row| setting(row).map(f32::to_bits))
-            .collect();
-        values.sort_unstable();
-        values.dedup();
-        values.len()
+        let values = run.rows.iter().filter_map(&setting);
+        rising(values.map(f32::to_bits)).len()
     };
     best_of_models(runs.iter().filter(|run| count(run) > 1), |run| {
         (count(run), run.rows[0].cases)
@@ -98,26 +97,24 @@ fn is_clean(row: &AccuracyRow) -> bool {
 }
 
 /// A curve of rows, by rising `x`.
-fn curve(
-    rows: impl Iterator<Item = impl std::borrow::Borrow<AccuracyRow>>,
+fn curve<'a>(
+    rows: impl Iterator<Item = &'a AccuracyRow>,
     look: Look,
     x: impl Fn(&AccuracyRow) -> Option<f32>,
 ) -> Curve {
-    let mut points: Vec<Point> = rows
-        .filter_map(|row| {
-            Some(Point {
-                x: f64::from(x(row.borrow())?),
-                y: row.borrow().error_pct,
-                ..Point::default()
-            })
-        })
-        .collect();
+    let mut points = points(rows.filter_map(|row| Some((f64::from(x(row)?), row.error_pct))));
     points.sort_by(|a, b| a.x.total_cmp(&b.x));
     Curve { look, points }
 }
 
-/// Both axes over all points of some curves and the levels.
-fn axes(curves: &[Curve], levels: &[Level], x: &str, y: &str, x_is_log: bool) -> [Axis; 2] {
+/// A panel of curves and levels. Errors are on a logarithmic axis, and so is what is varied if `x_is_log`.
+fn panel(
+    title: impl Into<String>,
+    [x, y]: [&str; 2],
+    x_is_log: bool,
+    curves: Vec<Curve>,
+    levels: Vec<Level>,
+) -> Panel {
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let xs = points().map(|p| p.x);
     let x = match x_is_log {
@@ -125,7 +122,11 @@ fn axes(curves: &[Curve], levels: &[Level], x: &str, y: &str, x_is_log: bool) ->
         false => Axis::linear(x, xs),
     };
     let ys = points().map(|p| p.y).chain(levels.iter().map(|l| l.y));
-    [x, Axis::log(y, ys)]
+    let y = Axis::log(y, ys);
+    Panel {
+        levels,
+        ..Panel::new(title, x, y, curves)
+    }
 }
 
 fn describe(run: &Run) -> String {
@@ -142,8 +143,10 @@ fn cases_note(runs: &[&Run]) -> String {
     )
 }
 
-fn provenances<'a>(runs: &'a [&Run]) -> impl Iterator<Item = &'a Provenance> {
-    runs.iter().map(|run| &run.provenance)
+/// What is said below a chart of these runs.
+fn notes(runs: &[&Run]) -> Vec<String> {
+    let provenances = runs.iter().map(|run| &run.provenance);
+    vec![cases_note(runs), origin(provenances)]
 }
 
 /// One panel for all models, and what is said of it.
@@ -157,119 +160,91 @@ struct Single {
 }
 
 impl Single {
+    /// `None` without curves.
     fn figure(
         self,
         runs: &[&Run],
         curves: Vec<Curve>,
         levels: Vec<Level>,
         legend: Vec<Entry>,
-    ) -> Figure {
-        let [x, y] = axes(&curves, &levels, self.x, self.y, self.x_is_log);
-        Figure {
+    ) -> Option<Figure> {
+        (!curves.is_empty()).then(|| Figure {
             name: self.name.to_owned(),
             title: self.title.to_owned(),
-            subtitle: vec![PROTOCOL.to_owned(), self.about.to_owned()],
-            panels: vec![Panel {
-                title: String::new(),
-                x,
-                y,
-                curves,
-                levels,
-            }],
+            subtitle: lines([PROTOCOL, self.about]),
+            panels: vec![panel("", [self.x, self.y], self.x_is_log, curves, levels)],
             columns: 1,
             panel_size: [980, 470],
             legend,
-            notes: vec![cases_note(runs), origin(provenances(runs))],
-        }
+            notes: notes(runs),
+        })
     }
 }
 
 /// Table 1.
 fn rho(runs: &[Run]) -> Option<Figure> {
     let runs = varying(runs, |row| row.rho);
-    let mut curves = Vec::new();
-    let mut legend = Vec::new();
+    if runs.is_empty() {
+        return None;
+    }
+    let (mut curves, mut legend) = (Vec::new(), Vec::new());
     for (k, run) in runs.iter().enumerate() {
         let look = looks::paper_look(looks::model_color(k));
         let rows = run.rows.iter().filter(|row| {
             is_paper(row) && is_clean(row) && row.resolution == Some(PAPER_RESOLUTION)
         });
         curves.push(curve(rows, look, |row| row.rho));
-        legend.push(Entry {
-            look,
-            label: format!("{}, measured here", describe(run)),
-        });
+        let label = format!("{}, measured here", describe(run));
+        legend.push(Entry::new(look, label));
     }
-    if curves.is_empty() {
-        return None;
-    }
-    let look = Look {
-        color: looks::BLACK,
-        mark: Mark::Diamond,
-        line: Line::None,
-    };
+    let look = Look::marks(looks::BLACK, Mark::Diamond);
+    let of_paper = PAPER_TABLE_1.map(|(model, points, error)| Point {
+        label: Some(format!("{model} {points}k: {error} %")),
+        ..Point::new(f64::from(PAPER_RHO), error)
+    });
     curves.push(Curve {
         look,
-        points: PAPER_TABLE_1
-            .map(|(model, points, error)| Point {
-                x: f64::from(PAPER_RHO),
-                y: error,
-                label: Some(format!("{model} {points}k: {error} %")),
-                ..Point::default()
-            })
-            .to_vec(),
+        points: of_paper.to_vec(),
     });
-    legend.push(Entry {
-        look,
-        label: "the paper's own figures at 0.05 (Table 1)".to_owned(),
-    });
-    Some(
-        Single {
-            name: "error_rho",
-            title: "The paper's Table 1: errors of its method against the compression of depth ranges",
-            about: "The paper found 0.01 to 0.05 best, and used 0.05.",
-            x: "compression ρ",
-            x_is_log: true,
-            y: ERROR,
-        }
-        .figure(&runs, curves, Vec::new(), legend),
-    )
+    let label = "the paper's own figures at 0.05 (Table 1)";
+    legend.push(Entry::new(look, label));
+    let single = Single {
+        name: "error_rho",
+        title: "The paper's Table 1: errors of its method against the compression of depth ranges",
+        about: "The paper found 0.01 to 0.05 best, and used 0.05.",
+        x: "compression ρ",
+        x_is_log: true,
+        y: ERROR,
+    };
+    single.figure(&runs, curves, Vec::new(), legend)
 }
 
-/// A curve of the paper and one of the default for every model.
-fn both(
+/// Whether a row belongs to a curve.
+type IsOfCurve = fn(&AccuracyRow) -> bool;
+
+/// For every model a curve of the paper, of the default, and of the default that is told the noise, where there are any.
+fn of_all_methods(
     runs: &[&Run],
     is_shown: impl Fn(&AccuracyRow) -> bool,
     x: impl Fn(&AccuracyRow) -> Option<f32>,
 ) -> (Vec<Curve>, Vec<Entry>) {
+    let told = "this project, told how large the noise is";
     let (mut curves, mut legend) = (Vec::new(), Vec::new());
     for (k, run) in runs.iter().enumerate() {
         let color = looks::model_color(k);
-        let rows = || run.rows.iter().filter(|row| is_shown(row));
-        for (look, rows, who) in [
-            (
-                looks::paper_look(color),
-                rows().filter(|r| is_plain_paper(r)).collect(),
-                "the paper's",
-            ),
-            (
-                looks::default_look(color),
-                rows().filter(|r| is_plain_default(r)).collect::<Vec<_>>(),
-                "this project",
-            ),
-            (
-                looks::told_look(color),
-                rows().filter(|r| is_told(r)).collect(),
-                "this project, told how large the noise is",
-            ),
-        ] {
-            if !rows.is_empty() {
-                let rows = rows.into_iter().cloned();
+        let methods: [(Look, IsOfCurve, &str); 3] = [
+            (looks::paper_look(color), is_plain_paper, PAPERS),
+            (looks::default_look(color), is_plain_default, OURS),
+            (looks::told_look(color), is_told, told),
+        ];
+        for (look, is_of_curve, who) in methods {
+            let rows = run
+                .rows
+                .iter()
+                .filter(|row| is_shown(row) && is_of_curve(row));
+            if rows.clone().next().is_some() {
                 curves.push(curve(rows, look, &x));
-                legend.push(Entry {
-                    look,
-                    label: format!("{}, {who}", describe(run)),
-                });
+                legend.push(Entry::new(look, format!("{}, {who}", describe(run))));
             }
         }
     }
@@ -279,11 +254,8 @@ fn both(
 /// Figure 13.
 fn noise(runs: &[Run]) -> Option<Figure> {
     let runs = varying(runs, |row| Some(row.noise));
-    let (curves, legend) = both(
-        &runs,
-        |row| row.radius_scale == Some(1.0),
-        |r| Some(r.noise),
-    );
+    let is_shown = |row: &AccuracyRow| row.radius_scale == Some(1.0);
+    let (curves, legend) = of_all_methods(&runs, is_shown, |row| Some(row.noise));
     let levels = vec![Level {
         y: PAPER_LIMIT,
         label: "the paper, up to 1: below 3 %".to_owned(),
@@ -296,7 +268,7 @@ fn noise(runs: &[Run]) -> Option<Figure> {
         x_is_log: false,
         y: ERROR,
     };
-    (!curves.is_empty()).then(|| single.figure(&runs, curves, levels, legend))
+    single.figure(&runs, curves, levels, legend)
 }
 
 /// Figure 8.
@@ -321,39 +293,29 @@ fn distance(runs: &[Run]) -> Option<Figure> {
         let key = |row: &AccuracyRow| (row.points, row.model.clone(), row.variant.clone());
         key(a).cmp(&key(b))
     });
-    let mut models: Vec<&str> = best.iter().map(|(_, row)| &*row.model).collect();
-    models.dedup();
+    let models = distinct(best.iter().map(|(_, row)| &*row.model));
     let (mut curves, mut legend) = (Vec::new(), Vec::new());
     for (_, row) in &best {
         let index = models.iter().position(|model| *model == row.model);
         let color = looks::model_color(index.unwrap_or(0));
         let (look, who) = match is_paper(row) {
-            true => (looks::paper_look(color), "the paper's"),
-            false => (looks::default_look(color), "this project"),
+            true => (looks::paper_look(color), PAPERS),
+            false => (looks::default_look(color), OURS),
         };
+        let errors = row.by_distance.iter().map(|tally| {
+            let wrong = tally.false_negatives + tally.false_positives;
+            let percent = 100.0 * wrong as f64 / tally.cases as f64;
+            (f64::from(tally.distance), percent)
+        });
         curves.push(Curve {
             look,
-            points: row
-                .by_distance
-                .iter()
-                .map(|tally| Point {
-                    x: f64::from(tally.distance),
-                    y: 100.0 * (tally.false_negatives + tally.false_positives) as f64
-                        / tally.cases as f64,
-                    ..Point::default()
-                })
-                .collect(),
+            points: points(errors),
         });
-        legend.push(Entry {
-            look,
-            label: format!(
-                "{} ({} points), {who}: {} cases",
-                row.model, row.points, row.cases
-            ),
-        });
-    }
-    if curves.is_empty() {
-        return None;
+        let label = format!(
+            "{} ({} points), {who}: {} cases",
+            row.model, row.points, row.cases
+        );
+        legend.push(Entry::new(look, label));
     }
     let levels = vec![Level {
         y: PAPER_LIMIT,
@@ -368,7 +330,7 @@ fn distance(runs: &[Run]) -> Option<Figure> {
         x_is_log: false,
         y: "wrong answers, % of the cases at this distance",
     };
-    let mut figure = single.figure(&shown, curves, levels, legend);
+    let mut figure = single.figure(&shown, curves, levels, legend)?;
     // The legend has the cases.
     figure.notes[0] = format!("\"0\": no wrong answer at this distance. {RUN_HERE}");
     Some(figure)
@@ -376,57 +338,38 @@ fn distance(runs: &[Run]) -> Option<Figure> {
 
 /// Figure 9.
 fn resolution(runs: &[Run]) -> Option<Figure> {
-    let of_paper = varying(runs, |row| row.resolution.map(|pixels| pixels as f32));
-    let of_default = varying(runs, |row| row.pixel_scale);
-    let mut shown = of_paper.clone();
-    shown.extend(&of_default);
+    let pixels = |row: &AccuracyRow| row.resolution.map(|pixels| pixels as f32);
+    let mut shown = varying(runs, pixels);
+    shown.extend(varying(runs, |row| row.pixel_scale));
     let shown = best_of_models(shown.into_iter(), |run| run.rows.len());
     let (mut paper, mut ours, mut legend) = (Vec::new(), Vec::new(), Vec::new());
     for (k, run) in shown.iter().enumerate() {
         let color = looks::model_color(k);
+        let [of_paper, of_ours] = [looks::paper_look(color), looks::default_look(color)];
         let rows = || run.rows.iter().filter(|row| is_clean(row));
-        let of_paper = rows().filter(|row| is_paper(row) && row.rho == Some(PAPER_RHO));
-        paper.push(curve(of_paper, looks::paper_look(color), |row| {
-            row.resolution.map(|pixels| pixels as f32)
+        let is_shown = |row: &&AccuracyRow| is_paper(row) && row.rho == Some(PAPER_RHO);
+        paper.push(curve(rows().filter(is_shown), of_paper, pixels));
+        let is_shown = |row: &&AccuracyRow| is_default(row);
+        ours.push(curve(rows().filter(is_shown), of_ours, |row| {
+            row.pixel_scale
         }));
-        ours.push(curve(
-            rows().filter(|row| is_default(row)),
-            looks::default_look(color),
-            |row| row.pixel_scale,
-        ));
-        for (look, who) in [
-            (looks::paper_look(color), "the paper's"),
-            (looks::default_look(color), "this project"),
-        ] {
-            legend.push(Entry {
-                look,
-                label: format!("{}, {who}", describe(run)),
-            });
+        for (look, who) in [(of_paper, PAPERS), (of_ours, OURS)] {
+            legend.push(Entry::new(look, format!("{}, {who}", describe(run))));
         }
     }
     let varies = |curves: &[Curve]| curves.iter().any(|curve| curve.points.len() > 1);
     if !varies(&paper) || !varies(&ours) {
         return None;
     }
-    let panel = |title: &str, curves: Vec<Curve>, x: &str| {
-        let [x, y] = axes(&curves, &[], x, ERROR, true);
-        Panel {
-            title: title.to_owned(),
-            x,
-            y,
-            curves,
-            levels: Vec::new(),
-        }
-    };
+    let panel = |title, curves, x| panel(title, [x, ERROR], true, curves, Vec::new());
     Some(Figure {
         name: "error_resolution".to_owned(),
         title: "The paper's Figure 9: errors against resolution".to_owned(),
-        subtitle: vec![
-            PROTOCOL.to_owned(),
+        subtitle: lines([
+            PROTOCOL,
             "The paper has one camera for the whole scene, with an image of 1024 × 1024 pixels; \
-             here the camera faces the contact, with pixels as large as the points' mean radius."
-                .to_owned(),
-        ],
+             here the camera faces the contact, with pixels as large as the points' mean radius.",
+        ]),
         panels: vec![
             panel("The paper's method", paper, "edge of the image, pixels"),
             panel(
@@ -438,7 +381,7 @@ fn resolution(runs: &[Run]) -> Option<Figure> {
         columns: 2,
         panel_size: [600, 430],
         legend,
-        notes: vec![cases_note(&shown), origin(provenances(&shown))],
+        notes: notes(&shown),
     })
 }
 
@@ -450,9 +393,7 @@ fn radius_scale(runs: &[Run]) -> Option<Figure> {
     });
     let (mut panels, mut legend) = (Vec::new(), Vec::<Entry>::new());
     for run in &runs {
-        let mut resolutions: Vec<u32> = run.rows.iter().filter_map(|r| r.resolution).collect();
-        resolutions.sort_unstable();
-        resolutions.dedup();
+        let resolutions = rising(run.rows.iter().filter_map(|row| row.resolution));
         let rows = || run.rows.iter().filter(|row| row.noise == 0.0);
         let mut curves = Vec::new();
         for (k, &pixels) in resolutions.iter().enumerate() {
@@ -461,36 +402,27 @@ fn radius_scale(runs: &[Run]) -> Option<Figure> {
             curves.push(curve(of_paper, look, |row| row.radius_scale));
             let label = format!("the paper's, image of {pixels} × {pixels} pixels");
             if !legend.iter().any(|entry| entry.label == label) {
-                legend.push(Entry { look, label });
+                legend.push(Entry::new(look, label));
             }
         }
         let ours = rows().filter(|row| is_plain_default(row));
         curves.push(curve(ours, looks::OURS, |row| row.radius_scale));
-        let [x, y] = axes(&curves, &[], "radii, times those of the paper", ERROR, true);
-        panels.push(Panel {
-            title: describe(run),
-            x,
-            y,
-            curves,
-            levels: Vec::new(),
-        });
+        let axes = ["radii, times those of the paper", ERROR];
+        panels.push(panel(describe(run), axes, true, curves, Vec::new()));
     }
-    legend.push(Entry {
-        look: looks::OURS,
-        label: "this project, pixels as large as the radii".to_owned(),
-    });
+    let label = "this project, pixels as large as the radii";
+    legend.push(Entry::new(looks::OURS, label));
     (!panels.is_empty()).then(|| Figure {
         name: "error_splat_scale".to_owned(),
         title: "The paper's Table 3: errors against resolution and the size of splats".to_owned(),
-        subtitle: vec![
-            PROTOCOL.to_owned(),
-            "The paper's radii are 0.65 × the distance of the 7th neighbour of each point."
-                .to_owned(),
-        ],
+        subtitle: lines([
+            PROTOCOL,
+            "The paper's radii are 0.65 × the distance of the 7th neighbour of each point.",
+        ]),
         columns: panels.len().min(2),
         panels,
         panel_size: [600, 430],
         legend,
-        notes: vec![cases_note(&runs), origin(provenances(&runs))],
+        notes: notes(&runs),
     })
 }

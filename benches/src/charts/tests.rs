@@ -95,14 +95,23 @@ fn frame(method: &str, placement: &str, points: usize, total_ms: f64) -> FrameRo
     }
 }
 
+fn run<R: Measured>(rows: Vec<R>) -> Stored<R> {
+    Stored {
+        kind: R::KIND.to_owned(),
+        provenance: provenance("aaa1111"),
+        rows,
+    }
+}
+
+/// Where the points of a curve of a panel are.
+fn places(panel: &figure::Panel, curve: usize) -> Vec<(f64, f64)> {
+    let points = panel.curves[curve].points.iter();
+    points.map(|p| (p.x, p.y)).collect()
+}
+
 fn names(files: &[PathBuf]) -> Vec<String> {
-    let name = |file: &PathBuf| {
-        file.file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
-    };
-    files.iter().map(name).collect()
+    let names = files.iter().filter_map(|file| file.file_name());
+    names.map(|name| name.to_string_lossy().into()).collect()
 }
 
 /// Charts are drawn of what is stored, and say so: commits, machine, models, methods, settings.
@@ -227,19 +236,14 @@ fn contacts_become_panels() {
         normal_median_deg: Some(0.01),
         ..contact_row()
     };
-    let rows = vec![
+    let run = run(vec![
         balls(0.5, Some(70.0), 0.9),
         balls(0.7, Some(80.0), 1.0),
         balls(1.0, None, 0.8),
         mesh,
         of_one_pair,
         ours,
-    ];
-    let run = Stored {
-        kind: ContactRow::KIND.to_owned(),
-        provenance: provenance("aaa1111"),
-        rows,
-    };
+    ]);
     let figures = contact_quality::figures(&[run]);
     let [figure] = &figures[..] else {
         panic!("a figure a run");
@@ -248,16 +252,12 @@ fn contacts_become_panels() {
     let [.., deep_normal, deep_depth] = &figure.panels[..] else {
         panic!("four panels");
     };
-    let curve = |panel: &figure::Panel, k: usize| -> Vec<(f64, f64)> {
-        let points = &panel.curves[k].points;
-        points.iter().map(|p| (p.x, p.y)).collect()
-    };
     let steps = [(0.9, 70.0), (2.0, 70.0), (2.0, 0.25)];
-    assert_eq!(curve(deep_normal, 0), steps);
-    assert_eq!(curve(deep_normal, 1), [(0.9, 70.0), (1.0, 80.0)]);
-    assert_eq!(curve(deep_normal, 2), [(0.5, 0.1)]);
+    assert_eq!(places(deep_normal, 0), steps);
+    assert_eq!(places(deep_normal, 1), [(0.9, 70.0), (1.0, 80.0)]);
+    assert_eq!(places(deep_normal, 2), [(0.5, 0.1)]);
     // The only ones of all pairs.
-    assert_eq!(curve(deep_normal, 3), [(2.0, 0.25)]);
+    assert_eq!(places(deep_normal, 3), [(2.0, 0.25)]);
     let ours = |panel: &figure::Panel| panel.curves[3].points[0].clone();
     assert_eq!(ours(deep_depth).label.as_deref(), Some("pixel 1 r"));
     assert_eq!(
@@ -278,21 +278,17 @@ fn contacts_become_panels() {
 /// The faster form of a peer is drawn, at its time.
 #[test]
 fn peers_are_drawn_in_their_best_form() {
-    let run = Stored {
-        kind: FrameRow::KIND.to_owned(),
-        provenance: provenance("aaa1111"),
-        rows: vec![
-            frame("bit grid", "deep", 1_000, 4.0),
-            frame("bit grid, culled", "deep", 1_000, 3.0),
-            frame("bit grid", "deep", 2_000, 5.0),
-            frame("bit grid, culled", "deep", 2_000, 6.0),
-            // By the clock: not to be drawn beside processor time.
-            FrameRow {
-                threads: 2,
-                ..frame("bit grid", "deep", 2_000, 1.0)
-            },
-        ],
-    };
+    let run = run(vec![
+        frame("bit grid", "deep", 1_000, 4.0),
+        frame("bit grid, culled", "deep", 1_000, 3.0),
+        frame("bit grid", "deep", 2_000, 5.0),
+        frame("bit grid, culled", "deep", 2_000, 6.0),
+        // By the clock: not to be drawn beside processor time.
+        FrameRow {
+            threads: 2,
+            ..frame("bit grid", "deep", 2_000, 1.0)
+        },
+    ]);
     let figures = frames::figures(&[run.clone(), run]);
     let [first, second] = &figures[..] else {
         panic!("a figure a run");
@@ -301,8 +297,7 @@ fn peers_are_drawn_in_their_best_form() {
     let [panel] = &first.panels[..] else {
         panic!("a panel a placement");
     };
-    let points: Vec<(f64, f64)> = panel.curves[0].points.iter().map(|p| (p.x, p.y)).collect();
-    assert_eq!(points, [(1_000.0, 3.0), (2_000.0, 5.0)]);
+    assert_eq!(places(panel, 0), [(1_000.0, 3.0), (2_000.0, 5.0)]);
     assert_eq!(panel.curves.len(), 1);
 }
 
@@ -325,11 +320,6 @@ fn work_becomes_curves() {
         }),
         ..frame("tldi (cpu)", placement, points, 2.0)
     };
-    let run = |rows| Stored {
-        kind: FrameRow::KIND.to_owned(),
-        provenance: provenance("aaa1111"),
-        rows,
-    };
     let counted = run(vec![
         row("apart", 1_000, 0),
         row("apart", 2_000, 0),
@@ -345,13 +335,9 @@ fn work_becomes_curves() {
         panic!("a figure a run that counted");
     };
     let panel = &figure.panels[0];
-    let curve = |k: usize| -> Vec<(f64, f64)> {
-        let points = &panel.curves[k].points;
-        points.iter().map(|p| (p.x, p.y)).collect()
-    };
-    assert_eq!(curve(0), [(1_000.0, 0.0), (2_000.0, 0.0)]);
-    assert_eq!(curve(1), [(1_000.0, 60.0), (2_000.0, 180.0)]);
-    assert_eq!(curve(3), [(1_000.0, 2_000.0), (2_000.0, 4_000.0)]);
+    assert_eq!(places(panel, 0), [(1_000.0, 0.0), (2_000.0, 0.0)]);
+    assert_eq!(places(panel, 1), [(1_000.0, 60.0), (2_000.0, 180.0)]);
+    assert_eq!(places(panel, 3), [(1_000.0, 2_000.0), (2_000.0, 4_000.0)]);
     assert!(panel.y.has_zero && panel.x.place(2_000.0) < 0.8);
     let words: Vec<(&str, f64)> = (panel.curves[4..].iter())
         .filter_map(|curve| Some((curve.points[0].label.as_deref()?, curve.points[0].y)))
@@ -387,11 +373,6 @@ fn stages_become_bars() {
         ),
         ..frame("tldi (cpu)", placement, points, 2.25)
     };
-    let run = |rows| Stored {
-        kind: FrameRow::KIND.to_owned(),
-        provenance: provenance("aaa1111"),
-        rows,
-    };
     let deep = [("normals", 0.9), ("cull", 0.3), ("rest", 0.3)];
     let one = run(vec![row("deep", 9_000, &deep)]);
     let two = run(vec![
@@ -402,8 +383,10 @@ fn stages_become_bars() {
         frame("bit grid", "deep", 1_000, 2.0),
     ]);
     let untold = run(vec![frame("tldi (cpu)", "deep", 1_000, 2.0)]);
-    let figure = stages::figures(&[untold.clone(), one, two]).expect("two runs told stages");
-    let figure = figure.expect("there are runs");
+    let figures = stages::figures(&[untold.clone(), one, two]).expect("two runs told stages");
+    let [figure] = &figures[..] else {
+        panic!("one figure of all runs");
+    };
     assert_eq!(figure.name, "stages");
     let legend: Vec<&str> = figure.legend.iter().map(|e| &*e.label).collect();
     assert_eq!(legend, ["cull", "normals", "compare", "patches", "rest"]);
@@ -436,7 +419,7 @@ fn stages_become_bars() {
     let short: Vec<_> = bars(second).into_iter().map(|(_, words)| words).collect();
     assert_eq!(short, [words("compare 98 %"), None, words("deep: 2.25 ms")]);
     assert!(stages::figures(&[untold]).is_err_and(|why| why.contains("bvh_vs_tldi")));
-    assert!(stages::figures(&[]).is_ok_and(|none| none.is_none()));
+    assert!(stages::figures(&[]).is_ok_and(|none| none.is_empty()));
 }
 
 #[test]
