@@ -16,7 +16,7 @@ use tldi_benches::accuracy::{Contender, Copies, TOLD, Truth, measure};
 use tldi_benches::args::{NameArgs, RunArgs};
 use tldi_benches::mesh_truth::ExactMesh;
 use tldi_benches::model::Model;
-use tldi_benches::peers::{Frame, Method, TldiPeer, all_peers};
+use tldi_benches::peers::{Frame, Method, TldiPeer, adapter, all_peers};
 use tldi_benches::protocol::{ALL_CASES, Case, cases};
 use tldi_benches::stored::{AccuracyRow, Provenance};
 use tldi_tests::standard_normal;
@@ -138,10 +138,8 @@ fn main() -> anyhow::Result<()> {
         progress.finish_and_clear();
         measured.iter().for_each(print);
         rows.extend(measured);
-        let backends = contenders.iter().filter_map(|c| c.peer.backend());
-        if let Some(adapter) = backends.filter_map(|b| b.adapter()).next() {
-            provenance.adapter = Some(adapter.to_owned());
-        }
+        let peers = contenders.iter().map(|contender| &*contender.peer);
+        provenance.adapter = adapter(peers).or(provenance.adapter);
     }
     args.run.store(provenance, rows)?;
     Ok(())
@@ -199,75 +197,76 @@ fn contenders(args: &Args, model: &Model, noise: f32) -> anyhow::Result<Vec<Cont
     };
     let mut all = Vec::new();
     if has(VariantChoice::Paper) {
-        for &rho in &args.rho {
-            for &resolution in &args.resolution {
-                for &scale in &args.radius_scale {
-                    let method = Method::Paper { rho, resolution };
-                    all.push(Contender {
-                        variant: "paper".to_owned(),
-                        // No other backend has this variant.
-                        peer: Box::new(TldiPeer::new(Box::new(CpuBackend::new()), method, 1)?),
-                        radius_scale: Some(scale),
-                        rho: Some(rho),
-                        resolution: Some(resolution),
-                        pixel_scale: None,
-                    });
-                }
-            }
-        }
+        all.extend(of_paper(args)?);
+    }
+    if has(VariantChoice::Default) {
+        all.extend(ours(args, "default", 0.0)?);
     }
     // Without noise there is nothing to tell.
-    let told = (noise > 0.0).then_some((VariantChoice::Told, TOLD, noise));
-    let untold = (VariantChoice::Default, "default", 0.0);
-    for (choice, variant, noise) in [untold].into_iter().chain(told) {
-        if !has(choice) {
-            continue;
-        }
-        for &pixel_scale in &args.pixel_scale {
-            for &scale in &args.radius_scale {
-                let method = Method::Default { pixel_scale };
-                let peer = TldiPeer::new(args.backend.open()?, method, 1)?;
-                all.push(Contender {
-                    variant: variant.to_owned(),
-                    peer: Box::new(peer.with_noise(noise)),
-                    radius_scale: Some(scale),
-                    rho: None,
-                    resolution: None,
-                    pixel_scale: Some(pixel_scale),
-                });
-            }
-        }
+    if has(VariantChoice::Told) && noise > 0.0 {
+        all.extend(ours(args, TOLD, noise)?);
     }
     if has(VariantChoice::Peers) {
-        let frame = Frame {
-            faces: Some([&model.faces, &model.faces]),
-            ..Frame::new(&model.points, &model.points, 1.0)
-        };
-        // Meshes have no radius to be tuned.
-        let scales = args.peer_radius.iter().copied().map(Some).chain([None]);
-        for radius_scale in scales {
-            all.extend(
-                all_peers()
-                    .into_iter()
-                    .filter(|peer| peer.needs_faces() == radius_scale.is_none())
-                    .filter(|peer| peer.refuses(&frame).is_none())
-                    .filter(|peer| args.names.take(&peer.name()))
-                    .map(|peer| Contender {
-                        variant: peer.name(),
-                        peer,
-                        radius_scale,
-                        rho: None,
-                        resolution: None,
-                        pixel_scale: None,
-                    }),
-            );
-        }
+        all.extend(peers(args, model));
     }
     ensure!(
         !all.is_empty(),
         "no method is left: of --variant, --only and --without, or no noise to tell"
     );
     Ok(all)
+}
+
+fn of_paper(args: &Args) -> anyhow::Result<Vec<Contender>> {
+    let mut all = Vec::new();
+    for &rho in &args.rho {
+        for &resolution in &args.resolution {
+            for &scale in &args.radius_scale {
+                // No other backend has this variant.
+                let backend = Box::new(CpuBackend::new());
+                let peer = TldiPeer::new(backend, Method::Paper { rho, resolution }, 1)?;
+                all.push(Contender {
+                    variant: "paper".to_owned(),
+                    rho: Some(rho),
+                    resolution: Some(resolution),
+                    ..Contender::new(Box::new(peer), Some(scale))
+                });
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// The default, told noise of that standard deviation, metres.
+fn ours(args: &Args, variant: &str, noise: f32) -> anyhow::Result<Vec<Contender>> {
+    let mut all = Vec::new();
+    for &pixel_scale in &args.pixel_scale {
+        for &scale in &args.radius_scale {
+            all.push(Contender {
+                variant: variant.to_owned(),
+                radius_scale: Some(scale),
+                ..Contender::ours(args.backend.open()?, pixel_scale, noise)?
+            });
+        }
+    }
+    Ok(all)
+}
+
+fn peers(args: &Args, model: &Model) -> Vec<Contender> {
+    let frame = Frame {
+        faces: Some([&model.faces, &model.faces]),
+        ..Frame::new(&model.points, &model.points, 1.0)
+    };
+    let taken = |scale: Option<f32>| {
+        let peers = all_peers().into_iter();
+        peers
+            .filter(|peer| peer.takes(&frame) && args.names.take(&peer.name()))
+            // Meshes have no radius to be tuned.
+            .filter(|peer| peer.needs_faces() == scale.is_none())
+            .map(|peer| Contender::new(peer, scale))
+            .collect::<Vec<_>>()
+    };
+    let scales = args.peer_radius.iter().copied().map(Some);
+    scales.chain([None]).flat_map(taken).collect()
 }
 
 fn print_head(model: &Model, cases: usize) {

@@ -9,9 +9,10 @@
 use anyhow::ensure;
 use clap::Parser;
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{Backend, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View};
+use tldi::{Backend, CpuBackend, PairResult, Params, PointCloud, Surface};
 use tldi_benches::placements::{Placement, Source};
 use tldi_memory::{Counting, allocations};
+use tldi_tests::aimed;
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting::new();
@@ -96,13 +97,8 @@ fn settled(args: &Args, placement: Placement) -> anyhow::Result<[usize; 2]> {
             });
             outcome?;
             let [a, b] = &clouds;
-            let query = PairQuery {
-                a: Surface::Cloud(a),
-                b: Surface::Cloud(b),
-                a_from_b: Pose3::IDENTITY,
-                view: View::aimed(),
-                params: Params::for_radius(radius),
-            };
+            let [a, b] = [a, b].map(Surface::Cloud);
+            let query = aimed(a, b, Pose3::IDENTITY, Params::for_radius(radius));
             let mut outcome = Ok(());
             counts[1] += allocations(|| outcome = backend.compare(&[query], &mut results));
             outcome?;

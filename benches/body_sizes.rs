@@ -16,6 +16,7 @@ use tldi::glamx::Vec3;
 use tldi_benches::args::RunArgs;
 use tldi_benches::stopwatch::Stopwatch;
 use tldi_benches::stored::{Measured, Provenance};
+use tldi_benches::times::Times;
 use tldi_tests::{sampled_box, sampled_plane};
 
 /// A ball, a cuboid and a cloud of a cube, each of several sizes, dropped by a tenth of their size onto flat clouds of
@@ -137,15 +138,15 @@ fn measure(body: Body, size: f32, radius: f32, args: &Args) -> anyhow::Result<Ro
         times.push(1e3 * watch.seconds());
         contact_pixels = contact_pixels.max(report.contact_pixels);
     }
-    times.sort_by(f64::total_cmp);
+    let times = Times::of(times);
     let depth = half - world.bodies[handle].translation().y;
     Ok(Row {
         body,
         size,
         radius,
         points,
-        median_ms: times[times.len() / 2],
-        worst_ms: times[times.len() - 1],
+        median_ms: times.median,
+        worst_ms: times.most,
         contact_pixels,
         depth_in_radii: depth / coarser,
         depth_in_sizes: depth / size,

@@ -19,7 +19,8 @@ use tldi_benches::args::RunArgs;
 use tldi_benches::floor::Coordinates;
 use tldi_benches::stopwatch::Stopwatch;
 use tldi_benches::stored::{Measured, Provenance};
-use tldi_tests::{Samples, sampled_box, sampled_plane, sampled_sphere};
+use tldi_benches::times::Times;
+use tldi_tests::{sampled_box, sampled_plane, sampled_sphere};
 
 /// A ball, and a cube on its edge and on its corner, 2 to 10 radii deep in a flat scan: how far the
 /// depth is off and what finding it takes, for pixels of several sizes and for budgets. Then one ball
@@ -178,7 +179,7 @@ fn scenes(args: &Args) -> anyhow::Result<Vec<Row>> {
     while count <= args.most {
         let mut rng = fastrand::Rng::with_seed(args.run.seed);
         let edge = spacing * (count as f32).sqrt();
-        let mut samples: Samples = sampled_plane(edge, spacing, &mut rng);
+        let mut samples = sampled_plane(edge, spacing, &mut rng);
         rng.shuffle(&mut samples.points);
         let depth = spacing;
         let pose = Pose::from_translation((SIZE - depth) * Vector::Y);
@@ -243,14 +244,13 @@ fn compare(
 }
 
 fn row(setting: String, scan_points: usize, outcomes: &[Outcome], floor_ms: f64) -> Row {
-    let mut seconds: Vec<f64> = outcomes.iter().map(|o| o.seconds).collect();
+    let times = Times::of(outcomes.iter().map(|o| 1e3 * o.seconds));
     let mut errors: Vec<f32> = outcomes.iter().map(|o| o.error).collect();
-    seconds.sort_by(f64::total_cmp);
     errors.sort_by(f32::total_cmp);
     Row {
         setting,
         scan_points,
-        median_ms: 1e3 * seconds[seconds.len() / 2],
+        median_ms: times.median,
         floor_ms,
         median_error_mm: 1e3 * errors[errors.len() / 2],
         p95_error_mm: 1e3 * errors[errors.len() * 95 / 100],
@@ -267,7 +267,7 @@ fn floor_ms(a: &PointCloud, b: &PointCloud) -> f64 {
         }
         1e3 * start.seconds()
     };
-    (0..9).map(|_| pass()).fold(f64::INFINITY, f64::min)
+    Times::of((0..9).map(|_| pass())).least
 }
 
 fn print(rows: &[Row]) {

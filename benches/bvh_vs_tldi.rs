@@ -15,7 +15,7 @@ use tldi::glamx::Pose3;
 use tldi_benches::args::{NameArgs, RunArgs};
 use tldi_benches::floor::Coordinates;
 use tldi_benches::model::Model;
-use tldi_benches::peers::{Found, Frame, Method, Peer, TldiPeer, all_peers};
+use tldi_benches::peers::{Found, Frame, Method, Peer, TldiPeer, adapter, all_peers};
 use tldi_benches::placements::{Placement, Source, bounds};
 use tldi_benches::stages::{StageTimes, medians_ms};
 use tldi_benches::stopwatch::Stopwatch;
@@ -82,10 +82,8 @@ fn main() -> anyhow::Result<()> {
             let measured = measure(&args, &source, placement, &mut methods)?;
             print(&measured);
             rows.extend(measured);
-            let mut backends = methods.iter().filter_map(|(method, _)| method.backend());
-            if let Some(adapter) = backends.find_map(|backend| backend.adapter()) {
-                provenance.adapter = Some(adapter.to_owned());
-            }
+            let peers = methods.iter().map(|(method, _)| &**method);
+            provenance.adapter = adapter(peers).or(provenance.adapter);
         }
     }
     args.run.store(provenance, rows)?;
@@ -127,6 +125,14 @@ fn methods(args: &Args) -> anyhow::Result<Vec<Measured>> {
     Ok(all)
 }
 
+/// What one method did in the frames of a placement.
+#[derive(Clone, Default)]
+struct Done {
+    found: Vec<Found>,
+    stages: Vec<StageTimes>,
+    peak_mib: f64,
+}
+
 /// Frames of one placement, each by all methods, one after the other, so that a change of the
 /// machine's speed meets all alike.
 fn measure(
@@ -136,77 +142,86 @@ fn measure(
     methods: &mut Vec<Measured>,
 ) -> anyhow::Result<Vec<FrameRow>> {
     let radius = source.radius(placement)?;
-    let mut found: Vec<Vec<Found>> = vec![Vec::new(); methods.len()];
-    let mut stages: Vec<Vec<StageTimes>> = vec![Vec::new(); methods.len()];
-    let mut peaks = vec![0.0f64; methods.len()];
+    let mut all_done = vec![Done::default(); methods.len()];
     let mut floors = Vec::new();
     let mut counts = [0; 2];
+    let faces = match source {
+        Source::Vertices(model) if placement != Placement::BodyOnScan => {
+            Some([&model.faces[..]; 2])
+        }
+        _ => None,
+    };
     let progress = ProgressBar::new((args.repeats + 1) as u64).with_message(placement.name());
     for number in 0..=args.repeats as u64 {
         let [a, b] = source.bodies(placement, radius, args.run.seed + number);
         counts = [a.len(), b.len()];
-        let faces = match source {
-            Source::Vertices(model) if placement != Placement::BodyOnScan => {
-                Some([&model.faces[..]; 2])
-            }
-            _ => None,
-        };
         let frame = Frame {
             faces,
             ..Frame::new(&a, &b, radius)
         };
         if number == 0 {
-            methods.retain(|(method, _)| method.refuses(&frame).is_none());
+            methods.retain(|(method, _)| method.takes(&frame));
         }
         floors.push(floor(&frame));
-        for (k, (method, _)) in methods.iter_mut().enumerate() {
+        for ((method, _), done) in methods.iter_mut().zip(&mut all_done) {
             MEMORY.reset_peak_usage();
             let before = MEMORY.current_usage_as_mb();
-            let one = method.compare(&frame);
-            peaks[k] = peaks[k].max(f64::from(MEMORY.peak_usage_as_mb() - before));
+            let found = method.compare(&frame);
+            let peak_mib = f64::from(MEMORY.peak_usage_as_mb() - before);
+            done.peak_mib = done.peak_mib.max(peak_mib);
             // The first frame warms memory up.
-            if number > 0 {
-                found[k].push(one);
-            }
+            done.found.extend((number > 0).then_some(found));
         }
         // After what is timed, with the points in the cache again, as the first method found them.
         floor(&frame);
-        for ((method, _), stages) in methods.iter_mut().zip(&mut stages) {
-            stages.extend(method.stages(&frame).filter(|_| number > 0));
+        for ((method, _), done) in methods.iter_mut().zip(&mut all_done) {
+            let stages = method.stages(&frame);
+            done.stages.extend(stages.filter(|_| number > 0));
         }
         progress.inc(1);
     }
     progress.finish_and_clear();
-    let floor_seconds = Times::of(floors).median;
-    let rows = methods.iter().zip(found).zip(peaks).zip(stages);
-    Ok(rows
-        .map(|((((method, threads), all), peak_mib), stages)| {
-            let spread = |part: fn(&Found) -> f64| Times::of(all.iter().map(|f| 1e3 * part(f)));
-            let total = spread(|found| found.build_seconds + found.query_seconds);
-            let last = all.last().copied().unwrap_or_default();
-            FrameRow {
-                model: source.name().to_owned(),
-                points: counts[0],
-                points_b: counts[1],
-                placement: placement.name().to_owned(),
-                method: method.name(),
-                threads: *threads,
-                build_ms: spread(|found| found.build_seconds).median,
-                query_ms: spread(|found| found.query_seconds).median,
-                total_ms: total.median,
-                least_ms: total.least,
-                quartiles_ms: Some(total.quartiles),
-                most_ms: total.most,
-                frames: all.len(),
-                collides: last.collides,
-                contacts: last.contacts,
-                peak_mib,
-                floor_ratio: 1e-3 * total.median / floor_seconds,
-                work: last.work.map(WorkRow::from),
-                stages: (!stages.is_empty()).then(|| stage_rows(&stages)),
-            }
-        })
-        .collect())
+    let floor_ms = 1e3 * Times::of(floors).median;
+    let row = |((method, threads), done): (&Measured, Done)| FrameRow {
+        model: source.name().to_owned(),
+        points: counts[0],
+        points_b: counts[1],
+        placement: placement.name().to_owned(),
+        method: method.name(),
+        threads: *threads,
+        ..done.row(floor_ms)
+    };
+    Ok(methods.iter().zip(all_done).map(row).collect())
+}
+
+impl Done {
+    /// The row, without what was compared.
+    fn row(&self, floor_ms: f64) -> FrameRow {
+        let spread = |part: fn(&Found) -> f64| Times::of(self.found.iter().map(|f| 1e3 * part(f)));
+        let total = spread(|found| found.build_seconds + found.query_seconds);
+        let last = self.found.last().copied().unwrap_or_default();
+        FrameRow {
+            model: String::new(),
+            points: 0,
+            points_b: 0,
+            placement: String::new(),
+            method: String::new(),
+            threads: 0,
+            build_ms: spread(|found| found.build_seconds).median,
+            query_ms: spread(|found| found.query_seconds).median,
+            total_ms: total.median,
+            least_ms: total.least,
+            quartiles_ms: Some(total.quartiles),
+            most_ms: total.most,
+            frames: self.found.len(),
+            collides: last.collides,
+            contacts: last.contacts,
+            peak_mib: self.peak_mib,
+            floor_ratio: total.median / floor_ms,
+            work: last.work.map(WorkRow::from),
+            stages: (!self.stages.is_empty()).then(|| stage_rows(&self.stages)),
+        }
+    }
 }
 
 fn stage_rows(runs: &[StageTimes]) -> Vec<StageRow> {

@@ -12,7 +12,7 @@ use indicatif::ProgressBar;
 use tldi_benches::accuracy::Contender;
 use tldi_benches::args::RunArgs;
 use tldi_benches::contact_quality::{Plan, measure};
-use tldi_benches::peers::{Culled, Grid, Method, Peer, TldiPeer, TriMeshPeer, VoxelsRebuild};
+use tldi_benches::peers::{Culled, Grid, Peer, TriMeshPeer, VoxelsRebuild, adapter};
 use tldi_benches::stored::{ContactRow, Provenance};
 use tldi_tests::{ContactPair, Regime};
 use tldi_wgpu::BackendChoice;
@@ -70,9 +70,8 @@ fn main() -> anyhow::Result<()> {
     let rows = measure(&mut contenders, &plan, || progress.inc(1));
     progress.finish_and_clear();
     print(&rows);
-    let mut backends = contenders.iter().filter_map(|c| c.peer.backend());
-    let backend = backends.find(|backend| backend.adapter().is_some());
-    args.run.store(Provenance::now(backend), rows)?;
+    let adapter = adapter(contenders.iter().map(|contender| &*contender.peer));
+    args.run.store(Provenance::now(adapter), rows)?;
     Ok(())
 }
 
@@ -80,26 +79,9 @@ fn main() -> anyhow::Result<()> {
 fn contenders(args: &Args) -> anyhow::Result<Vec<Contender>> {
     let mut all = Vec::new();
     for &pixel_scale in &args.pixel_scale {
-        let method = Method::Default { pixel_scale };
-        all.push(Contender {
-            variant: "default".to_owned(),
-            peer: Box::new(TldiPeer::new(args.backend.open()?, method, 1)?),
-            radius_scale: Some(1.0),
-            rho: None,
-            resolution: None,
-            pixel_scale: Some(pixel_scale),
-        });
+        all.push(Contender::ours(args.backend.open()?, pixel_scale, 0.0)?);
     }
-    let mut add = |peer: Box<dyn Peer>, radius_scale| {
-        all.push(Contender {
-            variant: peer.name(),
-            peer,
-            radius_scale,
-            rho: None,
-            resolution: None,
-            pixel_scale: None,
-        });
-    };
+    let mut add = |peer: Box<dyn Peer>, scale| all.push(Contender::new(peer, scale));
     for &scale in &args.peer_radius {
         add(Box::new(Culled::new(Grid::telling_deepest())), Some(scale));
         add(Box::new(Culled::new(VoxelsRebuild::default())), Some(scale));

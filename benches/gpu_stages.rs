@@ -7,15 +7,16 @@
     reason = "a bench's table is its output; progress goes to stderr"
 )]
 
-use anyhow::Context;
 use clap::Parser;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use tldi::glamx::Pose3;
-use tldi::{Backend, CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface, View};
+use tldi::{Backend, CpuBackend, PairResult, Params, PointCloud, Surface};
+use tldi_benches::stored::write_json;
+use tldi_benches::times::Times;
 use tldi_benches::{BUMP, bumpy_sheet};
-use tldi_tests::Host;
+use tldi_tests::{Host, aimed};
 use tldi_wgpu::{AdapterChoice, Gpu, WgpuBackend, copy_bandwidth};
 
 /// Times the stages of the GPU backend with two sheets of random points in shallow contact.
@@ -103,9 +104,7 @@ fn main() -> anyhow::Result<()> {
         report.rows.push(row);
     }
     if let Some(path) = &args.json {
-        let text = serde_json::to_string_pretty(&report)?;
-        std::fs::write(path, text + "\n")
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        write_json(path, &report)?;
     }
     Ok(())
 }
@@ -137,7 +136,7 @@ fn measure(gpu: &Gpu, points: usize, args: &Args, bandwidth: f64) -> anyhow::Res
     }
     let needed = timed.needed_bytes();
     let stage = |(k, &(stage, bytes)): (usize, &(&'static str, u64))| {
-        let seconds = has_times.then(|| median(stage_seconds.iter().map(|all| all[k])));
+        let seconds = has_times.then(|| Times::of(stage_seconds.iter().map(|all| all[k])).median);
         StageRow {
             stage,
             device_ms: seconds.map(|s| s * 1e3),
@@ -148,9 +147,9 @@ fn measure(gpu: &Gpu, points: usize, args: &Args, bandwidth: f64) -> anyhow::Res
     Ok(Row {
         points,
         contacts: results[0].contacts.len(),
-        resident_ms: median(resident) * 1e3,
-        uploaded_ms: median(uploaded) * 1e3,
-        cpu_ms: median(on_cpu) * 1e3,
+        resident_ms: Times::of(resident).median * 1e3,
+        uploaded_ms: Times::of(uploaded).median * 1e3,
+        cpu_ms: Times::of(on_cpu).median * 1e3,
         floor_ms: 32.0 * points as f64 / bandwidth * 1e3,
         stages: needed.iter().enumerate().map(stage).collect(),
     })
@@ -163,22 +162,12 @@ fn compare(
     b: &PointCloud,
     results: &mut Vec<PairResult>,
 ) -> anyhow::Result<f64> {
-    let query = PairQuery {
-        a: Surface::Cloud(a),
-        b: Surface::Cloud(b),
-        a_from_b: Pose3::translation(0.1, 0.5 * BUMP, 0.0),
-        view: View::aimed(),
-        params: Params::for_radius(a.mean_radius()),
-    };
+    let params = Params::for_radius(a.mean_radius());
+    let pose = Pose3::translation(0.1, 0.5 * BUMP, 0.0);
+    let query = aimed(Surface::Cloud(a), Surface::Cloud(b), pose, params);
     let start = Instant::now();
     backend.compare(&[query], results)?;
     Ok(start.elapsed().as_secs_f64())
-}
-
-fn median(values: impl IntoIterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 fn print(row: &Row) {

@@ -9,13 +9,13 @@ use std::hint::black_box;
 use std::time::Duration;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
-    Backend, CpuBackend, ImpactQuery, PairQuery, PairResult, Params, PointCloud, Surface, View,
+    Backend, CpuBackend, ImpactQuery, PairQuery, PairResult, Params, PointCloud, Surface,
     VirtualCamera, build,
 };
 use tldi_benches::placements::{Placement, Source};
 use tldi_benches::threads::workers;
 use tldi_benches::{SHEET_EDGE, bumpy_sheet};
-use tldi_tests::HalfSpace;
+use tldi_tests::{HalfSpace, aimed};
 
 /// Points of each cloud.
 const POINTS: [usize; 2] = [10_000, 100_000];
@@ -78,13 +78,7 @@ fn images(criterion: &mut Criterion) {
 }
 
 fn query<'a>(a: Surface<'a>, b: &'a PointCloud, pose: Pose3, radius: f32) -> PairQuery<'a> {
-    PairQuery {
-        a,
-        b: Surface::Cloud(b),
-        a_from_b: pose,
-        view: View::aimed(),
-        params: Params::for_radius(radius),
-    }
+    aimed(a, Surface::Cloud(b), pose, Params::for_radius(radius))
 }
 
 /// Whole comparisons with warm memory.

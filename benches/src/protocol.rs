@@ -1,6 +1,7 @@
 //! The cases of the paper's accuracy protocol: two copies of a model, the second at 31 distances and
 //! 900 rotations.
 
+use crate::placements::bounds;
 use tldi::glamx::{Pose3, Quat, Vec3};
 
 /// Distances: 3.0 down to 0 along x.
@@ -49,13 +50,9 @@ pub fn cases(count: usize) -> impl Iterator<Item = Case> {
 
 /// Moves and scales points so that their bounds are in a cube of 2 about the origin.
 pub fn normalised(points: &[Vec3]) -> Vec<Vec3> {
-    let (low, high) = points
-        .iter()
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| {
-            (low.min(*p), high.max(*p))
-        });
-    let scale = 2.0 / (high - low).max_element();
-    let middle = 0.5 * (low + high);
+    let bounds = bounds(points);
+    let scale = 2.0 / bounds.extents().max_element();
+    let middle = bounds.center();
     points.iter().map(|p| (*p - middle) * scale).collect()
 }
 

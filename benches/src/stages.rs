@@ -1,5 +1,6 @@
 //! How long each stage of `tldi` takes of what one thread does.
 
+use crate::distinct::distinct;
 use crate::times::Times;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -29,12 +30,7 @@ pub fn staged<R>(run: impl FnOnce() -> R) -> (R, StageTimes) {
 
 /// Median of each stage over several runs, milliseconds. A stage that does not run takes no time.
 pub fn medians_ms(runs: &[StageTimes]) -> Vec<(&'static str, f64)> {
-    let mut names: Vec<&'static str> = Vec::new();
-    for (name, _) in runs.iter().flatten() {
-        if !names.contains(name) {
-            names.push(name);
-        }
-    }
+    let mut names = distinct(runs.iter().flatten().map(|(name, _)| *name));
     names.sort_by_key(|name| *name == REST);
     let ms = |run: &StageTimes, name| {
         let own = run.iter().find(|(own, _)| *own == name);

@@ -8,7 +8,6 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-use tldi::Backend;
 use tldi_tests::Host;
 
 /// Results of one run.
@@ -41,8 +40,8 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// Here and now; the device is that of `backend`.
-    pub fn now(backend: Option<&dyn Backend>) -> Self {
+    /// Here and now; `adapter` is the name of the GPU, where one took part.
+    pub fn now(adapter: Option<String>) -> Self {
         let host = Host::now();
         Self {
             date: host.date,
@@ -50,9 +49,7 @@ impl Provenance {
             cores: host.cores,
             commit: host.commit,
             features: features(),
-            adapter: backend
-                .and_then(|backend| backend.adapter())
-                .map(str::to_owned),
+            adapter,
         }
     }
 }
@@ -191,7 +188,12 @@ pub fn write<R: Measured>(
         provenance,
         rows,
     };
-    let text = serde_json::to_string_pretty(&stored).map_err(|source| StoredError::Format {
+    write_json(path, &stored)
+}
+
+/// Anything as JSON into a file.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), StoredError> {
+    let text = serde_json::to_string_pretty(value).map_err(|source| StoredError::Format {
         path: path.to_owned(),
         source,
     })?;

@@ -6,14 +6,13 @@
 
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
-use tldi::{Backend, CameraPolicy, CpuBackend, PairQuery, Params, PointCloud, Surface, View};
+use tldi::{CameraPolicy, CpuBackend, Params, PointCloud, Surface};
 use tldi_benches::accuracy::{Contender, Copies, measure};
 use tldi_benches::mesh_truth::ExactMesh;
 use tldi_benches::model::Model;
-use tldi_benches::peers::{Method, TldiPeer};
 use tldi_benches::placements::{Placement, Source};
 use tldi_benches::protocol::{Case, cases};
-use tldi_tests::{Regime, measure_accuracy, random_unit};
+use tldi_tests::{Regime, aimed, compare_on, measure_accuracy, random_unit};
 
 /// Points of the model: few, so that there are errors at all, and that the meshes are tested in seconds.
 const POINTS: usize = 2_000;
@@ -39,15 +38,10 @@ fn accuracy() {
         .collect();
     let cloud = PointCloud::builder(model.points.clone()).knn_radii(7, 0.65);
     let cloud = cloud.build().expect("a valid model");
-    let method = Method::Default { pixel_scale: 1.0 };
-    let peer = TldiPeer::new(Box::new(CpuBackend::new()), method, 1).expect("one thread");
+    let ours = Contender::ours(Box::new(CpuBackend::new()), 1.0, 0.0).expect("one thread");
     let mut contenders = [Contender {
-        variant: "default".to_owned(),
-        peer: Box::new(peer),
         radius_scale: None,
-        rho: None,
-        resolution: None,
-        pixel_scale: Some(1.0),
+        ..ours
     }];
     let copies = Copies {
         model: &model,
@@ -118,15 +112,9 @@ fn work() {
             let cloud = PointCloud::builder(points).radius(radius);
             cloud.build().expect("the points are finite")
         });
-        let mut results = Vec::new();
-        let query = PairQuery {
-            a: Surface::Cloud(&a),
-            b: Surface::Cloud(&b),
-            a_from_b: Pose::IDENTITY,
-            view: View::aimed(),
-            params: Params::for_radius(radius),
-        };
-        (CpuBackend::new().compare(&[query], &mut results)).expect("two clouds are supported");
+        let [a, b] = [Surface::Cloud(&a), Surface::Cloud(&b)];
+        let query = aimed(a, b, Pose::IDENTITY, Params::for_radius(radius));
+        let results = compare_on(&mut CpuBackend::new(), &[query]);
         let looked = results[0].work.looked();
         let found = format!(
             "{}: {} points, {} pixels",

@@ -9,11 +9,13 @@ pub use way_out::way_out;
 
 use crate::mesh_truth::ExactMesh;
 use crate::model::Model;
-use crate::peers::{Frame, Peer};
+use crate::peers::{Frame, Method, Peer, TldiPeer};
 use crate::protocol::Case;
 use crate::stored::{AccuracyRow, DistanceTally};
+use crate::times::Times;
+use rayon::ThreadPoolBuildError;
 use std::collections::HashMap;
-use tldi::PointCloud;
+use tldi::{Backend, PointCloud};
 
 /// Name in the rows of the default, told how large the noise is.
 pub const TOLD: &str = "default, noise told";
@@ -32,6 +34,35 @@ pub struct Contender {
     pub resolution: Option<u32>,
     /// Of the default.
     pub pixel_scale: Option<f32>,
+}
+
+impl Contender {
+    /// A peer with balls, or half edges of voxels, of that many mean radii; `None`: it has no radii.
+    pub fn new(peer: Box<dyn Peer>, radius_scale: Option<f32>) -> Self {
+        Self {
+            variant: peer.name(),
+            peer,
+            radius_scale,
+            rho: None,
+            resolution: None,
+            pixel_scale: None,
+        }
+    }
+
+    /// The default on one thread, with pixels of an edge of so many mean radii. It is told that all points have noise
+    /// of that standard deviation, metres.
+    pub fn ours(
+        backend: Box<dyn Backend>,
+        pixel_scale: f32,
+        noise: f32,
+    ) -> Result<Self, ThreadPoolBuildError> {
+        let peer = TldiPeer::new(backend, Method::Default { pixel_scale }, 1)?;
+        Ok(Self {
+            variant: "default".to_owned(),
+            pixel_scale: Some(pixel_scale),
+            ..Self::new(Box::new(peer.with_noise(noise)), Some(1.0))
+        })
+    }
 }
 
 /// Both copies as a sensor has them, and their radii.
@@ -135,10 +166,9 @@ impl Answers {
         tally.false_positives += usize::from(is_invented);
     }
 
-    fn row(mut self, contender: &Contender, copies: &Copies, colliding: usize) -> AccuracyRow {
-        self.seconds.sort_unstable_by(f64::total_cmp);
+    fn row(self, contender: &Contender, copies: &Copies, colliding: usize) -> AccuracyRow {
         let cases = self.seconds.len();
-        let at = |part: usize| 1e3 * self.seconds[(part * cases / 4).min(cases - 1)];
+        let ms = Times::of(self.seconds.iter().map(|seconds| 1e3 * seconds));
         let share = |count: usize| 100.0 * count as f64 / cases as f64;
         let sum = |of: fn(&DistanceTally) -> usize| self.by_distance.iter().map(of).sum::<usize>();
         let (missed, invented) = (sum(|t| t.false_negatives), sum(|t| t.false_positives));
@@ -158,9 +188,9 @@ impl Answers {
             error_pct: share(missed) + share(invented),
             colliding_pct: share(colliding),
             worst_false_negative_mean_radii: self.worst,
-            median_ms: at(2),
-            lower_quartile_ms: at(1),
-            upper_quartile_ms: at(3),
+            median_ms: ms.median,
+            lower_quartile_ms: ms.quartiles[0],
+            upper_quartile_ms: ms.quartiles[1],
             by_distance: self.by_distance,
         }
     }

@@ -2,8 +2,7 @@ use super::*;
 use crate::peers::Found;
 use crate::protocol::{ALL_CASES, cases};
 use crate::stored::Measured;
-use tldi::glamx::Vec3;
-use tldi::glamx::{Pose3, Quat};
+use tldi::glamx::{Pose3, Quat, Vec3};
 
 /// The cube of an edge of 2 about the origin.
 fn cube() -> Model {
@@ -91,7 +90,6 @@ fn truth_is_kept_for_each_mesh() {
 /// Says that bodies collide if their middles are nearer than `reach`.
 struct Oracle {
     reach: f32,
-    radius_seen: f32,
 }
 
 impl Peer for Oracle {
@@ -101,7 +99,6 @@ impl Peer for Oracle {
 
     fn compare(&mut self, frame: &Frame) -> Found {
         let middle = |points: &[Vec3]| points.iter().sum::<Vec3>() / points.len() as f32;
-        self.radius_seen = frame.radius;
         assert_eq!(frame.radii.expect("they are given")[1].len(), frame.b.len());
         Found {
             build_seconds: 1e-3 * f64::from(middle(frame.b).x + 1.0),
@@ -130,17 +127,7 @@ fn errors_are_counted_on_the_side_where_they_are() {
         clouds: [&cloud, &cloud],
         noise: 0.0,
     };
-    let contender = |reach| Contender {
-        variant: "oracle".to_owned(),
-        peer: Box::new(Oracle {
-            reach,
-            radius_seen: 0.0,
-        }),
-        radius_scale: Some(0.5),
-        rho: None,
-        resolution: None,
-        pixel_scale: None,
-    };
+    let contender = |reach| Contender::new(Box::new(Oracle { reach }), Some(0.5));
     let mut contenders = [contender(9.0), contender(0.05), contender(2.35)];
     let mut done = 0;
     let rows = measure(&mut contenders, &copies, &mesh, &all, &truth, || done += 1);

@@ -1,7 +1,7 @@
 use super::*;
 use crate::stored::DistanceTally;
 use crate::stored::Provenance;
-use crate::stored::tests::contact_row;
+use crate::stored::tests::{accuracy_row, contact_row};
 use tldi_tests::ContactPair;
 
 fn folder(name: &str) -> PathBuf {
@@ -16,12 +16,9 @@ fn folder(name: &str) -> PathBuf {
 
 fn provenance(commit: &str) -> Provenance {
     Provenance {
-        date: "2026-01-31".to_owned(),
-        cpu: "a processor".to_owned(),
-        cores: 2,
         commit: commit.to_owned(),
-        features: vec!["release".to_owned()],
         adapter: Some("a device".to_owned()),
+        ..stored::tests::provenance()
     }
 }
 
@@ -32,17 +29,10 @@ fn accuracy(variant: &str, wrong: usize, median_ms: f64) -> AccuracyRow {
         points: 4321,
         cases: 1000,
         variant: variant.to_owned(),
-        backend: None,
-        rho: None,
-        resolution: None,
         pixel_scale: None,
-        radius_scale: Some(1.0),
-        noise: 0.0,
         false_negative_pct: wrong_pct,
         false_positive_pct: 0.0,
         error_pct: wrong_pct,
-        colliding_pct: 60.0,
-        worst_false_negative_mean_radii: 0.1,
         median_ms,
         lower_quartile_ms: 0.5 * median_ms,
         upper_quartile_ms: 2.0 * median_ms,
@@ -52,6 +42,7 @@ fn accuracy(variant: &str, wrong: usize, median_ms: f64) -> AccuracyRow {
             false_negatives: wrong,
             false_positives: 0,
         }],
+        ..accuracy_row()
     }
 }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::peers::{Culled, Grid, Method, TldiPeer};
+use crate::peers::{Culled, Grid};
 use rapier3d::math::Vector;
 use rapier3d::parry::query::PointQuery;
 use rapier3d::parry::shape::TriMesh;
@@ -7,26 +7,12 @@ use tldi::CpuBackend;
 use tldi_tests::{DEEP_LIMIT, NORMAL_LIMIT, SHALLOW_LIMIT};
 
 fn ours() -> Contender {
-    let method = Method::Default { pixel_scale: 1.0 };
-    let peer = TldiPeer::new(Box::new(CpuBackend::new()), method, 1);
-    Contender {
-        variant: "default".to_owned(),
-        peer: Box::new(peer.expect("a thread can be started")),
-        radius_scale: Some(1.0),
-        rho: None,
-        resolution: None,
-        pixel_scale: Some(1.0),
-    }
+    Contender::ours(Box::new(CpuBackend::new()), 1.0, 0.0).expect("a thread can be started")
 }
 
 fn balls(radius_scale: f32) -> Contender {
-    Contender {
-        variant: "balls".to_owned(),
-        peer: Box::new(Culled::new(Grid::telling_deepest())),
-        radius_scale: Some(radius_scale),
-        pixel_scale: None,
-        ..ours()
-    }
+    let peer = Culled::new(Grid::telling_deepest());
+    Contender::new(Box::new(peer), Some(radius_scale))
 }
 
 fn plan(pairs: &[ContactPair], cases: usize) -> Plan<'_> {

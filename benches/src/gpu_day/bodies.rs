@@ -2,8 +2,8 @@
 
 use crate::placements::{Placement, Source};
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{CloudError, PairQuery, Params, PointCloud, Surface, View};
-use tldi_tests::standard_normal;
+use tldi::{CloudError, PairQuery, Params, PointCloud, Surface};
+use tldi_tests::{aimed, standard_normal};
 
 /// What is told of the points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,12 +60,9 @@ impl Scene {
         };
         let normals = match kind {
             Kind::Normals => {
-                let is_sheet = |k: usize| placement == Placement::BodyOnScan && k == 0;
+                let is_sheet = placement == Placement::BodyOnScan;
                 let [a, b] = &points;
-                Some([
-                    outward(a, radius, is_sheet(0))?,
-                    outward(b, radius, is_sheet(1))?,
-                ])
+                Some([outward(a, radius, is_sheet)?, outward(b, radius, false)?])
             }
             Kind::Bare | Kind::Noisy => None,
         };
@@ -94,13 +91,8 @@ impl Scene {
 
     /// Both bodies.
     pub fn query(&self) -> PairQuery<'_> {
-        PairQuery {
-            a: Surface::Cloud(&self.clouds[0]),
-            b: Surface::Cloud(&self.clouds[1]),
-            a_from_b: Pose3::IDENTITY,
-            view: View::aimed(),
-            params: Params::for_radius(self.radius),
-        }
+        let [a, b] = self.clouds.each_ref().map(Surface::Cloud);
+        aimed(a, b, Pose3::IDENTITY, Params::for_radius(self.radius))
     }
 }
 
@@ -111,11 +103,8 @@ fn clouds(
     noise: f32,
 ) -> Result<[PointCloud<'static>; 2], CloudError> {
     let cloud = |k: usize| {
-        let builder = PointCloud::builder(points[k].clone()).radius(radius);
-        let builder = match noise > 0.0 {
-            true => builder.noise(noise),
-            false => builder,
-        };
+        let builder = PointCloud::builder(points[k].clone());
+        let builder = builder.radius(radius).noise(noise);
         match normals {
             Some(normals) => builder.normals(normals[k].clone()).build(),
             None => builder.build(),

@@ -45,8 +45,8 @@ pub(super) fn open() -> anyhow::Result<(Gpu, Card)> {
     let start = Instant::now();
     let gpu = Gpu::open(AdapterChoice::Any)?;
     let open_seconds = start.elapsed().as_secs_f64();
-    let compile_seconds = compile_seconds(&gpu)?;
-    let compile_again_seconds = compile_seconds_of_another()?;
+    let compile_seconds = seconds_to_compile(&gpu)?;
+    let compile_again_seconds = seconds_to_compile(&Gpu::open(AdapterChoice::Any)?)?;
     let info = gpu.device().adapter_info();
     let card = Card {
         name: info.name,
@@ -87,14 +87,10 @@ fn any_adapter() -> anyhow::Result<wgpu::Adapter> {
         .context("no adapter: install the GPU's driver, or Mesa's software Vulkan")
 }
 
-fn compile_seconds(gpu: &Gpu) -> anyhow::Result<f64> {
+fn seconds_to_compile(gpu: &Gpu) -> anyhow::Result<f64> {
     let start = Instant::now();
     WgpuBackend::new(gpu.clone())?;
     Ok(start.elapsed().as_secs_f64())
-}
-
-fn compile_seconds_of_another() -> anyhow::Result<f64> {
-    compile_seconds(&Gpu::open(AdapterChoice::Any)?)
 }
 
 fn features(all: wgpu::Features) -> Vec<String> {
@@ -103,38 +99,20 @@ fn features(all: wgpu::Features) -> Vec<String> {
 
 /// Those that a compute backend meets.
 fn limits(all: &wgpu::Limits) -> BTreeMap<String, u64> {
-    let named = [
-        (
-            "max_storage_buffers_per_shader_stage",
-            u64::from(all.max_storage_buffers_per_shader_stage),
-        ),
-        (
-            "max_storage_buffer_binding_size",
-            all.max_storage_buffer_binding_size,
-        ),
-        ("max_buffer_size", all.max_buffer_size),
-        (
-            "min_storage_buffer_offset_alignment",
-            u64::from(all.min_storage_buffer_offset_alignment),
-        ),
-        (
-            "max_compute_workgroup_storage_size",
-            u64::from(all.max_compute_workgroup_storage_size),
-        ),
-        (
-            "max_compute_invocations_per_workgroup",
-            u64::from(all.max_compute_invocations_per_workgroup),
-        ),
-        (
-            "max_compute_workgroup_size_x",
-            u64::from(all.max_compute_workgroup_size_x),
-        ),
-        (
-            "max_compute_workgroups_per_dimension",
-            u64::from(all.max_compute_workgroups_per_dimension),
-        ),
-        ("max_immediate_size", u64::from(all.max_immediate_size)),
-    ];
+    macro_rules! named {
+        ($($limit:ident)*) => { [$((stringify!($limit), u64::from(all.$limit))),*] };
+    }
+    let named = named! {
+        max_storage_buffers_per_shader_stage
+        max_storage_buffer_binding_size
+        max_buffer_size
+        min_storage_buffer_offset_alignment
+        max_compute_workgroup_storage_size
+        max_compute_invocations_per_workgroup
+        max_compute_workgroup_size_x
+        max_compute_workgroups_per_dimension
+        max_immediate_size
+    };
     let owned = named.map(|(name, value)| (name.to_owned(), value));
     owned.into_iter().collect()
 }

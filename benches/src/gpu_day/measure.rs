@@ -6,7 +6,6 @@ use super::{Correctness, Floors, KIND, Report, Settings, Shown, card, frames, ho
 use crate::charts::gpu_day::draw;
 use crate::stored::Provenance;
 use std::path::Path;
-use tldi_wgpu::WgpuBackend;
 
 impl Report {
     /// Measures everything, and writes points of frames and pictures into `out`, if that is given.
@@ -34,10 +33,9 @@ impl Report {
         }
         let all = Workloads::new(&gpu, settings.repeats, settings.seed, floors.bandwidth())?;
         let workloads = all.measure(&settings.sizes, &settings.batches, &mut budget)?;
-        let backend = WgpuBackend::new(gpu.clone())?;
         let report = Self {
             kind: KIND.to_owned(),
-            provenance: Provenance::now(Some(&backend)),
+            provenance: Provenance::now(Some(card.name.clone())),
             seconds: budget.elapsed(),
             skipped: budget.skipped(),
             card,

@@ -24,9 +24,7 @@ pub use table::print;
 pub use workloads::{StageTime, Workload};
 
 use crate::stored::Provenance;
-use anyhow::Context;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// Name of the results, as other benches name their rows.
 pub const KIND: &str = "gpu_day";
@@ -114,15 +112,6 @@ pub struct Report {
     pub frames: Vec<String>,
     /// What is wrong with the answers; empty where nothing is.
     pub faults: Vec<String>,
-}
-
-impl Report {
-    /// Writes it as JSON.
-    pub fn write(&self, path: &Path) -> anyhow::Result<()> {
-        let text = serde_json::to_string_pretty(self)?;
-        std::fs::write(path, text + "\n")
-            .with_context(|| format!("cannot write {}", path.display()))
-    }
 }
 
 #[cfg(test)]

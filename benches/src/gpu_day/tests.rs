@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::placements::Placement;
+use crate::stored::write_json;
 use serde_json::Value;
 use tldi_tests::gpu_backend;
 
@@ -91,7 +92,7 @@ fn a_run_measures_all_parts() {
     assert_eq!(names.filter(|name| name.ends_with(".png")).count(), 6);
     assert_eq!(report.frames.len(), 10);
     let json = out.join("report.json");
-    report.write(&json).expect("it is writable");
+    write_json(&json, &report).expect("it is writable");
     let text = std::fs::read_to_string(&json).expect("it was written");
     let read: Report = serde_json::from_str(&text).expect("it has the form");
     let again = serde_json::to_string(&read).expect("it can be written");

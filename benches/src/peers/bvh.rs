@@ -19,6 +19,14 @@ pub(super) fn ball_bounds(p: &Vec3, radius: f32) -> Aabb {
     Aabb::new(middle - half, middle + half)
 }
 
+/// A hierarchy of the balls of each body.
+pub(super) fn trees(frame: &Frame, strategy: BvhBuildStrategy) -> [Bvh; 2] {
+    [frame.a, frame.b].map(|points| {
+        let leaves = points.iter().map(|p| ball_bounds(p, frame.radius));
+        Bvh::from_leaves(strategy, &leaves.collect::<Vec<_>>())
+    })
+}
+
 /// Pairs of balls that overlap.
 pub(super) fn overlapping(a: &Bvh, b: &Bvh, frame: &Frame) -> usize {
     let reach = 4.0 * frame.radius * frame.radius;
@@ -37,14 +45,7 @@ impl Peer for BvhRebuild {
 
     fn compare(&mut self, frame: &Frame) -> Found {
         let start = Stopwatch::of_thread();
-        let build = |points: &[Vec3]| {
-            let leaves: Vec<Aabb> = points
-                .iter()
-                .map(|p| ball_bounds(p, frame.radius))
-                .collect();
-            Bvh::from_leaves(self.strategy, &leaves)
-        };
-        let (a, b) = (build(frame.a), build(frame.b));
+        let [a, b] = trees(frame, self.strategy);
         let built = start.seconds();
         let contacts = overlapping(&a, &b, frame);
         Found::new(&start, built, contacts)

@@ -1,6 +1,7 @@
 //! Any peer after the points outside of the overlap of the bounds have been dropped.
 
 use super::{Found, Frame, Peer};
+use crate::placements::bounds;
 use crate::stopwatch::Stopwatch;
 use tldi::Aabb;
 use tldi::glamx::Vec3;
@@ -30,10 +31,6 @@ impl<P: Peer> Culled<P> {
             kept: Default::default(),
         }
     }
-}
-
-fn bounds(points: &[Vec3]) -> Aabb {
-    points.iter().fold(Aabb::EMPTY, |all, p| all.including(*p))
 }
 
 impl Kept {
@@ -76,8 +73,8 @@ impl<P: Peer> Peer for Culled<P> {
         self.inner.needs_faces()
     }
 
-    fn refuses(&self, frame: &Frame) -> Option<&'static str> {
-        self.inner.refuses(frame)
+    fn takes(&self, frame: &Frame) -> bool {
+        self.inner.takes(frame)
     }
 
     fn compare(&mut self, frame: &Frame) -> Found {

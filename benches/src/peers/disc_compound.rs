@@ -22,10 +22,8 @@ impl Peer for DiscCompound {
         "compound of discs".to_owned()
     }
 
-    fn refuses(&self, frame: &Frame) -> Option<&'static str> {
-        let too_many = frame.a.len().max(frame.b.len()) > MOST_POINTS;
-        too_many
-            .then_some("more than 50,000 discs: a manifold for each pair of them needs too much")
+    fn takes(&self, frame: &Frame) -> bool {
+        frame.a.len().max(frame.b.len()) <= MOST_POINTS
     }
 
     fn compare(&mut self, frame: &Frame) -> Found {

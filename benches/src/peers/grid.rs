@@ -1,8 +1,8 @@
 //! A uniform grid by counting sort, rebuilt in every frame.
 
 use super::{Deepest, Found, Frame, Peer};
+use crate::placements::bounds;
 use crate::stopwatch::Stopwatch;
-use tldi::Aabb;
 use tldi::glamx::{UVec3, Vec3};
 
 /// Most cells: larger grids get larger cells.
@@ -27,7 +27,7 @@ pub(super) struct Cells {
 
 impl Cells {
     pub(super) fn new(points: &[Vec3], edge: f32) -> Self {
-        let bounds = points.iter().fold(Aabb::EMPTY, |all, p| all.including(*p));
+        let bounds = bounds(points);
         let dims = |edge: f32| (bounds.extents() / edge).floor() + Vec3::splat(5.0);
         let mut edge = edge;
         while dims(edge).element_product() > MAX_CELLS {

@@ -125,13 +125,12 @@ pub trait Peer {
         None
     }
 
-    /// Why the method is not measured with such a frame, if it is not.
-    fn refuses(&self, frame: &Frame) -> Option<&'static str> {
-        let lacks_faces = self.needs_faces() && frame.faces.is_none();
-        lacks_faces.then_some("a mesh is needed")
+    /// Whether the method is measured with such a frame.
+    fn takes(&self, frame: &Frame) -> bool {
+        frame.faces.is_some() || !self.needs_faces()
     }
 
-    /// One frame, which the method does not [refuse](Self::refuses).
+    /// One frame, which the method [takes](Self::takes).
     fn compare(&mut self, frame: &Frame) -> Found;
 
     /// The stages of such a frame, which is compared once more, of methods that tell them. Telling them takes time, so
@@ -168,6 +167,12 @@ pub fn all_peers() -> Vec<Box<dyn Peer>> {
         Box::new(Culled::new(TriMeshPeer::rebuilt())),
         Box::new(TriMeshPeer::updated()),
     ]
+}
+
+/// Name of the GPU on which the first of these that has one compared its last frame.
+pub fn adapter<'a>(peers: impl IntoIterator<Item = &'a dyn Peer>) -> Option<String> {
+    let mut backends = peers.into_iter().filter_map(|peer| peer.backend());
+    backends.find_map(|backend| backend.adapter().map(str::to_owned))
 }
 
 #[cfg(test)]

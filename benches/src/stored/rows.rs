@@ -5,6 +5,12 @@ use serde::{Deserialize, Serialize};
 use tldi::{Looked, Work};
 use tldi_tests::{ContactPair, Regime};
 
+/// What is wrong with times that must rise, ms.
+fn fault_of_times(times: &[f64]) -> Option<String> {
+    let are_possible = times[0] > 0.0 && times.is_sorted();
+    (!are_possible).then(|| format!("times of {times:?} ms are not positive and rising"))
+}
+
 /// Answers of one method, with its settings, to the cases of the accuracy protocol.
 #[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
 pub struct AccuracyRow {
@@ -68,16 +74,16 @@ impl Measured for AccuracyRow {
     const KIND: &'static str = "accuracy";
 
     fn fault(&self) -> Option<String> {
+        if self.cases == 0 || self.points == 0 {
+            return Some("cases and points must be at least 1".to_owned());
+        }
         let times = [
             self.lower_quartile_ms,
             self.median_ms,
             self.upper_quartile_ms,
         ];
-        if self.cases == 0 || self.points == 0 {
-            return Some("cases and points must be at least 1".to_owned());
-        }
-        if !(times[0] > 0.0 && times.is_sorted()) {
-            return Some(format!("times of {times:?} ms are not positive and rising"));
+        if let Some(fault) = fault_of_times(&times) {
+            return Some(fault);
         }
         let parts = self.false_negative_pct + self.false_positive_pct;
         if !(0.0..=100.0).contains(&self.error_pct) || (parts - self.error_pct).abs() > 1e-6 {
@@ -225,8 +231,8 @@ impl Measured for FrameRow {
         }
         let [lower, upper] = self.quartiles_ms.unwrap_or([self.total_ms; 2]);
         let times = [self.least_ms, lower, self.total_ms, upper, self.most_ms];
-        if !(times[0] > 0.0 && times.is_sorted()) {
-            return Some(format!("times of {times:?} ms are not positive and rising"));
+        if let Some(fault) = fault_of_times(&times) {
+            return Some(fault);
         }
         if self.floor_ratio.is_nan() || self.floor_ratio <= 0.0 {
             return Some(format!("floor_ratio {} is not positive", self.floor_ratio));
@@ -296,8 +302,8 @@ impl Measured for ContactRow {
             self.median_ms,
             self.upper_quartile_ms,
         ];
-        if !(times[0] > 0.0 && times.is_sorted()) {
-            return Some(format!("times of {times:?} ms are not positive and rising"));
+        if let Some(fault) = fault_of_times(&times) {
+            return Some(fault);
         }
         let shares = [self.missed_pct, self.wrong_side_pct];
         let are_possible = shares.iter().all(|share| *share >= 0.0);

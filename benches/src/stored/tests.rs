@@ -55,7 +55,7 @@ pub(crate) fn contact_row() -> ContactRow {
     }
 }
 
-fn provenance() -> Provenance {
+pub(crate) fn provenance() -> Provenance {
     Provenance {
         date: "2026-01-31".to_owned(),
         cpu: "a processor".to_owned(),

@@ -1,7 +1,7 @@
 //! Wrong answers.
 
 use crate::table::{Table, numbers};
-use crate::{done, number, page, stored};
+use crate::{number, stored};
 use serde_json::Value;
 
 /// The row of a method whose setting errs least, and its setting.
@@ -57,15 +57,10 @@ fn method(shown: &str) -> &str {
 
 #[test]
 fn accuracy_of_samples() {
-    let page = page("docs/benchmarks.md");
-    let mut wrong = Vec::new();
     let models = ["bunny_watertight", "armadillo_86k"];
     let large = models.map(|model| stored(&format!("accuracy/speed_accuracy_{model}.json")));
-    Table::new(&page, "<details><summary>Two large models").check(
-        &mut wrong,
-        |_| true,
-        |name, k| Some(of_accuracy(&large[k], name)),
-    );
+    Table::read("docs/benchmarks.md", "<details><summary>Two large models")
+        .check(|name, k| Some(of_accuracy(&large[k], name)));
     let models = ["rabbit", "dilo", "octopus"];
     let small = models.map(|model| stored(&format!("accuracy/speed_accuracy_{model}.json")));
     let without_setting = |mut figures: Vec<f64>, is_exact: bool| {
@@ -75,23 +70,17 @@ fn accuracy_of_samples() {
         }
         figures
     };
-    Table::new(&page, "<details><summary>Small models").check(
-        &mut wrong,
-        |_| true,
-        |name, k| {
-            Some(match name {
-                "paper, 256²" => {
-                    let is_it =
-                        |row: &&Value| row["variant"] == "paper" && row["resolution"] == 256;
-                    let row = small[k].iter().find(is_it)?;
-                    let keys = ["error_pct", "false_negative_pct", "median_ms"];
-                    keys.map(|key| number(row, key)).to_vec()
-                }
-                name => without_setting(of_accuracy(&small[k], name), name.starts_with('`')),
-            })
-        },
-    );
-    done(wrong);
+    Table::read("docs/benchmarks.md", "<details><summary>Small models").check(|name, k| {
+        Some(match name {
+            "paper, 256²" => {
+                let is_it = |row: &&Value| row["variant"] == "paper" && row["resolution"] == 256;
+                let row = small[k].iter().find(is_it)?;
+                let keys = ["error_pct", "false_negative_pct", "median_ms"];
+                keys.map(|key| number(row, key)).to_vec()
+            }
+            name => without_setting(of_accuracy(&small[k], name), name.starts_with('`')),
+        })
+    });
 }
 
 /// Error, false negatives, the deepest of them, milliseconds of all cases of a model.
@@ -122,8 +111,6 @@ pub(crate) fn of_all_cases(model: &str, name: &str) -> Option<Vec<f64>> {
 
 #[test]
 fn accuracy_of_all_cases() {
-    let page = page("docs/benchmarks.md");
-    let mut wrong = Vec::new();
     let models = [
         "bunny_watertight",
         "armadillo_86k",
@@ -131,10 +118,6 @@ fn accuracy_of_all_cases() {
         "dilo",
         "octopus",
     ];
-    Table::new(&page, "<details><summary>All 27,900 cases").check(
-        &mut wrong,
-        |_| true,
-        |name, k| of_all_cases(models[k], name),
-    );
-    done(wrong);
+    Table::read("docs/benchmarks.md", "<details><summary>All 27,900 cases")
+        .check(|name, k| of_all_cases(models[k], name));
 }

@@ -1,19 +1,16 @@
 //! What a batch costs the host, on the page of the day with a GPU.
 
 use crate::table::Table;
-use crate::{done, number, page, stored_file};
+use crate::{number, stored_file};
 
 /// The rows of the present version. Those of earlier ones have no stored file.
 #[test]
 fn host_costs() {
-    let page = page("docs/gpu_day.md");
     let file = stored_file("gpu_day/llvmpipe_small.json");
     let rows = file["host_costs"].as_array().expect("rows");
-    let mut wrong = Vec::new();
-    Table::new(&page, "## Host costs").check(
-        &mut wrong,
-        |name| name.contains(", now, "),
-        |name, k| {
+    Table::read("docs/gpu_day.md", "## Host costs")
+        .only(|name| name.contains(", now, "))
+        .check(|name, k| {
             let frame = match name.contains("first frame") {
                 true => "cold",
                 false => "new points",
@@ -26,7 +23,5 @@ fn host_costs() {
             let keys = ["uploaded", "read_back", "filled", "dispatches", "redos"];
             let unit = if k < 3 { 1e6 } else { 1.0 };
             Some(vec![number(row, keys.get(k)?) / unit])
-        },
-    );
-    done(wrong);
+        });
 }

@@ -34,12 +34,3 @@ fn number(row: &Value, key: &str) -> f64 {
     let value = &row[key];
     value.as_f64().unwrap_or_else(|| panic!("{key} of {row}"))
 }
-
-fn done(wrong: Vec<String>) {
-    assert!(
-        wrong.is_empty(),
-        "{} are wrong:\n{}",
-        wrong.len(),
-        wrong.join("\n")
-    );
-}

@@ -1,5 +1,7 @@
 //! Tables of a page, and numbers as they are written.
 
+use crate::page;
+
 /// The numbers in a text, as written.
 pub(crate) fn numbers(text: &str) -> Vec<String> {
     let mut all = Vec::new();
@@ -25,48 +27,57 @@ pub(crate) fn is_rounded(shown: &str, value: f64) -> bool {
     (parsed - value).abs() <= 0.5 * step * (1.0 + 1e-6)
 }
 
-/// A table of a page: the first one behind `caption`.
-pub(crate) struct Table<'a> {
-    pub(crate) caption: &'a str,
-    pub(crate) rows: Vec<Vec<&'a str>>,
+/// A table of a page.
+pub(crate) struct Table {
+    caption: String,
+    /// Cells of each row below the head.
+    pub(crate) rows: Vec<Vec<String>>,
 }
 
-impl<'a> Table<'a> {
-    pub(crate) fn new(page: &'a str, caption: &'a str) -> Self {
-        let (_, behind) = (page.split_once(caption)).unwrap_or_else(|| panic!("no {caption:?}"));
-        let lines = behind.lines().map(str::trim);
+impl Table {
+    /// The first one from `caption` on, which may be the beginning of its head.
+    pub(crate) fn read(page_name: &str, caption: &str) -> Self {
+        let page = page(page_name);
+        let start = page.find(caption);
+        let start = start.unwrap_or_else(|| panic!("{page_name}: no {caption:?}"));
+        let lines = page[start..].lines().map(str::trim);
         let table = lines.skip_while(|line| !line.starts_with('|'));
-        let rows = table.take_while(|line| line.starts_with('|'));
-        let cells = |line: &'a str| line.trim_matches('|').split('|').map(str::trim).collect();
+        let rows = table.take_while(|line| line.starts_with('|')).skip(2);
+        let cells = |line: &str| {
+            let cells = line.trim_matches('|').split('|');
+            cells.map(|cell| cell.trim().to_owned()).collect()
+        };
         Self {
-            caption,
+            caption: caption.to_owned(),
             rows: rows.map(cells).collect(),
         }
     }
 
+    /// Only the rows of these names: others are about nothing measured.
+    pub(crate) fn only(mut self, is_row: impl Fn(&str) -> bool) -> Self {
+        self.rows.retain(|row| is_row(&row[0]));
+        self
+    }
+
     /// Compares every cell behind the first of every row with what `expected` has for the row's name and the cell's
-    /// number. `None`: the cell has no number. Rows that are about nothing measured have no entry (`is_row`).
-    pub(crate) fn check(
-        &self,
-        wrong: &mut Vec<String>,
-        is_row: impl Fn(&str) -> bool,
-        expected: impl Fn(&str, usize) -> Option<Vec<f64>>,
-    ) {
-        let mut checked = 0;
-        for row in self.rows.iter().skip(2).filter(|row| is_row(row[0])) {
+    /// number. `None`: the cell has no number.
+    pub(crate) fn check(&self, expected: impl Fn(&str, usize) -> Option<Vec<f64>>) {
+        let (mut checked, mut wrong) = (0, Vec::new());
+        for row in &self.rows {
             for (k, cell) in row[1..].iter().enumerate() {
-                let expected = expected(row[0], k).unwrap_or_default();
+                let expected = expected(&row[0], k).unwrap_or_default();
                 let shown = numbers(cell);
                 let agree = shown.len() == expected.len()
                     && shown.iter().zip(&expected).all(|(s, v)| is_rounded(s, *v));
                 if !agree {
-                    let Self { caption, .. } = self;
-                    wrong.push(format!("{caption}: {}: {cell:?} is {expected:.4?}", row[0]));
+                    wrong.push(format!("{}: {cell:?} is {expected:.4?}", row[0]));
                 }
                 checked += 1;
             }
         }
-        assert!(checked > 3, "{}: {checked} cells", self.caption);
+        let caption = &self.caption;
+        assert!(wrong.is_empty(), "{caption}:\n{}", wrong.join("\n"));
+        assert!(checked > 3, "{caption}: {checked} cells");
     }
 }
 
