@@ -189,8 +189,7 @@ fn only_the_core_passes_over_roughness() {
     let bare = floor.cloud(R);
     assert_eq!(cast(&bare, true), None);
     assert!(cast(&bare, false).is_some(), "the floor is not rough");
-    floor.points.extend(&wall.points);
-    floor.normals.extend(&wall.normals);
+    floor.extend(&wall);
     let met = cast(&floor.cloud(R), true).expect("the wall is met");
     assert!((met.distance - 0.5).abs() < 0.2 * R, "{met:?}");
     assert!(met.normal.x < -0.99, "{met:?}");
@@ -207,8 +206,7 @@ fn what_touches_is_met_only_head_on() {
         Quat::from_rotation_z(std::f32::consts::FRAC_PI_2),
     ));
     let mut room = sampled_plane(0.6, R, &mut rng);
-    room.points.extend(&wall.points);
-    room.normals.extend(&wall.normals);
+    room.extend(&wall);
     let room = room.bare_cloud(R);
     let ball = sampled_sphere(0.05, R).cloud(R);
     let start = Pose3::translation(0.0, 0.051, 0.0);
@@ -248,8 +246,7 @@ fn what_is_inside_leaves() {
     assert_eq!(found, None);
     let mut with_lid = solid.clone();
     let lid = sampled_plane(0.6, R, &mut rng).moved(&Pose3::translation(0.0, 1.0, 0.0));
-    with_lid.points.extend(&lid.points);
-    with_lid.normals.extend(&lid.normals);
+    with_lid.extend(&lid);
     let with_lid = with_lid.cloud(R);
     let found = impact(&query(
         Surface::Cloud(&with_lid),

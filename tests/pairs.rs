@@ -386,8 +386,7 @@ fn far_pairs_are_rejected_early() {
         for sign in [1.0, -1.0] {
             let at = Pose3::translation(sign * x, sign * 0.2, 0.0);
             let ball = sampled_sphere(0.05, R).moved(&at);
-            balls.points.extend(ball.points);
-            balls.normals.extend(ball.normals);
+            balls.extend(&ball);
         }
         balls.cloud(R)
     };

@@ -30,9 +30,7 @@ fn by_default(batch: &[PairQuery<'_>]) -> Vec<PairResult> {
 /// Clouds much finer than the pixels, of which both take the same points.
 #[test]
 fn thinned_clouds_are_those_of_the_cpu() {
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(mut gpu) = gpu_backend() else { return };
     let pairs = random_pairs(200..220);
     let mut batch = pair_queries(&pairs);
     for query in &mut batch {
@@ -48,9 +46,7 @@ fn thinned_clouds_are_those_of_the_cpu() {
 /// the ball, and the same every time, although points come in any order.
 #[test]
 fn crowds_are_represented_evenly() {
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(mut gpu) = gpu_backend() else { return };
     // 36 points in a square of a radius: 1,000 within the neighbourhood's radius of 3 R, and 2,900 in the cells that hold it.
     let middle = Vec3::new(0.0, 10.0 * R, 0.0);
     let ball = sampled_sphere(10.0 * R, R / 6.0).bare_cloud(R);
@@ -87,9 +83,7 @@ fn crowds_are_represented_evenly() {
 /// What such views show is compared by the least gap.
 #[test]
 fn contacts_are_those_of_the_cpu() {
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(mut gpu) = gpu_backend() else { return };
     for seeds in [0..120, 9000..9120, 20_000..20_120, 30_000..30_120] {
         let pairs = random_pairs(seeds.clone());
         let batch = pair_queries(&pairs);
@@ -114,9 +108,7 @@ fn contacts_are_those_of_the_cpu() {
 /// are powers of two, nothing is rounded before the layers: pixels are equal, one by one.
 #[test]
 fn pixels_are_equal_where_nothing_is_rounded() {
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(mut gpu) = gpu_backend() else { return };
     let pixel = 1.0 / 64.0;
     for seed in 0..12 {
         let mut rng = fastrand::Rng::with_seed(seed);
@@ -158,9 +150,7 @@ fn pixels_are_equal_where_nothing_is_rounded() {
 /// All camera policies, with motion and memory.
 #[test]
 fn policies_are_those_of_the_cpu() {
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(mut gpu) = gpu_backend() else { return };
     let pairs = random_pairs(200..230);
     for policy in [
         CameraPolicy::ContactZone,
@@ -197,9 +187,7 @@ fn policies_are_those_of_the_cpu() {
 /// what was compared before.
 #[test]
 fn results_are_the_same_every_time() {
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(mut gpu) = gpu_backend() else { return };
     let pairs = random_pairs(300..316);
     let batch = pair_queries(&pairs);
     let first = compare_on(&mut gpu, &batch);
@@ -212,9 +200,7 @@ fn results_are_the_same_every_time() {
 /// Buffers that are too small for a batch are found out, grown, and the batch is redone.
 #[test]
 fn batches_that_outgrow_the_buffers_are_redone() {
-    let Some(gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(gpu) = gpu_backend() else { return };
     let mut rng = fastrand::Rng::with_seed(5);
     let sheet = |rng: &mut fastrand::Rng| sampled_plane(1.0, 0.004, rng).cloud(0.004);
     let (a, b) = (sheet(&mut rng), sheet(&mut rng));
@@ -279,9 +265,7 @@ fn what_the_gpu_does_not_take_the_cpu_compares() {
 /// New points are uploaded, and old ones are not mistaken for them.
 #[test]
 fn clouds_follow_their_points() {
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(mut gpu) = gpu_backend() else { return };
     let mut rng = fastrand::Rng::with_seed(9);
     let floor = sampled_plane(0.5, R, &mut rng).cloud(R);
     let mut ball = sampled_sphere(0.2, R).bare_cloud(R).into_owned();
@@ -337,9 +321,7 @@ fn a_lost_device_loses_nothing() {
 /// Small batches are the CPU's.
 #[test]
 fn small_batches_stay_on_the_cpu() {
-    let Some(gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(gpu) = gpu_backend() else { return };
     let pairs = random_pairs(500..502);
     let batch = pair_queries(&pairs);
     let mut auto = AutoBackend::with_gpu(gpu, 1_000_000);
@@ -350,9 +332,7 @@ fn small_batches_stay_on_the_cpu() {
 /// The frame of a view follows its axis, whatever the signs of its zeros.
 #[test]
 fn views_along_the_axes_have_the_frames_of_the_cpu() {
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(mut gpu) = gpu_backend() else { return };
     let mut rng = fastrand::Rng::with_seed(11);
     let (a, b) = (
         sampled_plane(0.3, R, &mut rng).bare_cloud(R),
@@ -389,9 +369,7 @@ fn views_along_the_axes_have_the_frames_of_the_cpu() {
 /// What the CPU refuses, the GPU does, by the same words and the place in the batch.
 #[test]
 fn bad_queries_are_refused_as_by_the_cpu() {
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(mut gpu) = gpu_backend() else { return };
     let pairs = random_pairs(700..702);
     let good = pair_queries(&pairs);
     let moving = |motion| View::Aim {

@@ -135,8 +135,7 @@ fn a_ball_in_a_groove_is_pushed_by_its_walls() {
             let wall = sampled_plane(30.0 * R, R, &mut rng);
             let wall = wall.moved(&Pose3::from_parts(turn * (side * 15.0 * R * Vec3::X), turn));
             walls.push(wall.normals[0]);
-            groove.points.extend(wall.points);
-            groove.normals.extend(wall.normals);
+            groove.extend(&wall);
         }
         let turned = Pose3::from_rotation(random_pose(&mut rng, 0.0).rotation);
         let groove = groove.moved(&turned).cloud(R);
@@ -308,8 +307,7 @@ fn a_dumbbell_touches_in_two_spots() {
         let ball = sampled_sphere(radius, R);
         let mut body = ball.moved(&Pose3::from_translation(apart * Vec3::X));
         let other = ball.moved(&Pose3::from_translation(-apart * Vec3::X));
-        body.points.extend(other.points);
-        body.normals.extend(other.normals);
+        body.extend(&other);
         let turn = Quat::from_rotation_y(TAU * rng.f32()) * Quat::from_rotation_x(TAU * rng.f32());
         let depth = 0.2 * R * rng.f32();
         let place = (radius - depth) * Vec3::Y;

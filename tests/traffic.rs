@@ -43,9 +43,7 @@ fn a_first_batch_is_not_redone() {
         let samples = sampled_sphere(0.5, spacing);
         for cloud in [samples.bare_cloud(spacing), samples.cloud(spacing)] {
             for share in [SLIGHT, DEEP] {
-                let Some(mut backend) = fresh() else {
-                    return;
-                };
+                let Some(mut backend) = fresh() else { return };
                 let query = PairQuery {
                     params: Params::for_radius(spacing),
                     ..apart(&cloud, share)
@@ -72,9 +70,7 @@ fn new_points_are_uploaded_as_they_are() {
     let differing = PointCloud::builder(samples.points.clone()).radii(radii);
     let differing = differing.build().expect("they are valid");
     for (cloud, bytes) in [(bare, 12), (differing, 16), (samples.cloud(R), 24)] {
-        let Some(mut backend) = fresh() else {
-            return;
-        };
+        let Some(mut backend) = fresh() else { return };
         // All are in reach.
         let query = apart(&cloud, 0.0);
         compare_on(&mut backend, &[query]);
@@ -144,9 +140,7 @@ fn only_blocks_in_reach_are_uploaded() {
 fn further_views_are_drawn_where_the_first_show_no_crossing() {
     let samples = ball();
     for (cloud, before, round) in [(samples.bare_cloud(R), 6, 12), (samples.cloud(R), 4, 10)] {
-        let Some(mut backend) = fresh() else {
-            return;
-        };
+        let Some(mut backend) = fresh() else { return };
         let found = compare_on(&mut backend, &[apart(&cloud, DEEP)]);
         assert!(found[0].collides);
         assert_eq!(backend.traffic().dispatches, before + round);
@@ -175,9 +169,7 @@ fn further_views_are_drawn_where_the_first_show_no_crossing() {
 /// in a second copy, and nothing is missing.
 #[test]
 fn only_what_was_found_is_read_back() {
-    let Some(mut backend) = fresh() else {
-        return;
-    };
+    let Some(mut backend) = fresh() else { return };
     let ball = ball().bare_cloud(R);
     let far = apart(&ball, 0.999);
     let deep = apart(&ball, DEEP);
@@ -212,9 +204,7 @@ fn only_what_was_found_is_read_back() {
 /// What is filled does not grow with the buffers of earlier batches.
 #[test]
 fn only_what_is_used_is_filled() {
-    let Some(mut backend) = fresh() else {
-        return;
-    };
+    let Some(mut backend) = fresh() else { return };
     let ball = ball().bare_cloud(R);
     let slight = apart(&ball, SLIGHT);
     compare_on(&mut backend, &[slight]);
@@ -223,9 +213,7 @@ fn only_what_is_used_is_filled() {
     let expected = compare_on(&mut backend, &[slight]);
     assert_eq!(backend.traffic().filled, filled);
     // And what earlier batches left behind is not mistaken for this one's.
-    let Some(mut other) = fresh() else {
-        return;
-    };
+    let Some(mut other) = fresh() else { return };
     assert_eq!(expected, compare_on(&mut other, &[slight]));
     assert_eq!(backend.needed_elements(), other.needed_elements());
 }

@@ -32,9 +32,7 @@ fn walls_are_pierced_by_what_goes_on_behind_them() {
             assert_eq!(result.collides, beyond < 0.0, "{beyond}");
         }
     }
-    let Some(mut gpu) = gpu_backend() else {
-        return;
-    };
+    let Some(mut gpu) = gpu_backend() else { return };
     let gpu = compare_on(&mut gpu, &batch);
     let both = cpu.iter().zip(&gpu);
     // Where a splat ends within rounding of a pixel's middle.

@@ -76,13 +76,10 @@ pub(crate) fn draw(rows: &[AccuracyRow], suffix: &str, folder: &Path) -> anyhow:
         .with_context(|| format!("cannot draw {}", png.display()))
 }
 
-fn paint<B: DrawingBackend>(
+fn paint<B: DrawingBackend<ErrorType: 'static>>(
     rows: &[AccuracyRow],
     area: &DrawingArea<B, Shift>,
-) -> anyhow::Result<()>
-where
-    B::ErrorType: 'static,
-{
+) -> anyhow::Result<()> {
     area.fill(&WHITE)?;
     let area = area.titled(
         "Contacts against analytic truth, by the angle between the motion and the true normal",
@@ -107,14 +104,11 @@ where
     Ok(())
 }
 
-fn paint_panel<B: DrawingBackend>(
+fn paint_panel<B: DrawingBackend<ErrorType: 'static>>(
     rows: &[AccuracyRow],
     panel: &Panel,
     area: &DrawingArea<B, Shift>,
-) -> anyhow::Result<()>
-where
-    B::ErrorType: 'static,
-{
+) -> anyhow::Result<()> {
     let mut chart = ChartBuilder::on(area)
         .caption(panel.title, (FONT, 17))
         .margin(10)

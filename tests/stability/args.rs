@@ -79,7 +79,7 @@ impl Args {
         }
     }
 
-    /// How to run; the method is that of each row.
+    /// How to run; method and seed are those of each row.
     pub(crate) fn setup(&self) -> Setup {
         Setup {
             method: Method::Tldi,
@@ -89,6 +89,7 @@ impl Args {
             },
             backend: self.backend,
             trace: self.trace,
+            seed: self.seed,
         }
     }
 
@@ -109,7 +110,7 @@ impl Args {
         let cases: Vec<Case> = SCENES
             .iter()
             .filter(|scene| self.scene.is_empty() || self.scene.iter().any(|n| n == scene.name))
-            .flat_map(|scene| (scene.cases)(scale))
+            .flat_map(|scene| scene.all_cases(scale))
             .filter(|case| {
                 self.case
                     .as_ref()

@@ -1,6 +1,7 @@
 //! Scenes, their cases, and what a case finds.
 
 use super::method::Method;
+use fastrand::Rng;
 use rapier3d_tldi::TldiConfig;
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -17,9 +18,16 @@ pub(crate) struct Setup {
     pub(crate) backend: BackendChoice,
     /// Whether every step is written to stderr.
     pub(crate) trace: bool,
+    /// Seed of everything random in the case.
+    pub(crate) seed: u64,
 }
 
 impl Setup {
+    /// Random numbers of the case, from the first on.
+    pub(crate) fn rng(&self) -> Rng {
+        Rng::with_seed(self.seed)
+    }
+
     /// The same run with rapier's primitives, untraced.
     pub(crate) fn of_primitive(&self) -> Self {
         Self {
@@ -58,8 +66,40 @@ pub(crate) struct Scene {
     pub(crate) about: &'static str,
     /// What passes.
     pub(crate) rule: &'static str,
-    /// Its cases.
-    pub(crate) cases: fn(&Scale) -> Vec<Case>,
+    /// Adds its cases of one seed.
+    pub(crate) cases: fn(&Scale, &mut Cases),
+}
+
+impl Scene {
+    /// The cases of all seeds.
+    pub(crate) fn all_cases(&self, scale: &Scale) -> Vec<Case> {
+        let mut cases = Cases(Vec::new());
+        let mut all = Vec::new();
+        for &seed in &scale.seeds {
+            (self.cases)(scale, &mut cases);
+            all.extend(cases.0.drain(..).map(|(name, run)| Case {
+                scene: self.name,
+                name,
+                seed,
+                run,
+            }));
+        }
+        all
+    }
+}
+
+/// Names within a scene, and what carries the cases out.
+pub(crate) struct Cases(Vec<(String, Box<Run>)>);
+
+impl Cases {
+    /// Adds a case that `run` carries out.
+    pub(crate) fn add(
+        &mut self,
+        name: impl Into<String>,
+        run: impl Fn(&Setup, &mut Verdict) -> Result<(), Stop> + Send + Sync + 'static,
+    ) {
+        self.0.push((name.into(), Box::new(run)));
+    }
 }
 
 type Run = dyn Fn(&Setup, &mut Verdict) -> Result<(), Stop> + Send + Sync;
@@ -76,25 +116,11 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    /// A case that `run` carries out.
-    pub(crate) fn new(
-        scene: &'static str,
-        name: impl Into<String>,
-        seed: u64,
-        run: impl Fn(&Setup, &mut Verdict) -> Result<(), Stop> + Send + Sync + 'static,
-    ) -> Self {
-        Self {
-            scene,
-            name: name.into(),
-            seed,
-            run: Box::new(run),
-        }
-    }
-
-    /// Runs it with one method.
+    /// Runs it with one method, and its own seed.
     pub(crate) fn run(&self, setup: &Setup) -> Result<Verdict, Stop> {
         let mut verdict = Verdict::default();
-        (self.run)(setup, &mut verdict)?;
+        let seed = self.seed;
+        (self.run)(&Setup { seed, ..*setup }, &mut verdict)?;
         Ok(verdict)
     }
 }
@@ -175,6 +201,14 @@ impl Verdict {
     pub(crate) fn require(&mut self, name: &str, holds: bool, otherwise: impl FnOnce() -> String) {
         if !holds {
             self.fail(name, otherwise());
+        }
+    }
+
+    /// A body must fall asleep within `limit` seconds; `after` tells when it did.
+    pub(crate) fn asleep_within(&mut self, limit: f64, after: Option<f32>) {
+        match after {
+            Some(seconds) => self.at_most("asleep_after_s", seconds, limit),
+            None => self.require("asleep_after_s", false, || "never asleep".into()),
         }
     }
 

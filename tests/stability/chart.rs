@@ -31,13 +31,10 @@ pub(crate) fn draw(report: &Report, folder: &Path) -> anyhow::Result<()> {
         .with_context(|| format!("cannot draw {}", png.display()))
 }
 
-fn paint<B: DrawingBackend>(
+fn paint<B: DrawingBackend<ErrorType: 'static>>(
     report: &Report,
     area: &DrawingArea<B, plotters::coord::Shift>,
-) -> anyhow::Result<()>
-where
-    B::ErrorType: 'static,
-{
+) -> anyhow::Result<()> {
     area.fill(&WHITE)?;
     let style = |size: i32, horizontal: HPos| {
         (FONT, size)

@@ -68,15 +68,14 @@ mod tests {
     }
 
     fn cases_of(scene: &str) -> Vec<Case> {
-        let is_it = |case: &Case| case.scene == scene;
-        let all = SCENES.iter().flat_map(|scene| (scene.cases)(&scale()));
-        all.filter(is_it).collect()
+        let scene = SCENES.iter().find(|known| known.name == scene);
+        scene.expect("there is one").all_cases(&scale())
     }
 
     #[test]
     fn rows_have_names_of_their_own() {
         let mut seen = HashSet::new();
-        for case in SCENES.iter().flat_map(|scene| (scene.cases)(&scale())) {
+        for case in SCENES.iter().flat_map(|scene| scene.all_cases(&scale())) {
             let name = (case.scene, case.name.clone(), case.seed);
             assert!(seen.insert(name.clone()), "{name:?} occurs twice");
         }
@@ -89,6 +88,7 @@ mod tests {
             config: TldiConfig::default(),
             backend: BackendChoice::Cpu,
             trace: false,
+            seed: 0,
         };
         for scene in ["bounce", "tunnelling"] {
             let run = || run_all(cases_of(scene), &Method::ALL, &setup);

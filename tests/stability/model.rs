@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::sync::LazyLock;
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi_sources::{ReadOptions, read};
-use tldi_tests::{Samples, data_file};
+use tldi_tests::{Samples, data_file, scale_to};
 
 /// The Stanford Bunny.
 const BUNNY: &str = "stanford/bunny_watertight.ply.gz";
@@ -17,11 +17,10 @@ static BUNNY_MESH: LazyLock<Mesh> = LazyLock::new(|| {
     let Some(path) = data_file(BUNNY) else {
         return pebble();
     };
-    let raw = read(&path, &ReadOptions::default()).expect("the test data can be read");
-    let (lo, hi) = bounds(&raw.points);
-    let (middle, scale) = (0.5 * (lo + hi), (hi - lo).max_element().recip());
+    let mut raw = read(&path, &ReadOptions::default()).expect("the test data can be read");
+    scale_to(&mut raw.points, 1.0);
     Mesh {
-        vertices: raw.points.iter().map(|p| (*p - middle) * scale).collect(),
+        vertices: raw.points,
         triangles: raw.faces,
         one_sided: true,
     }
@@ -30,15 +29,6 @@ static BUNNY_MESH: LazyLock<Mesh> = LazyLock::new(|| {
 /// Whether the bunny is at hand.
 pub(crate) fn has_bunny() -> bool {
     data_file(BUNNY).is_some()
-}
-
-/// Corners of the bounds.
-pub(crate) fn bounds(points: &[Vec3]) -> (Vec3, Vec3) {
-    points
-        .iter()
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| {
-            (lo.min(*p), hi.max(*p))
-        })
 }
 
 /// A body of the bunny's shape with a largest extent of `size` metres: of the vertices in each cube

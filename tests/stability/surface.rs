@@ -23,6 +23,42 @@ pub(crate) enum Normals {
     Seen(Vec3),
 }
 
+impl Normals {
+    /// With true normals and without, and how cases are named then.
+    pub(crate) const GIVEN_OR_NOT: [(Self, &'static str); 2] =
+        [(Self::Given, "oriented"), (Self::Absent, "bare")];
+}
+
+/// A body as wide as it is high and deep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Solid {
+    /// A cube.
+    Box,
+    /// A sphere.
+    Ball,
+}
+
+impl Solid {
+    /// Both.
+    pub(crate) const ALL: [Self; 2] = [Self::Box, Self::Ball];
+
+    /// Name in cases.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Ball => "ball",
+        }
+    }
+
+    /// Its surface about the origin, `half` its size in metres, with points `spacing` metres apart.
+    pub(crate) fn surface(self, half: f32, spacing: f32, rng: &mut fastrand::Rng) -> Surface {
+        match self {
+            Self::Box => Surface::cuboid(Vec3::splat(half), spacing, rng),
+            Self::Ball => Surface::ball(half, spacing),
+        }
+    }
+}
+
 /// What the radii of a cloud are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Radius {
@@ -252,8 +288,7 @@ impl Surface {
     /// first.
     #[must_use]
     pub(crate) fn joined(mut self, other: &Self) -> Self {
-        self.samples.points.extend(&other.samples.points);
-        self.samples.normals.extend(&other.samples.normals);
+        self.samples.extend(&other.samples);
         if let (Ok(mesh), Ok(more)) = (&mut self.mesh, &other.mesh) {
             let first = mesh.vertices.len() as u32;
             mesh.vertices.extend(&more.vertices);

@@ -2,7 +2,8 @@
 
 use crate::skip::test_data;
 use std::path::PathBuf;
-use tldi::PointCloud;
+use tldi::glamx::Vec3;
+use tldi::{Aabb, PointCloud};
 
 /// The path of a file of the test data, or `None` (said loudly) where it is absent: see [`test_data`].
 ///
@@ -18,19 +19,21 @@ pub fn load_cloud(name: &str, size: f32) -> Option<PointCloud<'static>> {
     let path = data_file(name)?;
     let mut raw = tldi_sources::read(&path, &tldi_sources::ReadOptions::default())
         .expect("the test data can be read");
-    let (lo, hi) = raw.points.iter().fold(
-        (tldi::glamx::Vec3::INFINITY, tldi::glamx::Vec3::NEG_INFINITY),
-        |(lo, hi), p| (lo.min(*p), hi.max(*p)),
-    );
-    let scale = size / (hi - lo).max_element();
-    let middle = 0.5 * (lo + hi);
-    for p in &mut raw.points {
-        *p = (*p - middle) * scale;
-    }
+    scale_to(&mut raw.points, size);
     Some(
         raw.into_builder()
             .knn_radii(7, 0.65)
             .build()
             .expect("the test data is valid"),
     )
+}
+
+/// Moves points so that the middle of their bounds is the origin, and scales them so that their largest extent is `size`
+/// metres.
+pub fn scale_to(points: &mut [Vec3], size: f32) {
+    let bounds = (points.iter()).fold(Aabb::EMPTY, |all, p| all.including(*p));
+    let (middle, scale) = (bounds.center(), size / bounds.extents().max_element());
+    for p in points {
+        *p = (*p - middle) * scale;
+    }
 }

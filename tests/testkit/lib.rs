@@ -22,7 +22,7 @@ pub use accuracy::{
     measure_accuracy,
 };
 pub use backend::{compare_batch, compare_on, gpu_backend};
-pub use data::{data_file, load_cloud};
+pub use data::{data_file, load_cloud, scale_to};
 pub use half_space::HalfSpace;
 pub use host::Host;
 pub use oracle::{OracleFragment, OracleLayer, OracleSurface, oracle_layers};

@@ -1,6 +1,8 @@
 //! Closed clouds that overlap at random, and how deep they are told to be beside the least way out.
 
-use crate::{WayOut, compare_batch, data_file, deepest_contact, random_pose, random_unit};
+use crate::{
+    WayOut, compare_batch, data_file, deepest_contact, random_pose, random_unit, scale_to,
+};
 use rapier3d::prelude::SharedShape;
 use rapier3d_tldi::sample_shape;
 use rayon::prelude::*;
@@ -70,12 +72,7 @@ impl ClosedShape {
     fn model(name: &'static str, file: &str) -> Option<Self> {
         let mut raw = tldi_sources::read(&data_file(file)?, &Default::default())
             .expect("the test data can be read");
-        let bounds = |(lo, hi): (Vec3, Vec3), p: &Vec3| (lo.min(*p), hi.max(*p));
-        let (lo, hi) = (raw.points.iter()).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), bounds);
-        let scale = MODEL / (hi - lo).max_element();
-        for p in &mut raw.points {
-            *p = (*p - 0.5 * (lo + hi)) * scale;
-        }
+        scale_to(&mut raw.points, MODEL);
         let bare = (PointCloud::builder(raw.points.clone())
             .knn_radii(7, 0.65)
             .build())

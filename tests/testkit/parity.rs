@@ -95,12 +95,17 @@ impl Difference {
     /// Between results of the same batch of [`pair_queries`].
     pub fn between(first: &[PairResult], second: &[PairResult]) -> Self {
         let mut all = Self::default();
+        all.add_batch(first, second);
+        all
+    }
+
+    /// Adds those between results of another batch.
+    pub fn add_batch(&mut self, first: &[PairResult], second: &[PairResult]) {
         for (p, q) in first.iter().zip(second) {
-            all.add(p, q);
+            self.add(p, q);
         }
         let greatest = |values: &[f32]| values.iter().copied().fold(0.0, f32::max);
-        (all.gap, all.axis) = (greatest(&all.gaps), greatest(&all.axes));
-        all
+        (self.gap, self.axis) = (greatest(&self.gaps), greatest(&self.axes));
     }
 
     fn add(&mut self, first: &PairResult, second: &PairResult) {

@@ -38,6 +38,19 @@ impl Samples {
         }
     }
 
+    /// Keeps only the points of which `is_kept` holds.
+    pub fn retain(&mut self, is_kept: impl Fn(&Vec3) -> bool) {
+        let mut kept = self.points.iter().map(&is_kept);
+        self.normals.retain(|_| kept.next() == Some(true));
+        self.points.retain(is_kept);
+    }
+
+    /// Adds the points of another surface.
+    pub fn extend(&mut self, other: &Self) {
+        self.points.extend(&other.points);
+        self.normals.extend(&other.normals);
+    }
+
     fn push(&mut self, point: Vec3, normal: Vec3) {
         self.points.push(point);
         self.normals.push(normal);

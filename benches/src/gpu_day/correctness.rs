@@ -120,14 +120,7 @@ impl Correctness {
             let batch = pair_queries(&pairs);
             let mut on_cpu = Vec::new();
             CpuBackend::without_first_look().compare(&batch, &mut on_cpu)?;
-            let some = Difference::between(&on_cpu, &compared(&mut backend, &batch)?);
-            all.pairs += some.pairs;
-            all.answers += some.answers;
-            all.turned += some.turned;
-            all.contacts += some.contacts;
-            all.other_contacts += some.other_contacts;
-            all.gaps.extend(some.gaps);
-            all.axes.extend(some.axes);
+            all.add_batch(&on_cpu, &compared(&mut backend, &batch)?);
         }
         found.parity = (all.pairs > 0).then(|| Parity {
             pairs: all.pairs,

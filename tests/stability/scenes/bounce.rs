@@ -1,10 +1,9 @@
 //! Balls and boxes that rebound.
 
 use crate::suite::arena::{Arena, DT, GRAVITY, Material};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
 use crate::suite::method::Method;
-use crate::suite::surface::{Backing, Surface};
-use fastrand::Rng;
+use crate::suite::surface::{Backing, Solid, Surface};
 use rapier3d::prelude::*;
 use tldi::glamx::{Vec2, Vec3};
 
@@ -23,25 +22,20 @@ const SPACING: f32 = 0.02;
 const HALF: f32 = 0.1;
 const FALL: f32 = 1.0;
 
-fn cases(scale: &Scale) -> Vec<Case> {
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for is_ball in [true, false] {
-            for restitution in [0.0, 0.25, 0.5, 0.75, 1.0] {
-                let body = if is_ball { "ball" } else { "box" };
-                let name = format!("{body}, restitution {restitution}");
-                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                    bounce(setup, verdict, is_ball, restitution, seed)
-                }));
-            }
+fn cases(_: &Scale, cases: &mut Cases) {
+    for body in [Solid::Ball, Solid::Box] {
+        for restitution in [0.0, 0.25, 0.5, 0.75, 1.0] {
+            let name = format!("{}, restitution {restitution}", body.name());
+            cases.add(name, move |setup, verdict| {
+                bounce(setup, verdict, body, restitution)
+            });
         }
     }
-    cases
 }
 
 /// Height of the first rebound in metres, and most energy over the initial one.
-fn rebound(setup: &Setup, is_ball: bool, restitution: f32, seed: u64) -> Result<[f64; 2], Stop> {
-    let mut rng = Rng::with_seed(seed);
+fn rebound(setup: &Setup, solid: Solid, restitution: f32) -> Result<[f64; 2], Stop> {
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let material = Material {
         restitution,
@@ -49,11 +43,7 @@ fn rebound(setup: &Setup, is_ball: bool, restitution: f32, seed: u64) -> Result<
     };
     let floor = Surface::flat(Vec2::splat(0.8), SPACING, Backing::Solid, &mut rng);
     arena.insert(RigidBodyBuilder::fixed(), &floor, material)?;
-    let surface = if is_ball {
-        Surface::ball(HALF, SPACING)
-    } else {
-        Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng)
-    };
+    let surface = solid.surface(HALF, SPACING, &mut rng);
     let mass = surface.mass.map_or(0.0, |mass| mass.mass());
     let body = RigidBodyBuilder::dynamic()
         .translation(Vec3::Y * (HALF + FALL))
@@ -86,12 +76,11 @@ fn rebound(setup: &Setup, is_ball: bool, restitution: f32, seed: u64) -> Result<
 fn bounce(
     setup: &Setup,
     verdict: &mut Verdict,
-    is_ball: bool,
+    solid: Solid,
     restitution: f32,
-    seed: u64,
 ) -> Result<(), Stop> {
-    let [truth, _] = rebound(&setup.of_primitive(), is_ball, restitution, seed)?;
-    let [height, energy] = rebound(setup, is_ball, restitution, seed)?;
+    let [truth, _] = rebound(&setup.of_primitive(), solid, restitution)?;
+    let [height, energy] = rebound(setup, solid, restitution)?;
     let theory = f64::from(restitution * restitution * FALL);
     let tolerance = f64::from(0.03 * FALL);
     verdict.near("rebound_m", height, truth, tolerance);

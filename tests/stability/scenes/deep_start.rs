@@ -1,9 +1,8 @@
 //! Bodies that start inside a floor or inside each other.
 
 use crate::suite::arena::{Arena, DT, Material};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
-use crate::suite::surface::Surface;
-use fastrand::Rng;
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::surface::{Solid, Surface};
 use rapier3d::prelude::*;
 use tldi::glamx::Vec3;
 
@@ -23,50 +22,36 @@ const HALF: f32 = 0.1;
 const FLOOR_HALF: Vec3 = Vec3::new(0.5, 0.3, 0.5);
 const SECONDS: f32 = 3.0;
 
-fn cases(scale: &Scale) -> Vec<Case> {
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for is_ball in [false, true] {
-            for percent in [10, 30, 50, 80] {
-                let body = if is_ball { "ball" } else { "box" };
-                let share = percent as f32 / 100.0;
-                let name = format!("{body} in the floor, {percent} %");
-                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                    in_floor(setup, verdict, is_ball, share, seed)
-                }));
-                let name = format!("two {body}es, {percent} %").replace("balles", "balls");
-                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                    in_each_other(setup, verdict, is_ball, share, seed)
-                }));
-            }
+fn cases(_: &Scale, cases: &mut Cases) {
+    for solid in Solid::ALL {
+        for percent in [10, 30, 50, 80] {
+            let body = solid.name();
+            let share = percent as f32 / 100.0;
+            let name = format!("{body} in the floor, {percent} %");
+            cases.add(name, move |setup, verdict| {
+                in_floor(setup, verdict, solid, share)
+            });
+            let name = format!("two {body}es, {percent} %").replace("balles", "balls");
+            cases.add(name, move |setup, verdict| {
+                in_each_other(setup, verdict, solid, share)
+            });
         }
     }
-    cases
 }
 
-fn body(is_ball: bool, rng: &mut Rng) -> Surface {
-    if is_ball {
-        Surface::ball(HALF, SPACING)
-    } else {
-        Surface::cuboid(Vec3::splat(HALF), SPACING, rng)
-    }
-}
-
-fn in_floor(
-    setup: &Setup,
-    verdict: &mut Verdict,
-    is_ball: bool,
-    share: f32,
-    seed: u64,
-) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+fn in_floor(setup: &Setup, verdict: &mut Verdict, solid: Solid, share: f32) -> Result<(), Stop> {
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let floor = Surface::cuboid(FLOOR_HALF, SPACING, &mut rng);
     let below = RigidBodyBuilder::fixed().translation(Vec3::NEG_Y * FLOOR_HALF.y);
     arena.insert(below, &floor, Material::default())?;
     let depth = 2.0 * HALF * share;
     let builder = RigidBodyBuilder::dynamic().translation(Vec3::Y * (HALF - depth));
-    let placed = arena.insert(builder, &body(is_ball, &mut rng), Material::default())?;
+    let placed = arena.insert(
+        builder,
+        &solid.surface(HALF, SPACING, &mut rng),
+        Material::default(),
+    )?;
     let mut fastest = 0.0_f32;
     for _ in 0..(SECONDS / DT) as usize {
         arena.step()?;
@@ -82,28 +67,30 @@ fn in_floor(
 fn in_each_other(
     setup: &Setup,
     verdict: &mut Verdict,
-    is_ball: bool,
+    solid: Solid,
     share: f32,
-    seed: u64,
 ) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     arena.world.gravity = Vec3::ZERO;
     let offset = HALF * (1.0 - share);
     let mut placed = Vec::new();
     for side in [-1.0, 1.0] {
         let builder = RigidBodyBuilder::dynamic().translation(Vec3::X * (side * offset));
-        placed.push(arena.insert(builder, &body(is_ball, &mut rng), Material::default())?);
+        placed.push(arena.insert(
+            builder,
+            &solid.surface(HALF, SPACING, &mut rng),
+            Material::default(),
+        )?);
     }
     let mut fastest = 0.0_f32;
     let mut at_parting: Option<Vec3> = None;
     for _ in 0..(SECONDS / DT) as usize {
         arena.step()?;
         let apart = (arena.position(&placed[1]) - arena.position(&placed[0])).abs();
-        let distance = if is_ball {
-            apart.length()
-        } else {
-            apart.max_element()
+        let distance = match solid {
+            Solid::Ball => apart.length(),
+            Solid::Box => apart.max_element(),
         };
         if distance >= 2.0 * HALF - SPACING {
             at_parting.get_or_insert(apart);

@@ -1,7 +1,7 @@
 //! Clouds as sensors give them: uneven, with duplicates, flying pixels and range noise.
 
 use crate::suite::arena::{Arena, DT, Material};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
 use crate::suite::surface::{Backing, Normals, Radius, Surface};
 use fastrand::Rng;
 use rapier3d::prelude::*;
@@ -39,7 +39,7 @@ enum Flaw {
     KinectNoise,
 }
 
-fn cases(scale: &Scale) -> Vec<Case> {
+fn cases(_: &Scale, cases: &mut Cases) {
     let flaws = [
         (Flaw::Uneven { x: 0.0 }, "100:1, across the border"),
         (Flaw::Uneven { x: -0.15 }, "100:1, on the dense side"),
@@ -49,15 +49,9 @@ fn cases(scale: &Scale) -> Vec<Case> {
         (Flaw::FlyingPixels, "1 % flying pixels"),
         (Flaw::KinectNoise, "range noise of a Kinect at 1.5 m"),
     ];
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for (flaw, name) in flaws {
-            cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                rest(setup, verdict, flaw, seed)
-            }));
-        }
+    for (flaw, name) in flaws {
+        cases.add(name, move |setup, verdict| rest(setup, verdict, flaw));
     }
-    cases
 }
 
 /// Range noise of a Kinect at a distance in metres: deviation along the ray (Nguyen, Izadi and
@@ -115,8 +109,7 @@ fn floor(flaw: Flaw, rng: &mut Rng) -> Surface {
         Flaw::Repeated(times) => {
             let once = floor.samples.clone();
             for _ in 1..times {
-                floor.samples.points.extend(&once.points);
-                floor.samples.normals.extend(&once.normals);
+                floor.samples.extend(&once);
             }
         }
         Flaw::FlyingPixels => {
@@ -160,8 +153,8 @@ fn local_radius(floor: &Surface, at: Vec3) -> Result<f32, Stop> {
     Ok(sum / count as f32)
 }
 
-fn rest(setup: &Setup, verdict: &mut Verdict, flaw: Flaw, seed: u64) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+fn rest(setup: &Setup, verdict: &mut Verdict, flaw: Flaw) -> Result<(), Stop> {
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let floor = floor(flaw, &mut rng);
     arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;

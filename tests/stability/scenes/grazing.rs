@@ -2,7 +2,7 @@
 //! pixels lie.
 
 use crate::suite::arena::{Arena, Material};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
 use crate::suite::surface::{Backing, Normals, Surface};
 use fastrand::Rng;
 use rapier3d::prelude::*;
@@ -85,22 +85,18 @@ impl Pair {
     }
 }
 
-fn cases(scale: &Scale) -> Vec<Case> {
+fn cases(scale: &Scale, cases: &mut Cases) {
     let step_deg = scale.pick(5, 1);
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for pair in Pair::ALL {
-            for (normals, kind) in [(Normals::Given, "oriented"), (Normals::Absent, "bare")] {
-                for (axis, letter) in [(Vec3::X, "x"), (Vec3::Y, "y"), (Vec3::Z, "z")] {
-                    let name = format!("{}, {kind}, about {letter}", pair.name());
-                    cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                        turn(setup, verdict, pair, normals, axis, step_deg, seed)
-                    }));
-                }
+    for pair in Pair::ALL {
+        for (normals, kind) in Normals::GIVEN_OR_NOT {
+            for (axis, letter) in [(Vec3::X, "x"), (Vec3::Y, "y"), (Vec3::Z, "z")] {
+                let name = format!("{}, {kind}, about {letter}", pair.name());
+                cases.add(name, move |setup, verdict| {
+                    turn(setup, verdict, pair, normals, axis, step_deg)
+                });
             }
         }
     }
-    cases
 }
 
 /// Contacts of the first step, which are those of the poses before it: normals and gaps.
@@ -129,9 +125,8 @@ fn turn(
     normals: Normals,
     axis: Vec3,
     step_deg: usize,
-    seed: u64,
 ) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = setup.rng();
     let (body, sheet, middle, true_normals) = pair.parts(&mut rng);
     let sheet = sheet.with_normals(normals);
     let (gap_bound, normal_bound) = pair.bounds();

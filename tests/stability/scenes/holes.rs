@@ -1,12 +1,11 @@
 //! Holes in a floor, and the shadow behind what was scanned from one side.
 
 use crate::suite::arena::{Arena, DT, GRAVITY, Material};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
-use crate::suite::surface::{Backing, Mesh, Normals, Surface, slab};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::surface::{Backing, Mesh, Normals, Solid, Surface, slab};
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use tldi::glamx::{Quat, Vec2, Vec3};
-use tldi_tests::Samples;
 
 /// The scene.
 pub(crate) const SCENE: Scene = Scene {
@@ -26,46 +25,27 @@ const EDGE: f32 = 1.2;
 /// Turn of the box about the vertical, radians: it then cannot pass a hole of its own width.
 const TURN: f32 = 0.349;
 
-fn cases(scale: &Scale) -> Vec<Case> {
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for is_ball in [false, true] {
-            let body = if is_ball { "ball" } else { "box" };
-            let equal = if is_ball { 0.95 } else { 1.0 };
-            for ratio in [0.5, 0.8, equal, 1.75, 2.0] {
-                for (normals, kind) in [(Normals::Given, "oriented"), (Normals::Absent, "bare")] {
-                    let name = format!("{body}, hole of {ratio} widths, {kind}");
-                    cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                        fall(setup, verdict, is_ball, ratio, normals, seed)
-                    }));
-                }
+fn cases(_: &Scale, cases: &mut Cases) {
+    for solid in Solid::ALL {
+        let body = solid.name();
+        let equal = if solid == Solid::Ball { 0.95 } else { 1.0 };
+        for ratio in [0.5, 0.8, equal, 1.75, 2.0] {
+            for (normals, kind) in Normals::GIVEN_OR_NOT {
+                let name = format!("{body}, hole of {ratio} widths, {kind}");
+                cases.add(name, move |setup, verdict| {
+                    fall(setup, verdict, solid, ratio, normals)
+                });
             }
         }
-        cases.push(Case::new(
-            SCENE.name,
-            "shadow",
-            seed,
-            move |setup, verdict| shadow(setup, verdict, seed),
-        ));
     }
-    cases
+    cases.add("shadow", shadow);
 }
 
 /// A floor with a square hole of this width in its middle.
 fn floor_with_hole(width: f32, rng: &mut Rng) -> Surface {
     let mut floor = Surface::flat(Vec2::splat(EDGE), SPACING, Backing::Film, rng);
     let is_floor = |p: &Vec3| p.x.abs().max(p.z.abs()) > 0.5 * width;
-    floor.samples = floor
-        .samples
-        .points
-        .iter()
-        .zip(&floor.samples.normals)
-        .filter(|(p, _)| is_floor(p))
-        .fold(Samples::default(), |mut kept, (p, n)| {
-            kept.points.push(*p);
-            kept.normals.push(*n);
-            kept
-        });
+    floor.samples.retain(is_floor);
     // The hole's rim is sampled like the floor's.
     let steps = (width / SPACING).ceil() as i32;
     for k in 0..steps {
@@ -113,20 +93,18 @@ fn floor_with_hole(width: f32, rng: &mut Rng) -> Surface {
 fn fall(
     setup: &Setup,
     verdict: &mut Verdict,
-    is_ball: bool,
+    solid: Solid,
     ratio: f32,
     normals: Normals,
-    seed: u64,
 ) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let floor = floor_with_hole(2.0 * HALF * ratio, &mut rng).with_normals(normals);
     arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;
-    let (surface, turn) = if is_ball {
-        (Surface::ball(HALF, SPACING), Quat::IDENTITY)
-    } else {
-        let surface = Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng);
-        (surface, Quat::from_rotation_y(TURN))
+    let surface = solid.surface(HALF, SPACING, &mut rng);
+    let turn = match solid {
+        Solid::Ball => Quat::IDENTITY,
+        Solid::Box => Quat::from_rotation_y(TURN),
     };
     let pose = Pose::from_parts(Vec3::Y * (HALF + 0.05), turn);
     let body = arena.insert(
@@ -150,21 +128,15 @@ fn fall(
 /// and the floor without what the box hides.
 fn seen_from_one_side(camera: Vec3, rng: &mut Rng) -> Surface {
     let front_half = 0.2;
-    let floor = Surface::flat(Vec2::new(2.0, 2.0), SPACING, Backing::Film, rng);
-    let is_hidden = |p: &Vec3| {
+    let mut seen = Surface::flat(Vec2::new(2.0, 2.0), SPACING, Backing::Film, rng);
+    let is_seen = |p: &Vec3| {
         // Where the line of sight crosses the plane of the front, z = 0.
         let share = camera.z / (camera.z - p.z);
         let at = camera.lerp(*p, share);
-        p.z < 0.0 && at.x.abs() < front_half && (0.0..2.0 * front_half).contains(&at.y)
+        let is_hidden_there = at.x.abs() < front_half && (0.0..2.0 * front_half).contains(&at.y);
+        p.z >= 0.0 || !is_hidden_there
     };
-    let mut seen = floor.clone();
-    seen.samples = Samples::default();
-    for (p, n) in floor.samples.points.iter().zip(&floor.samples.normals) {
-        if !is_hidden(p) {
-            seen.samples.points.push(*p);
-            seen.samples.normals.push(*n);
-        }
-    }
+    seen.samples.retain(is_seen);
     let upright = Quat::from_rotation_x(std::f32::consts::FRAC_PI_2);
     let front = Surface::flat(Vec2::splat(2.0 * front_half), SPACING, Backing::Film, rng);
     let front = front.moved(&Pose::from_parts(Vec3::Y * front_half, upright));
@@ -176,8 +148,8 @@ fn seen_from_one_side(camera: Vec3, rng: &mut Rng) -> Surface {
     }
 }
 
-fn shadow(setup: &Setup, verdict: &mut Verdict, seed: u64) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+fn shadow(setup: &Setup, verdict: &mut Verdict) -> Result<(), Stop> {
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let scan = seen_from_one_side(Vec3::new(0.0, 1.0, 2.0), &mut rng);
     arena.insert(RigidBodyBuilder::fixed(), &scan, Material::default())?;

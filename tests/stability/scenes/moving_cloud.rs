@@ -1,8 +1,8 @@
 //! Clouds that move against a resting body: as a kinematic body, and as a stream of new points.
 
 use crate::suite::arena::{Arena, DT, Material, SamePoints};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
-use crate::suite::surface::{Backing, Normals, Surface};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::surface::{Backing, Normals, Solid, Surface};
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use tldi::glamx::{Quat, Vec2, Vec3};
@@ -45,22 +45,18 @@ impl Motion {
     }
 }
 
-fn cases(scale: &Scale) -> Vec<Case> {
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for motion in Motion::ALL {
-            for is_ball in [false, true] {
-                for speed in [0.5, 2.0, 5.0] {
-                    let body = if is_ball { "ball" } else { "box" };
-                    let name = format!("{} wall, {body}, {speed} m/s", motion.name());
-                    cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                        sweep(setup, verdict, motion, is_ball, speed, seed)
-                    }));
-                }
+fn cases(_: &Scale, cases: &mut Cases) {
+    for motion in Motion::ALL {
+        for solid in Solid::ALL {
+            for speed in [0.5, 2.0, 5.0] {
+                let body = solid.name();
+                let name = format!("{} wall, {body}, {speed} m/s", motion.name());
+                cases.add(name, move |setup, verdict| {
+                    sweep(setup, verdict, motion, solid, speed)
+                });
             }
         }
     }
-    cases
 }
 
 /// An upright wall in x = 0 that faces +x, its middle at the origin; rapier's is solid behind.
@@ -74,11 +70,10 @@ fn sweep(
     setup: &Setup,
     verdict: &mut Verdict,
     motion: Motion,
-    is_ball: bool,
+    solid: Solid,
     speed: f32,
-    seed: u64,
 ) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let floor = Surface::flat(
         Vec2::new(2.0 * WAY + 3.0, 1.0),
@@ -88,11 +83,7 @@ fn sweep(
     );
     let ground = RigidBodyBuilder::fixed().translation(Vec3::X * WAY);
     arena.insert(ground, &floor, Material::default())?;
-    let surface = if is_ball {
-        Surface::ball(HALF, SPACING)
-    } else {
-        Surface::cuboid(Vec3::splat(HALF), SPACING, &mut rng)
-    };
+    let surface = solid.surface(HALF, SPACING, &mut rng);
     let body = RigidBodyBuilder::dynamic()
         .translation(Vec3::Y * (HALF + surface.lift_on(&floor, setup.method)))
         .ccd_enabled(true);

@@ -1,7 +1,7 @@
 //! Bodies at rest on a plane whose samples stay, or are new in every frame.
 
 use crate::suite::arena::{Arena, DT, Material, Placed, SamePoints};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
 use crate::suite::model;
 use crate::suite::surface::{Backing, Normals, Surface};
 use fastrand::Rng;
@@ -75,23 +75,19 @@ impl Body {
     }
 }
 
-fn cases(scale: &Scale) -> Vec<Case> {
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for body in Body::ALL {
-            for (normals, name) in [(Normals::Given, "oriented"), (Normals::Absent, "bare")] {
-                let name = format!("{}, {name} plane", body.name());
-                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                    fixed_samples(setup, verdict, body, normals, seed)
-                }));
-            }
-            let name = format!("{}, new samples each frame", body.name());
-            cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                new_samples(setup, verdict, body, seed)
-            }));
+fn cases(_: &Scale, cases: &mut Cases) {
+    for body in Body::ALL {
+        for (normals, name) in Normals::GIVEN_OR_NOT {
+            let name = format!("{}, {name} plane", body.name());
+            cases.add(name, move |setup, verdict| {
+                fixed_samples(setup, verdict, body, normals)
+            });
         }
+        let name = format!("{}, new samples each frame", body.name());
+        cases.add(name, move |setup, verdict| {
+            new_samples(setup, verdict, body)
+        });
     }
-    cases
 }
 
 fn plane(body: Body, noise: f32, normals: Normals, rng: &mut Rng) -> Surface {
@@ -127,9 +123,8 @@ fn fixed_samples(
     verdict: &mut Verdict,
     body: Body,
     normals: Normals,
-    seed: u64,
 ) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = setup.rng();
     let plane = plane(body, 0.0, normals, &mut rng);
     let (mut arena, [_, placed], truth) = start(setup, body, &plane, &mut rng)?;
     let mut asleep_after = None;
@@ -148,10 +143,7 @@ fn fixed_samples(
         }
     }
     let end = *arena.body(&placed).position();
-    match asleep_after {
-        Some(seconds) => verdict.at_most("asleep_after_s", seconds, SETTLE_SECONDS.into()),
-        None => verdict.require("asleep_after_s", false, || "never asleep".into()),
-    }
+    verdict.asleep_within(SETTLE_SECONDS.into(), asleep_after);
     verdict.note("last_awake_s", last_awake);
     let drift = end.translation.distance(settled.translation) / SPACING;
     verdict.at_most("drift_mean_radii", drift, 0.1);
@@ -176,15 +168,15 @@ fn fixed_samples(
     Ok(())
 }
 
-fn new_samples(setup: &Setup, verdict: &mut Verdict, body: Body, seed: u64) -> Result<(), Stop> {
+fn new_samples(setup: &Setup, verdict: &mut Verdict, body: Body) -> Result<(), Stop> {
     if body == Body::Bunny && !model::has_bunny() {
         return Err(Stop::Unfit(
             "the bunny is not at hand; the pebble in its place rocks by up to 2.5 cm/s",
         ));
     }
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = setup.rng();
     let mut sample = {
-        let mut rng = Rng::with_seed(seed ^ 0x5eed);
+        let mut rng = Rng::with_seed(setup.seed ^ 0x5eed);
         move || plane(body, 0.25, Normals::Absent, &mut rng)
     };
     let (mut arena, [floor, placed], truth) = start(setup, body, &sample(), &mut rng)?;

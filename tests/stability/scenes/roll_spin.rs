@@ -1,7 +1,7 @@
 //! Balls that roll, rods and tops that spin, and a doll that rocks on a plane.
 
 use crate::suite::arena::{Arena, DT, Material};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
 use crate::suite::surface::{Backing, Surface};
 use fastrand::Rng;
 use rapier3d::prelude::*;
@@ -54,36 +54,22 @@ impl Spinner {
     }
 }
 
-fn cases(scale: &Scale) -> Vec<Case> {
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for speed in [1.0, 3.0, 6.0] {
-            let name = format!("ball at {speed} m/s");
-            cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                roll(setup, verdict, speed, seed)
-            }));
-        }
-        for spinner in [Spinner::Rod, Spinner::Top] {
-            cases.push(Case::new(
-                SCENE.name,
-                spinner.name(),
-                seed,
-                move |setup, verdict| spin(setup, verdict, spinner, seed),
-            ));
-        }
-        cases.push(Case::new(
-            SCENE.name,
-            "doll",
-            seed,
-            move |setup, verdict| rock(setup, verdict, seed),
-        ));
+fn cases(_: &Scale, cases: &mut Cases) {
+    for speed in [1.0, 3.0, 6.0] {
+        let name = format!("ball at {speed} m/s");
+        cases.add(name, move |setup, verdict| roll(setup, verdict, speed));
     }
-    cases
+    for spinner in [Spinner::Rod, Spinner::Top] {
+        cases.add(spinner.name(), move |setup, verdict| {
+            spin(setup, verdict, spinner)
+        });
+    }
+    cases.add("doll", rock);
 }
 
 /// Displacement of a ball that starts rolling at this speed.
-fn way_of_ball(setup: &Setup, speed: f32, seed: u64) -> Result<Vec3, Stop> {
-    let mut rng = Rng::with_seed(seed);
+fn way_of_ball(setup: &Setup, speed: f32) -> Result<Vec3, Stop> {
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let size = Vec2::new(WAY + 2.0, 1.2);
     let floor = Surface::flat(size, SPACING, Backing::Solid, &mut rng);
@@ -104,17 +90,17 @@ fn way_of_ball(setup: &Setup, speed: f32, seed: u64) -> Result<Vec3, Stop> {
     Ok(arena.position(&ball).with_y(0.0))
 }
 
-fn roll(setup: &Setup, verdict: &mut Verdict, speed: f32, seed: u64) -> Result<(), Stop> {
-    let truth = f64::from(way_of_ball(&setup.of_primitive(), speed, seed)?.length());
-    let way = way_of_ball(setup, speed, seed)?;
+fn roll(setup: &Setup, verdict: &mut Verdict, speed: f32) -> Result<(), Stop> {
+    let truth = f64::from(way_of_ball(&setup.of_primitive(), speed)?.length());
+    let way = way_of_ball(setup, speed)?;
     verdict.near("way_m", way.length(), truth, 0.05 * truth);
     verdict.at_most("heading_deg", way.z.atan2(way.x).to_degrees().abs(), 1.0);
     Ok(())
 }
 
 /// Angle turned about the vertical, spin left, and shift sideways.
-fn spun(setup: &Setup, spinner: Spinner, seed: u64) -> Result<[f32; 3], Stop> {
-    let mut rng = Rng::with_seed(seed);
+fn spun(setup: &Setup, spinner: Spinner) -> Result<[f32; 3], Stop> {
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let floor = Surface::flat(Vec2::splat(1.0), SPACING, Backing::Solid, &mut rng);
     arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;
@@ -133,10 +119,10 @@ fn spun(setup: &Setup, spinner: Spinner, seed: u64) -> Result<[f32; 3], Stop> {
     Ok([angle, arena.body(&body).angvel().y, shift])
 }
 
-fn spin(setup: &Setup, verdict: &mut Verdict, spinner: Spinner, seed: u64) -> Result<(), Stop> {
-    let [angle, rate, _] = spun(&setup.of_primitive(), spinner, seed)?.map(f64::from);
-    let ours = spun(setup, spinner, seed)?;
-    let initial = f64::from(spinner.parts(&mut Rng::with_seed(seed)).2);
+fn spin(setup: &Setup, verdict: &mut Verdict, spinner: Spinner) -> Result<(), Stop> {
+    let [angle, rate, _] = spun(&setup.of_primitive(), spinner)?.map(f64::from);
+    let ours = spun(setup, spinner)?;
+    let initial = f64::from(spinner.parts(&mut setup.rng()).2);
     verdict.near("angle_rad", ours[0], angle, 0.05 * angle.abs());
     verdict.near(
         "spin_left_rad_s",
@@ -149,8 +135,8 @@ fn spin(setup: &Setup, verdict: &mut Verdict, spinner: Spinner, seed: u64) -> Re
 }
 
 /// Nothing drives the doll: it rocks no faster at last than at first.
-fn rock(setup: &Setup, verdict: &mut Verdict, seed: u64) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+fn rock(setup: &Setup, verdict: &mut Verdict) -> Result<(), Stop> {
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let floor = Surface::flat(Vec2::splat(1.0), SPACING, Backing::Solid, &mut rng);
     arena.insert(RigidBodyBuilder::fixed(), &floor, Material::default())?;

@@ -1,9 +1,8 @@
 //! The same fall moved by half a pixel, moved by a kilometre, and scaled.
 
 use crate::suite::arena::{Arena, DT, GRAVITY, Material};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
 use crate::suite::surface::{Backing, Surface};
-use fastrand::Rng;
 use rapier3d::prelude::*;
 use tldi::glamx::{Vec2, Vec3};
 
@@ -41,7 +40,7 @@ const BASE: Change = Change {
     points: Vec3::ZERO,
 };
 
-fn cases(scale: &Scale) -> Vec<Case> {
+fn cases(_: &Scale, cases: &mut Cases) {
     let kilometre = Vec3::new(600.0, 0.0, 800.0);
     let scaled = |scale| Change { scale, ..BASE };
     let changes = [
@@ -73,19 +72,13 @@ fn cases(scale: &Scale) -> Vec<Case> {
         ("box of 10 m", scaled(50.0)),
         ("box of 100 m", scaled(500.0)),
     ];
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for (name, change) in changes {
-            cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                fall(setup, verdict, change, seed)
-            }));
-        }
+    for (name, change) in changes {
+        cases.add(name, move |setup, verdict| fall(setup, verdict, change));
     }
-    cases
 }
 
-fn fall(setup: &Setup, verdict: &mut Verdict, change: Change, seed: u64) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+fn fall(setup: &Setup, verdict: &mut Verdict, change: Change) -> Result<(), Stop> {
+    let mut rng = setup.rng();
     let s = change.scale;
     let mut arena = Arena::new(setup)?;
     arena.world.gravity = Vec3::NEG_Y * (GRAVITY * s);
@@ -122,9 +115,6 @@ fn fall(setup: &Setup, verdict: &mut Verdict, change: Change, seed: u64) -> Resu
     );
     let up = *arena.body(&body).rotation() * Vec3::Y;
     verdict.at_most("tilt_deg", up.angle_between(Vec3::Y).to_degrees(), 0.1);
-    match asleep_after {
-        Some(seconds) => verdict.at_most("asleep_after_s", seconds, 2.0),
-        None => verdict.require("asleep_after_s", false, || "never asleep".into()),
-    }
+    verdict.asleep_within(2.0, asleep_after);
     Ok(())
 }

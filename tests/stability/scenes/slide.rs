@@ -1,9 +1,8 @@
 //! Boxes that slide over a plane, and hold or slip on ramps.
 
 use crate::suite::arena::{Arena, DT, GRAVITY, Material};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
 use crate::suite::surface::{Backing, Normals, Surface};
-use fastrand::Rng;
 use rapier3d::prelude::*;
 use tldi::glamx::{Quat, Vec2, Vec3};
 
@@ -35,29 +34,23 @@ fn material() -> Material {
     }
 }
 
-fn cases(scale: &Scale) -> Vec<Case> {
+fn cases(scale: &Scale, cases: &mut Cases) {
     let speeds: &[f32] = scale.pick(
         &[0.0, 1.0, 5.0, 10.0],
         &[0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0],
     );
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for (noise, kind) in [(0.0, "plane"), (0.25, "noisy plane")] {
-            for &speed in speeds {
-                let name = format!("{kind}, {speed} m/s");
-                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                    slide(setup, verdict, speed, noise, seed)
-                }));
-            }
-        }
-        for offset in [-5.0, -1.0, 1.0, 5.0] {
-            let name = format!("ramp, friction angle {offset:+}°");
-            cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                ramp(setup, verdict, offset, seed)
-            }));
+    for (noise, kind) in [(0.0, "plane"), (0.25, "noisy plane")] {
+        for &speed in speeds {
+            let name = format!("{kind}, {speed} m/s");
+            cases.add(name, move |setup, verdict| {
+                slide(setup, verdict, speed, noise)
+            });
         }
     }
-    cases
+    for offset in [-5.0, -1.0, 1.0, 5.0] {
+        let name = format!("ramp, friction angle {offset:+}°");
+        cases.add(name, move |setup, verdict| ramp(setup, verdict, offset));
+    }
 }
 
 /// Where a sliding box stopped, and how high it went above its start, metres.
@@ -66,8 +59,8 @@ struct Slide {
     hop: f32,
 }
 
-fn measure(setup: &Setup, speed: f32, noise: f32, seed: u64) -> Result<Slide, Stop> {
-    let mut rng = Rng::with_seed(seed);
+fn measure(setup: &Setup, speed: f32, noise: f32) -> Result<Slide, Stop> {
+    let mut rng = setup.rng();
     let length = speed * speed / (2.0 * FRICTION * GRAVITY);
     let size = Vec2::new(1.2 * length + 1.0, 0.8);
     let floor = if noise > 0.0 {
@@ -101,15 +94,9 @@ fn measure(setup: &Setup, speed: f32, noise: f32, seed: u64) -> Result<Slide, St
     })
 }
 
-fn slide(
-    setup: &Setup,
-    verdict: &mut Verdict,
-    speed: f32,
-    noise: f32,
-    seed: u64,
-) -> Result<(), Stop> {
-    let truth = measure(&setup.of_primitive(), speed, noise, seed)?;
-    let ours = measure(setup, speed, noise, seed)?;
+fn slide(setup: &Setup, verdict: &mut Verdict, speed: f32, noise: f32) -> Result<(), Stop> {
+    let truth = measure(&setup.of_primitive(), speed, noise)?;
+    let ours = measure(setup, speed, noise)?;
     let expected = f64::from(truth.way.length());
     let tolerance = if speed == 0.0 {
         f64::from(0.1 * SPACING)
@@ -136,8 +123,8 @@ fn slide(
     Ok(())
 }
 
-fn ramp(setup: &Setup, verdict: &mut Verdict, offset_deg: f32, seed: u64) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+fn ramp(setup: &Setup, verdict: &mut Verdict, offset_deg: f32) -> Result<(), Stop> {
+    let mut rng = setup.rng();
     let angle = FRICTION.atan() + offset_deg.to_radians();
     let acceleration = (GRAVITY * (angle.sin() - FRICTION * angle.cos())).max(0.0);
     let theory = 0.5 * acceleration * RAMP_SECONDS * RAMP_SECONDS;

@@ -1,9 +1,8 @@
 //! A tower of boxes.
 
 use crate::suite::arena::{Arena, DT, Material, Placed};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
 use crate::suite::surface::{Backing, Normals, Surface};
-use fastrand::Rng;
 use rapier3d::prelude::*;
 use tldi::glamx::{Vec2, Vec3};
 
@@ -25,31 +24,16 @@ const SECONDS: f32 = 10.0;
 /// Solver iterations of a step, instead of rapier's 4.
 const MANY: usize = 12;
 
-fn cases(scale: &Scale) -> Vec<Case> {
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        let default = IntegrationParameters::default().num_solver_iterations;
-        for (iterations, normals, name) in [
-            (default, Normals::Given, "10 boxes, oriented"),
-            (default, Normals::Absent, "10 boxes, bare"),
-            (
-                MANY,
-                Normals::Given,
-                "10 boxes, 12 solver iterations, oriented",
-            ),
-            (
-                MANY,
-                Normals::Absent,
-                "10 boxes, 12 solver iterations, bare",
-            ),
-        ] {
-            let run = move |setup: &Setup, verdict: &mut Verdict| {
-                stack(setup, verdict, iterations, normals, seed)
-            };
-            cases.push(Case::new(SCENE.name, name.to_owned(), seed, run));
+fn cases(_: &Scale, cases: &mut Cases) {
+    let default = IntegrationParameters::default().num_solver_iterations;
+    for (iterations, said) in [(default, ""), (MANY, " 12 solver iterations,")] {
+        for (normals, kind) in Normals::GIVEN_OR_NOT {
+            let name = format!("10 boxes,{said} {kind}");
+            cases.add(name, move |setup, verdict| {
+                stack(setup, verdict, iterations, normals)
+            });
         }
     }
-    cases
 }
 
 fn stack(
@@ -57,9 +41,8 @@ fn stack(
     verdict: &mut Verdict,
     iterations: usize,
     normals: Normals,
-    seed: u64,
 ) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     arena.set_solver_iterations(iterations);
     let floor = Surface::flat(Vec2::splat(1.0), SPACING, Backing::Solid, &mut rng);

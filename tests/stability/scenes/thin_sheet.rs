@@ -1,8 +1,8 @@
 //! Bodies on both sides of sheets that are one layer of points.
 
 use crate::suite::arena::{Arena, DT, Material, Placed};
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
-use crate::suite::surface::{Backing, Normals, Surface};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::surface::{Backing, Normals, Solid, Surface};
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use tldi::glamx::{Quat, Vec2, Vec3};
@@ -28,50 +28,24 @@ const EDGE: f32 = 0.8;
 const APART: f32 = 1.5 * SPACING;
 const SECONDS: f32 = 2.0;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Body {
-    Box,
-    Ball,
-}
-
-impl Body {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Box => "box",
-            Self::Ball => "ball",
-        }
-    }
-
-    fn surface(self, rng: &mut Rng) -> Surface {
-        match self {
-            Self::Box => Surface::cuboid(Vec3::splat(HALF), SPACING, rng),
-            Self::Ball => Surface::ball(HALF, SPACING),
-        }
-    }
-}
-
-fn cases(scale: &Scale) -> Vec<Case> {
+fn cases(scale: &Scale, cases: &mut Cases) {
     let speeds: &[f32] = scale.pick(&[0.0, 3.0], &[0.0, 1.0, 3.0, 5.0]);
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for body in [Body::Box, Body::Ball] {
-            for (normals, kind) in [(Normals::Given, "oriented"), (Normals::Absent, "bare")] {
-                for (side, place) in [(1.0, "above"), (-1.0, "below")] {
-                    for &speed in speeds {
-                        let name = format!("{} from {place}, {kind}, {speed} m/s", body.name());
-                        cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                            one_sheet(setup, verdict, body, normals, side, speed, seed)
-                        }));
-                    }
+    for solid in Solid::ALL {
+        for (normals, kind) in Normals::GIVEN_OR_NOT {
+            for (side, place) in [(1.0, "above"), (-1.0, "below")] {
+                for &speed in speeds {
+                    let name = format!("{} from {place}, {kind}, {speed} m/s", solid.name());
+                    cases.add(name, move |setup, verdict| {
+                        one_sheet(setup, verdict, solid, normals, side, speed)
+                    });
                 }
-                let name = format!("{} on each of two sheets, {kind}", body.name());
-                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                    two_sheets(setup, verdict, body, normals, seed)
-                }));
             }
+            let name = format!("{} on each of two sheets, {kind}", solid.name());
+            cases.add(name, move |setup, verdict| {
+                two_sheets(setup, verdict, solid, normals)
+            });
         }
     }
-    cases
 }
 
 /// A body that is pulled to `height` from one side (`side` is 1 from above, -1 from below), with
@@ -115,18 +89,23 @@ fn judge(verdict: &mut Verdict, name: &str, (least, last): (f32, f32)) {
 fn one_sheet(
     setup: &Setup,
     verdict: &mut Verdict,
-    body: Body,
+    solid: Solid,
     normals: Normals,
     side: f32,
     speed: f32,
-    seed: u64,
 ) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let sheet = Surface::flat(Vec2::splat(EDGE), SPACING, Backing::Film, &mut rng);
     let sheet = sheet.with_normals(normals);
     arena.insert(RigidBodyBuilder::fixed(), &sheet, Material::default())?;
-    let body = insert(&mut arena, &body.surface(&mut rng), side, 0.0, speed)?;
+    let body = insert(
+        &mut arena,
+        &solid.surface(HALF, SPACING, &mut rng),
+        side,
+        0.0,
+        speed,
+    )?;
     let heights = watch(&mut arena, &[(body, side, 0.0)])?;
     judge(verdict, "", heights[0]);
     Ok(())
@@ -143,15 +122,14 @@ fn sheet_pair(rng: &mut Rng) -> Surface {
 fn two_sheets(
     setup: &Setup,
     verdict: &mut Verdict,
-    body: Body,
+    solid: Solid,
     normals: Normals,
-    seed: u64,
 ) -> Result<(), Stop> {
-    let mut rng = Rng::with_seed(seed);
+    let mut rng = setup.rng();
     let mut arena = Arena::new(setup)?;
     let sheets = sheet_pair(&mut rng).with_normals(normals);
     arena.insert(RigidBodyBuilder::fixed(), &sheets, Material::default())?;
-    let surface = body.surface(&mut rng);
+    let surface = solid.surface(HALF, SPACING, &mut rng);
     let upper = insert(&mut arena, &surface, 1.0, 0.0, 0.0)?;
     let lower = insert(&mut arena, &surface, -1.0, -APART, 0.0)?;
     let heights = watch(&mut arena, &[(upper, 1.0, 0.0), (lower, -1.0, -APART)])?;

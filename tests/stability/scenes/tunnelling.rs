@@ -3,7 +3,7 @@
 mod drops;
 mod ground;
 
-use crate::suite::case::{Case, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
 use drops::{Outcome, SizeClass, Target, run_drop};
 
 /// The scene.
@@ -21,23 +21,19 @@ pub(crate) const SCENE: Scene = Scene {
 /// How many failures of a row are named.
 const NAMED_FAILURES: usize = 5;
 
-fn cases(scale: &Scale) -> Vec<Case> {
+fn cases(scale: &Scale, cases: &mut Cases) {
     let rows = Target::ALL.len() * SizeClass::ALL.len() * scale.seeds.len();
     let drops = scale.drops.div_ceil(rows.max(1));
     let only = scale.only_drop;
-    let mut cases = Vec::new();
-    for &seed in &scale.seeds {
-        for target in Target::ALL {
-            for size in SizeClass::ALL {
-                let name = format!("{}, {}", target.name(), size.name());
-                cases.push(Case::new(SCENE.name, name, seed, move |setup, verdict| {
-                    let chosen = only.map_or(0..drops, |k| k..k + 1);
-                    drop_all(setup, verdict, target, size, chosen, seed)
-                }));
-            }
+    for target in Target::ALL {
+        for size in SizeClass::ALL {
+            let name = format!("{}, {}", target.name(), size.name());
+            cases.add(name, move |setup, verdict| {
+                let chosen = only.map_or(0..drops, |k| k..k + 1);
+                drop_all(setup, verdict, target, size, chosen)
+            });
         }
     }
-    cases
 }
 
 fn drop_all(
@@ -46,14 +42,14 @@ fn drop_all(
     target: Target,
     size: SizeClass,
     drops: std::ops::Range<usize>,
-    seed: u64,
 ) -> Result<(), Stop> {
     let mut hits = 0_u32;
     let mut failures = Vec::new();
     let count = drops.len();
     for index in drops {
         // Every drop has a seed of its own, so that it can be run alone (`--only-drop`).
-        let row = seed
+        let row = setup
+            .seed
             .wrapping_mul(31)
             .wrapping_add(10 * target as u64 + size as u64);
         let drop_seed = row.wrapping_mul(1_000_003).wrapping_add(index as u64);

@@ -4,7 +4,7 @@ use super::ground::{Ground, WAVE_AMPLITUDE};
 use crate::suite::arena::{Arena, DT, GRAVITY, Material, Placed, SamePoints};
 use crate::suite::case::{Setup, Stop};
 use crate::suite::scan_spots::spots;
-use crate::suite::surface::{Backing, Normals, Surface};
+use crate::suite::surface::{Backing, Normals, Solid, Surface};
 use fastrand::Rng;
 use rapier3d::prelude::*;
 use std::f32::consts::TAU;
@@ -93,7 +93,7 @@ fn log_between(low: f32, high: f32, rng: &mut Rng) -> f32 {
 
 /// What a drop draws.
 struct Plan {
-    is_box: bool,
+    solid: Solid,
     size: f32,
     /// Points of the body.
     spacing: f32,
@@ -115,8 +115,12 @@ impl Plan {
     fn draw(target: Target, size: SizeClass, rng: &mut Rng) -> Self {
         let (low, high) = size.range();
         let size = log_between(low, high, rng);
-        let is_box = rng.bool();
-        let spacing = size / if is_box { 8.0 } else { 10.0 };
+        let solid = if rng.bool() { Solid::Box } else { Solid::Ball };
+        let points_along = match solid {
+            Solid::Box => 8.0,
+            Solid::Ball => 10.0,
+        };
+        let spacing = size / points_along;
         let radius = spacing * log_between(1.0, 3.0, rng);
         let extent = (4.0 * size).max(24.0 * radius);
         let speed = if rng.bool() {
@@ -133,7 +137,7 @@ impl Plan {
         let way = clearance / cos + speed * DT * between(0.0, 3.0, rng);
         let is_waving = target == Target::Waves;
         Self {
-            is_box,
+            solid,
             size,
             spacing,
             radius,
@@ -149,14 +153,6 @@ impl Plan {
             } else {
                 0.0
             },
-        }
-    }
-
-    fn body(&self, rng: &mut Rng) -> Surface {
-        if self.is_box {
-            Surface::cuboid(Vec3::splat(0.5 * self.size), self.spacing, rng)
-        } else {
-            Surface::ball(0.5 * self.size, self.spacing)
         }
     }
 
@@ -193,7 +189,7 @@ impl Plan {
     fn describe(&self) -> String {
         format!(
             "{} {:.4} m, {:.1} m/s, {:.0}° off the normal, spin {:.0} rad/s, r̄ {:.4} m{}",
-            if self.is_box { "box" } else { "ball" },
+            self.solid.name(),
             self.size,
             self.speed,
             (-self.direction.y).acos().to_degrees(),
@@ -237,7 +233,8 @@ pub(super) fn run_drop(
         .linvel(plan.direction * plan.speed)
         .angvel(plan.spin)
         .ccd_enabled(true);
-    let body = arena.insert(body, &plan.body(&mut rng), Material::default())?;
+    let surface_of_body = (plan.solid).surface(0.5 * plan.size, plan.spacing, &mut rng);
+    let body = arena.insert(body, &surface_of_body, Material::default())?;
     let ground = match target {
         Target::Sheet => Ground::Flat,
         Target::Waves => plan.wave(),
