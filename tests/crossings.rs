@@ -4,8 +4,10 @@
 use rapier3d::parry::query::QueryDispatcher;
 use rapier3d_tldi::{PointCloudShape, TldiConfig, TldiPipeline};
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{Backend, CpuBackend, PairQuery, Params, PointCloud, Surface};
-use tldi_tests::{aimed, compare_on, gpu_backend, random_pose, random_unit, sampled_plane};
+use tldi::{Backend, CpuBackend, PairQuery, PointCloud};
+use tldi_tests::{
+    aimed_clouds, cloud_of, compare_on, gpu_backend, random_pose, random_unit, sampled_plane,
+};
 
 /// Spacing of the samples, and mean radius, metres.
 const R: f32 = 0.01;
@@ -28,11 +30,8 @@ impl Jack {
             Pose3::rotation(quarter * Vec3::Z),
         ];
         let points = plates.map(|plate| sampled_plane(EDGE, R, rng).moved(&plate).points);
-        let cloud = PointCloud::builder(points.concat()).radius(R).build();
-        Self {
-            plates,
-            cloud: cloud.expect("a finite cloud"),
-        }
+        let cloud = cloud_of(points.concat(), R);
+        Self { plates, cloud }
     }
 
     /// Whether an edge of a plate of one passes through a plate of the other, all plates `wider` by so much
@@ -105,11 +104,8 @@ fn scenes() -> Vec<Scene> {
 /// How many crossings a backend misses, of how many, and how many it invents, of how many.
 fn wrong_answers(scenes: &[Scene], backend: &mut dyn Backend) -> [[usize; 2]; 2] {
     let queries = scenes.iter().map(|scene| {
-        let [a, b] = scene
-            .jacks
-            .each_ref()
-            .map(|jack| Surface::Cloud(&jack.cloud));
-        aimed(a, b, scene.a_from_b, Params::for_radius(R))
+        let [a, b] = &scene.jacks;
+        aimed_clouds(&a.cloud, &b.cloud, scene.a_from_b, R)
     });
     let batch: Vec<PairQuery> = queries.collect();
     let results = compare_on(backend, &batch);
@@ -165,8 +161,7 @@ fn intersection_tests_look_from_all_directions() {
 #[test]
 fn a_surface_meets_its_own_copy() {
     let cloud = Jack::new(&mut fastrand::Rng::with_seed(0)).cloud;
-    let copies = [Surface::Cloud(&cloud); 2];
-    let query = aimed(copies[0], copies[1], Pose3::IDENTITY, Params::for_radius(R));
+    let query = aimed_clouds(&cloud, &cloud, Pose3::IDENTITY, R);
     assert!(compare_on(&mut CpuBackend::new(), &[query])[0].collides);
     if let Some(mut gpu) = gpu_backend() {
         assert!(compare_on(&mut gpu, &[query])[0].collides);

@@ -6,15 +6,12 @@ use tldi::{
     PointCloud, Radii, Surface, View, VirtualCamera,
 };
 use tldi_tests::{aimed, compare_on, gpu_backend, sampled_plane, sampled_sphere};
-use tldi_wgpu::{AutoBackend, DepthCamera, GpuError, WgpuBackend, wgpu};
+use tldi_wgpu::{AutoBackend, DepthCamera, Gpu, GpuError, WgpuBackend, wgpu};
 
 const R: f32 = 0.02;
 
 fn compared(backend: &mut dyn Backend, query: PairQuery<'_>) -> PairResult {
-    let mut results = Vec::new();
-    let outcome = backend.compare(&[query], &mut results);
-    outcome.expect("the query is supported");
-    results.remove(0)
+    compare_on(backend, &[query]).remove(0)
 }
 
 /// What matters of two results, within rounding: device clouds know looser bounds, of which the
@@ -30,19 +27,19 @@ fn assert_like(host: &PairResult, device: &PairResult) {
     assert!(count.abs_diff(other) * 20 <= count, "{count} {other}");
 }
 
-fn buffer(device: &wgpu::Device, queue: &wgpu::Queue, points: &[[f32; 4]]) -> wgpu::Buffer {
+fn buffer(gpu: &Gpu, points: &[[f32; 4]]) -> wgpu::Buffer {
     let bytes: Vec<u8> = points
         .iter()
         .flatten()
         .flat_map(|c| c.to_le_bytes())
         .collect();
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+    let buffer = gpu.device().create_buffer(&wgpu::BufferDescriptor {
         label: Some("a simulation's points"),
         size: bytes.len() as u64,
         usage: wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
-    queue.write_buffer(&buffer, 0, &bytes);
+    gpu.queue().write_buffer(&buffer, 0, &bytes);
     buffer
 }
 
@@ -52,10 +49,7 @@ fn points_of_a_buffer_are_those_of_a_cloud() {
     let Some(mut backend) = gpu_backend() else {
         return;
     };
-    let (device, queue) = (
-        backend.gpu().device().clone(),
-        backend.gpu().queue().clone(),
-    );
+    let gpu = backend.gpu().clone();
     let mut rng = fastrand::Rng::with_seed(2);
     let floor = sampled_plane(0.6, R, &mut rng).cloud(R);
     let mut ball = sampled_sphere(0.15, R).points;
@@ -64,7 +58,7 @@ fn points_of_a_buffer_are_those_of_a_cloud() {
         let points = ball.iter().zip(&radii);
         points.map(|(p, r)| [p.x, p.y, p.z, *r]).collect()
     };
-    let points = buffer(&device, &queue, &gather(&ball));
+    let points = buffer(&gpu, &gather(&ball));
     let on_device = backend
         .adopt(
             &points,
@@ -98,10 +92,10 @@ fn points_of_a_buffer_are_those_of_a_cloud() {
             *p *= 1.0 + 0.02 * (frame + 1) as f32;
         }
         // A simulation writes the next frame.
-        let next = buffer(&device, &queue, &gather(&ball));
-        let mut encoder = device.create_command_encoder(&Default::default());
+        let next = buffer(&gpu, &gather(&ball));
+        let mut encoder = gpu.device().create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(&next, 0, &points, 0, points.size());
-        queue.submit([encoder.finish()]);
+        gpu.queue().submit([encoder.finish()]);
     }
     backend.release(on_device.id);
     let query = aimed(
@@ -191,11 +185,7 @@ fn bad_sources_are_refused() {
     let Some(mut backend) = gpu_backend() else {
         return;
     };
-    let points = buffer(
-        &backend.gpu().device().clone(),
-        &backend.gpu().queue().clone(),
-        &[[0.0; 4]; 8],
-    );
+    let points = buffer(backend.gpu(), &[[0.0; 4]; 8]);
     let cloud = |len, mean_radius| DeviceCloud {
         id: 0,
         len,
@@ -276,10 +266,6 @@ fn ball_points() -> Vec<[f32; 4]> {
 
 /// Such points, taken by a backend.
 fn adopted(backend: &mut WgpuBackend, points: &[[f32; 4]]) -> DeviceCloud {
-    let (device, queue) = (
-        backend.gpu().device().clone(),
-        backend.gpu().queue().clone(),
-    );
     let told = DeviceCloud {
         id: 0,
         len: points.len(),
@@ -290,7 +276,7 @@ fn adopted(backend: &mut WgpuBackend, points: &[[f32; 4]]) -> DeviceCloud {
         mean_radius: R,
         max_radius: R,
     };
-    let adopted = backend.adopt(&buffer(&device, &queue, points), told);
+    let adopted = backend.adopt(&buffer(backend.gpu(), points), told);
     adopted.expect("the buffer is valid")
 }
 

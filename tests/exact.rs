@@ -1,11 +1,10 @@
 //! Clouds against surfaces known exactly, which are seen by rays.
 
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{
-    Aabb, Backend, BackendError, CpuBackend, Params, PointCloud, RayHit, RaySurface, Surface,
-};
+use tldi::{Aabb, Backend, BackendError, CpuBackend, Params, RayHit, RaySurface, Surface};
 use tldi_tests::{
-    HalfSpace, aimed, compare, deepest_point, random_pose, random_unit, sampled_box, sampled_sphere,
+    HalfSpace, aimed, cloud_of, compare, deepest_point, random_pose, random_unit, sampled_box,
+    sampled_sphere,
 };
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
@@ -76,10 +75,7 @@ fn few_points_among_many_are_found() {
         if shuffled {
             rng.shuffle(&mut points);
         }
-        let cloud = PointCloud::builder(&points)
-            .radius(R)
-            .build()
-            .expect("a valid cloud");
+        let cloud = cloud_of(points.clone(), R);
         for _ in 0..6 {
             let turn = random_pose(&mut rng, 0.0).rotation;
             let lowest = (0..8)
@@ -181,10 +177,10 @@ fn stray_points_do_not_hide_a_floor() {
                 })
                 .collect();
             points.extend(&plate);
-            let cloud = PointCloud::builder(points).radius(R).build();
+            let cloud = cloud_of(points, R);
             let result = compare(
                 Surface::Exact(&Valley),
-                Surface::Cloud(&cloud.expect("a valid cloud")),
+                Surface::Cloud(&cloud),
                 Pose3::translation(0.0, half.y - 0.5 * R, 0.0),
                 Params::for_radius(R),
             );

@@ -2,7 +2,7 @@
 
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi_tests::{
-    Samples, compare_clouds, deepest_contact, random_unit, sampled_box, sampled_plane,
+    Samples, cloud_of, compare_clouds, deepest_contact, random_unit, sampled_box, sampled_plane,
     sampled_sphere,
 };
 
@@ -86,8 +86,7 @@ fn what_lies_between_two_sheets_does_not_collide() {
             let sheet = sampled_plane(1.0, R, &mut rng);
             points.extend(sheet.points.iter().map(|p| *p + height * Vec3::Y));
         }
-        let both = tldi::PointCloud::builder(points).radius(R).build();
-        let both = both.expect("the points are finite");
+        let both = cloud_of(points, R);
         let between = sampled_plane(0.6, R, &mut rng).bare_cloud(R);
         for tilt in [0.0, 0.4, 0.8, 1.3, 1.8] {
             // Its edge is 30 radii from the middle. Where that is too little for the tilt, it stands upright.

@@ -5,8 +5,8 @@ use rapier3d_tldi::ExactShape;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{CpuBackend, PairQuery, PairResult, Params, PointCloud, Surface};
 use tldi_tests::{
-    Difference, aimed, compare, compare_clouds, compare_on, gpu_backend, sampled_plane,
-    sampled_sphere,
+    Difference, aimed_clouds, cloud_of, compare, compare_clouds, compare_on, gpu_backend,
+    sampled_plane, sampled_sphere,
 };
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
@@ -27,12 +27,8 @@ fn over_sheet(beside: &[Vec3]) -> PairResult {
     let mut sheet = sampled_plane(0.4, R, &mut rng);
     sheet.points.extend(beside);
     let ball = sampled_sphere(0.05, R).cloud(R);
-    let sheet = PointCloud::builder(sheet.points).radius(R).build();
-    clouds(
-        &sheet.expect("a valid cloud"),
-        &ball,
-        Pose3::translation(0.0, 0.11 - 1.5 * R, 0.0),
-    )
+    let pose = Pose3::translation(0.0, 0.11 - 1.5 * R, 0.0);
+    clouds(&sheet.bare_cloud(R), &ball, pose)
 }
 
 /// A flying pixel within a ball does not hide the sheet in which the ball is one radius deep. The point's splat is as wide
@@ -64,8 +60,7 @@ fn nothing_but_a_lone_point_is_not_touched() {
     let mut rng = fastrand::Rng::with_seed(8);
     let mut points = sampled_plane(0.4, R, &mut rng).points;
     points.push(Vec3::new(0.0, 0.3, 0.0));
-    let cloud = PointCloud::builder(points).radius(R).build();
-    let cloud = cloud.expect("a valid cloud");
+    let cloud = cloud_of(points, R);
     let pose = Pose3::translation(0.0, 0.3 + 0.05 - 0.5 * R, 0.0);
     let ball = sampled_sphere(0.05, R).cloud(R);
     assert!(clouds(&cloud, &ball, pose).patches.is_empty());
@@ -86,10 +81,10 @@ fn lone_points_are_not_touched() {
     let wire: Vec<Vec3> = (-10..=10).map(|k| lone + k as f32 * R * Vec3::X).collect();
     assert!(!over_sheet(&wire).patches.is_empty());
     let few = [Vec3::ZERO, Vec3::X, -Vec3::X, Vec3::Z, -Vec3::Z].map(|p| lone + R * p);
-    let few = PointCloud::builder(few.to_vec()).radius(R).build();
+    let few = cloud_of(few.to_vec(), R);
     let ball = sampled_sphere(0.05, R).cloud(R);
     let pose = Pose3::translation(0.0, 0.11 - 1.5 * R, 0.0);
-    let result = clouds(&few.expect("a valid cloud"), &ball, pose);
+    let result = clouds(&few, &ball, pose);
     assert!(!result.patches.is_empty());
 }
 
@@ -118,8 +113,7 @@ fn flying_pixels_do_not_count() {
         let [with, without] = [Some(height), None].map(|flying| cloud(is_bare, flying));
         let [with, without] = [&with, &without].map(|cloud| {
             let pose = Pose3::translation(0.0, 19.0 * R, 0.0);
-            let (a, b) = (Surface::Cloud(cloud), Surface::Cloud(&ball));
-            [aimed(a, b, pose, Params::for_radius(R))]
+            [aimed_clouds(cloud, &ball, pose, R)]
         });
         let gpu = compare_on(&mut backend, &with);
         assert_eq!(backend.pairs_on_cpu(), pairs_on_cpu, "{height}");

@@ -4,7 +4,9 @@ use rapier3d::prelude::{Ball, Cuboid, HalfSpace, SharedShape, Vector};
 use rapier3d_tldi::ExactShape;
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi::{CpuBackend, Impact, ImpactQuery, Params, Penetration, PointCloud, Room, Surface};
-use tldi_tests::{Samples, random_pose, random_unit, sampled_box, sampled_plane, sampled_sphere};
+use tldi_tests::{
+    Samples, cloud_of, random_pose, random_unit, sampled_box, sampled_plane, sampled_sphere,
+};
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
 const R: f32 = 0.01;
@@ -20,6 +22,15 @@ fn query<'a>(a: Surface<'a>, b: Surface<'a>, a_from_b: Pose3, motion: Vec3) -> I
         penetration: None,
         params: Params::for_radius(R),
     }
+}
+
+fn clouds<'a>(
+    a: &'a PointCloud<'a>,
+    b: &'a PointCloud<'a>,
+    a_from_b: Pose3,
+    motion: Vec3,
+) -> ImpactQuery<'a> {
+    query(Surface::Cloud(a), Surface::Cloud(b), a_from_b, motion)
 }
 
 fn impact(query: &ImpactQuery) -> Option<Impact> {
@@ -146,7 +157,7 @@ fn sheets_stop_what_comes_from_either_side() {
             for core_only in [false, true] {
                 let found = impact(&ImpactQuery {
                     core_only,
-                    ..query(Surface::Cloud(&a), Surface::Cloud(&b), pose, motion)
+                    ..clouds(&a, &b, pose, motion)
                 });
                 let height = pose.translation.y.abs();
                 let found = found.unwrap_or_else(|| {
@@ -183,7 +194,7 @@ fn only_the_core_passes_over_roughness() {
     let cast = |floor: &PointCloud, core_only| {
         impact(&ImpactQuery {
             core_only,
-            ..query(Surface::Cloud(floor), Surface::Cloud(&boxed), pose, motion)
+            ..clouds(floor, &boxed, pose, motion)
         })
     };
     let bare = floor.cloud(R);
@@ -214,7 +225,7 @@ fn what_touches_is_met_only_head_on() {
         impact(&ImpactQuery {
             touching,
             core_only: true,
-            ..query(Surface::Cloud(cloud), Surface::Cloud(&ball), start, motion)
+            ..clouds(cloud, &ball, start, motion)
         })
         .map(|impact| impact.distance)
     };
@@ -237,23 +248,13 @@ fn what_is_inside_leaves() {
     let pose = Pose3::translation(0.0, 0.18, 0.0);
     let up = 2.0 * Vec3::Y;
     let alone = solid.cloud(R);
-    let found = impact(&query(
-        Surface::Cloud(&alone),
-        Surface::Cloud(&ball),
-        pose,
-        up,
-    ));
+    let found = impact(&clouds(&alone, &ball, pose, up));
     assert_eq!(found, None);
     let mut with_lid = solid.clone();
     let lid = sampled_plane(0.6, R, &mut rng).moved(&Pose3::translation(0.0, 1.0, 0.0));
     with_lid.extend(&lid);
     let with_lid = with_lid.cloud(R);
-    let found = impact(&query(
-        Surface::Cloud(&with_lid),
-        Surface::Cloud(&ball),
-        pose,
-        up,
-    ));
+    let found = impact(&clouds(&with_lid, &ball, pose, up));
     let met = found.expect("the lid is met from behind").distance;
     assert!((met - 0.77).abs() < 0.2 * R, "{met}");
 }
@@ -313,11 +314,10 @@ fn lone_points_are_passed() {
     for (beside, height) in [(vec![lone], 0.0), (wire.collect(), 0.2)] {
         let mut points = sampled_plane(0.4, R, &mut rng).points;
         points.extend(beside);
-        let cloud = PointCloud::builder(points).radius(R).build();
-        let cloud = cloud.expect("a valid cloud");
+        let cloud = cloud_of(points, R);
         let start = Pose3::translation(0.0, 0.4, 0.0);
-        let (a, b) = (Surface::Cloud(&cloud), Surface::Cloud(&ball));
-        let found = impact(&query(a, b, start, -0.5 * Vec3::Y)).expect("the sheet is in the way");
+        let found = impact(&clouds(&cloud, &ball, start, -0.5 * Vec3::Y));
+        let found = found.expect("the sheet is in the way");
         let off = found.distance - (0.35 - height);
         assert!(off.abs() < R, "{height}: off by {off}");
     }
@@ -333,17 +333,11 @@ fn what_lone_points_hide_is_met() {
     let above =
         |(k, [x, z]): (usize, [f32; 2])| R * Vec3::new(0.8 * x, 6.0 + 6.0 * k as f32, 0.8 * z);
     points.extend(corners.into_iter().enumerate().map(above));
-    let cloud = PointCloud::builder(points).radius(R).build();
-    let cloud = cloud.expect("a valid cloud");
+    let cloud = cloud_of(points, R);
     for core_only in [false, true] {
         let found = impact(&ImpactQuery {
             core_only,
-            ..query(
-                Surface::Cloud(&cloud),
-                Surface::Cloud(&ball),
-                Pose3::translation(0.0, 0.5, 0.0),
-                -Vec3::Y,
-            )
+            ..clouds(&cloud, &ball, Pose3::translation(0.0, 0.5, 0.0), -Vec3::Y)
         });
         let found = found.expect("the sheet is behind the lone points");
         let off = found.distance - (0.5 - 3.0 * R);
@@ -364,7 +358,7 @@ fn the_rim_of_what_is_fast_is_met() {
     let cast = |motion: Vec3| {
         impact(&ImpactQuery {
             core_only: true,
-            ..query(Surface::Cloud(&floor), Surface::Cloud(&ball), start, motion)
+            ..clouds(&floor, &ball, start, motion)
         })
     };
     let met = cast(2.0 * Vec3::new(sin, -cos, 0.0)).expect("the floor is met");
@@ -375,12 +369,7 @@ fn the_rim_of_what_is_fast_is_met() {
     let beside = Pose3::translation(1.0 + radius + 0.5 * R, 0.5, 0.0);
     let passed = impact(&ImpactQuery {
         core_only: true,
-        ..query(
-            Surface::Cloud(&floor),
-            Surface::Cloud(&ball),
-            beside,
-            -Vec3::Y,
-        )
+        ..clouds(&floor, &ball, beside, -Vec3::Y)
     });
     assert_eq!(passed, None);
 }
@@ -395,15 +384,14 @@ fn what_is_in_a_sheet_leaves_it() {
     let sheet = sampled_plane(1.0, R, &mut rng);
     let above = sheet.points.iter().map(|p| p + 0.4 * Vec3::Y);
     let both: Vec<Vec3> = sheet.points.iter().copied().chain(above).collect();
-    let sheets = PointCloud::builder(both).radius(R).build();
-    let sheets = sheets.expect("a valid cloud");
+    let sheets = cloud_of(both, R);
     for ball in [ball.cloud(R), ball.bare_cloud(R)] {
         let way = |from: f32, direction: Vec3, penetration: Option<Penetration>| {
             let found = impact(&ImpactQuery {
                 penetration,
-                ..query(
-                    Surface::Cloud(&sheets),
-                    Surface::Cloud(&ball),
+                ..clouds(
+                    &sheets,
+                    &ball,
                     Pose3::translation(0.0, from, 0.0),
                     direction,
                 )

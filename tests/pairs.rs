@@ -1,11 +1,9 @@
 //! Whole pairs of clouds against analytic truth: gap, collision, contact normals and support points.
 
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{
-    CameraPolicy, ContactPoint, PairQuery, PairResult, Params, PointCloud, Surface, View, Work,
-};
+use tldi::{CameraPolicy, ContactPoint, PairQuery, PairResult, PointCloud, View, Work};
 use tldi_tests::{
-    Samples, aimed, compare_batch, compare_clouds, deepest_point, random_pose, random_unit,
+    Samples, aimed_clouds, compare_batch, compare_clouds, deepest_point, random_pose, random_unit,
     sampled_box, sampled_plane, sampled_sphere,
 };
 
@@ -313,12 +311,7 @@ fn an_open_body_reaches_to_its_middle() {
             motion: -0.05 * Vec3::Y,
             last_axis: None,
         },
-        ..aimed(
-            Surface::Cloud(&sheet),
-            Surface::Cloud(&bowl),
-            Pose3::translation(0.0, 0.015, 0.0),
-            Params::for_radius(R),
-        )
+        ..aimed_clouds(&sheet, &bowl, Pose3::translation(0.0, 0.015, 0.0), R)
     };
     let deep = &compare_batch(&[falling])[0];
     assert!(deepest_normal(deep).y > 0.99, "{:?}", deep.patches);

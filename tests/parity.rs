@@ -10,8 +10,8 @@ use tldi::{
     VirtualCamera,
 };
 use tldi_tests::{
-    Difference, HalfSpace, PARITY_RADIUS, aimed, compare_on, gpu_backend, pair_queries,
-    random_pairs, random_unit, sampled_plane, sampled_sphere,
+    Difference, HalfSpace, PARITY_RADIUS, aimed, aimed_clouds, compare_on, gpu_backend,
+    pair_queries, random_pairs, random_unit, sampled_plane, sampled_sphere,
 };
 use tldi_wgpu::{AdapterChoice, AutoBackend, Gpu, WgpuBackend, wgpu};
 
@@ -52,11 +52,11 @@ fn crowds_are_represented_evenly() {
     let ball = sampled_sphere(10.0 * R, R / 6.0).bare_cloud(R);
     let mut rng = fastrand::Rng::with_seed(12);
     let floor = sampled_plane(0.5, R, &mut rng).cloud(R);
-    let query = aimed(
-        Surface::Cloud(&floor),
-        Surface::Cloud(&ball),
+    let query = aimed_clouds(
+        &floor,
+        &ball,
         Pose3::from_translation(middle - 0.2 * R * Vec3::Y),
-        Params::for_radius(R),
+        R,
     );
     let found = compare_on(&mut gpu, &[query]);
     for _ in 0..3 {
@@ -125,12 +125,7 @@ fn pixels_are_equal_where_nothing_is_rounded() {
         camera.view_from_frame.rotation = tldi::glamx::Quat::from_rotation_x(std::f32::consts::PI);
         let query = PairQuery {
             view: View::Fixed(camera),
-            ..aimed(
-                Surface::Cloud(&a),
-                Surface::Cloud(&b),
-                Pose3::IDENTITY,
-                Params::for_radius(pixel),
-            )
+            ..aimed_clouds(&a, &b, Pose3::IDENTITY, pixel)
         };
         let (cpu, gpu) = (on_cpu(&[query]), compare_on(&mut gpu, &[query]));
         let pixels = |result: &PairResult| -> Vec<_> {
@@ -204,12 +199,7 @@ fn batches_that_outgrow_the_buffers_are_redone() {
     let mut rng = fastrand::Rng::with_seed(5);
     let sheet = |rng: &mut fastrand::Rng| sampled_plane(1.0, 0.004, rng).cloud(0.004);
     let (a, b) = (sheet(&mut rng), sheet(&mut rng));
-    let query = aimed(
-        Surface::Cloud(&a),
-        Surface::Cloud(&b),
-        Pose3::translation(0.0, 0.002, 0.0),
-        Params::for_radius(0.004),
-    );
+    let query = aimed_clouds(&a, &b, Pose3::translation(0.0, 0.002, 0.0), 0.004);
     // Cold, with the least buffers: 62,500 points a side, as many pixels, three times the contacts
     // that fit at first.
     let mut cold = WgpuBackend::new(gpu.gpu().clone()).expect("there is a device");
@@ -274,12 +264,7 @@ fn clouds_follow_their_points() {
         let samples = sampled_sphere(0.15 + 0.005 * frame as f32, R);
         ball.set_points(&samples.points, None)
             .expect("valid points");
-        let query = aimed(
-            Surface::Cloud(&floor),
-            Surface::Cloud(&ball),
-            Pose3::translation(0.0, height, 0.0),
-            Params::for_radius(R),
-        );
+        let query = aimed_clouds(&floor, &ball, Pose3::translation(0.0, height, 0.0), R);
         let found = Difference::between(&on_cpu(&[query]), &compare_on(&mut gpu, &[query]));
         assert!(found.answers == 0 && found.gap < 0.05, "{frame}: {found:?}");
     }
@@ -351,12 +336,7 @@ fn views_along_the_axes_have_the_frames_of_the_cpu() {
                 motion: Vec3::ZERO,
                 last_axis: Some(axis),
             },
-            ..aimed(
-                Surface::Cloud(&a),
-                Surface::Cloud(&b),
-                Pose3::translation(0.0, 0.1, 0.0),
-                Params::for_radius(R),
-            )
+            ..aimed_clouds(&a, &b, Pose3::translation(0.0, 0.1, 0.0), R)
         };
         let found = Difference::between(&on_cpu(&[query]), &compare_on(&mut gpu, &[query]));
         assert!(
@@ -447,12 +427,7 @@ fn a_device_without_room_for_a_batch_takes_it_in_parts() {
     // 90,000 points a side, all in reach, of 32 bytes each: more than four megabytes.
     let mut rng = fastrand::Rng::with_seed(8);
     let sheet = sampled_plane(1.2, 0.004, &mut rng).cloud(0.004);
-    let too_large = aimed(
-        Surface::Cloud(&sheet),
-        Surface::Cloud(&sheet),
-        Pose3::translation(0.0, 0.002, 0.0),
-        Params::for_radius(0.004),
-    );
+    let too_large = aimed_clouds(&sheet, &sheet, Pose3::translation(0.0, 0.002, 0.0), 0.004);
     batch.push(too_large);
     let results = compare_on(&mut small, &batch);
     assert_eq!(small.pairs_on_cpu(), 1);

@@ -1,8 +1,8 @@
 //! The same bits at any number of threads.
 
 use tldi::glamx::Pose3;
-use tldi::{Backend, CpuBackend, PairQuery, PairResult, Params, Surface};
-use tldi_tests::{aimed, random_pose, sampled_sphere};
+use tldi::{CpuBackend, PairQuery, PairResult};
+use tldi_tests::{aimed_clouds, compare_on, random_pose, sampled_sphere};
 
 #[test]
 fn results_do_not_depend_on_threads() {
@@ -29,8 +29,8 @@ fn results_do_not_depend_on_threads() {
             .iter()
             .enumerate()
             .map(|(k, pose)| {
-                let [a, b] = [0, 1].map(|side| Surface::Cloud(&clouds[2 * (k % 2) + side]));
-                aimed(a, b, *pose, Params::for_radius(0.01))
+                let [a, b] = [0, 1].map(|side| &clouds[2 * (k % 2) + side]);
+                aimed_clouds(a, b, *pose, 0.01)
             })
             .collect();
         let pool = rayon::ThreadPoolBuilder::new()
@@ -38,16 +38,11 @@ fn results_do_not_depend_on_threads() {
             .build()
             .expect("threads can be started");
         pool.install(|| {
-            let (mut backend, mut results) = (CpuBackend::new(), Vec::new());
-            let mut compare = |batch: &[PairQuery]| -> Vec<PairResult> {
-                backend
-                    .compare(batch, &mut results)
-                    .expect("the batch is supported");
-                results.clone()
-            };
-            let cold = compare(&batch);
+            let mut backend = CpuBackend::new();
+            let cold = compare_on(&mut backend, &batch);
             // Warm memory must not show either, least of all what it held for another pair.
-            let mut warm = compare(&batch.iter().rev().copied().collect::<Vec<_>>());
+            let reversed: Vec<PairQuery> = batch.iter().rev().copied().collect();
+            let mut warm = compare_on(&mut backend, &reversed);
             warm.reverse();
             assert_eq!(cold, warm, "{threads} threads");
             cold

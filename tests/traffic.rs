@@ -2,7 +2,7 @@
 
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{CameraPolicy, PairQuery, Params, PointCloud, Surface, View};
-use tldi_tests::{Samples, aimed, compare_on, gpu_backend, sampled_sphere};
+use tldi_tests::{Samples, aimed, aimed_clouds, cloud_of, compare_on, gpu_backend, sampled_sphere};
 use tldi_wgpu::WgpuBackend;
 
 const R: f32 = 0.02;
@@ -15,8 +15,7 @@ fn ball() -> Samples {
 /// The same ball twice, apart by this share of its width.
 fn apart<'a>(ball: &'a PointCloud<'static>, share: f32) -> PairQuery<'a> {
     let pose = Pose3::translation(share, 0.1 * R, 0.05 * R);
-    let (a, b) = (Surface::Cloud(ball), Surface::Cloud(ball));
-    aimed(a, b, pose, Params::for_radius(R))
+    aimed_clouds(ball, ball, pose, R)
 }
 
 /// Shares for slight and for deep contact.
@@ -91,8 +90,7 @@ fn only_blocks_in_reach_are_uploaded() {
     let position = |i: usize| Vec3::new(R * (i / 16) as f32, 0.0, R * (i % 16) as f32);
     let points: Vec<Vec3> = (0..16 * 1600).map(position).collect();
     let count = points.len() as u64;
-    let floor = PointCloud::builder(points).radius(R).build();
-    let floor = floor.expect("they are valid");
+    let floor = cloud_of(points, R);
     let ball = sampled_sphere(0.1, R).bare_cloud(R);
     let balls = 12 * ball.len() as u64;
     let (a, b) = (Surface::Cloud(&floor), Surface::Cloud(&ball));

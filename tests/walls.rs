@@ -2,8 +2,8 @@
 //! against the CPU.
 
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{CpuBackend, PairQuery, Params, Surface, View, VirtualCamera};
-use tldi_tests::{aimed, compare_on, gpu_backend, sampled_plane};
+use tldi::{CpuBackend, PairQuery, View, VirtualCamera};
+use tldi_tests::{aimed_clouds, compare_on, gpu_backend, sampled_plane};
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
 const R: f32 = 0.02;
@@ -17,11 +17,11 @@ fn walls_are_pierced_by_what_goes_on_behind_them() {
     let beyond_edge: Vec<f32> = (0..60).map(|_| 4.0 * (rng.f32() - 0.5) * R).collect();
     let query = |beyond: &f32| PairQuery {
         view: View::Fixed(VirtualCamera::along(-Vec3::Y, R)),
-        ..aimed(
-            Surface::Cloud(&sheet),
-            Surface::Cloud(&sheet),
+        ..aimed_clouds(
+            &sheet,
+            &sheet,
             Pose3::new(Vec3::new(0.2 + beyond, 0.05, 0.0), upright),
-            Params::for_radius(R),
+            R,
         )
     };
     let batch: Vec<PairQuery> = beyond_edge.iter().map(query).collect();

@@ -27,12 +27,12 @@ pub use half_space::HalfSpace;
 pub use host::Host;
 pub use oracle::{OracleFragment, OracleLayer, OracleSurface, oracle_layers};
 pub use overlaps::{ClosedShape, Overlap, measure_overlaps};
-pub use pairs::{aimed, compare, compare_clouds, deepest_contact, deepest_point};
+pub use pairs::{aimed, aimed_clouds, compare, compare_clouds, deepest_contact, deepest_point};
 pub use parity::{Difference, FIRM, PARITY_RADIUS, RandomPair, TURNED, pair_queries, random_pairs};
 pub use policy::PolicyChoice;
 pub use random::{random_pose, random_unit};
 pub use shapes::{
-    Samples, sampled_box, sampled_plane, sampled_ramp, sampled_sphere, sampled_torus,
+    Samples, cloud_of, sampled_box, sampled_plane, sampled_ramp, sampled_sphere, sampled_torus,
 };
 pub use sheets::{Sheet, standard_normal};
 pub use skip::{REQUIRE_DATA, REQUIRE_GPU, say_skipped, skip, test_data};

@@ -15,6 +15,17 @@ pub fn aimed<'a>(a: Surface<'a>, b: Surface<'a>, a_from_b: Pose3, params: Params
     }
 }
 
+/// An [`aimed`] query about two clouds of mean radius `radius`, metres, with the default parameters.
+pub fn aimed_clouds<'a>(
+    a: &'a PointCloud<'a>,
+    b: &'a PointCloud<'a>,
+    a_from_b: Pose3,
+    radius: f32,
+) -> PairQuery<'a> {
+    let [a, b] = [a, b].map(Surface::Cloud);
+    aimed(a, b, a_from_b, Params::for_radius(radius))
+}
+
 /// Compares two surfaces with [`aimed`] cameras.
 pub fn compare(a: Surface, b: Surface, a_from_b: Pose3, params: Params) -> PairResult {
     compare_batch(&[aimed(a, b, a_from_b, params)]).remove(0)
@@ -27,8 +38,7 @@ pub fn compare_clouds(
     a_from_b: Pose3,
     radius: f32,
 ) -> PairResult {
-    let (a, b) = (Surface::Cloud(a), Surface::Cloud(b));
-    compare(a, b, a_from_b, Params::for_radius(radius))
+    compare_batch(&[aimed_clouds(a, b, a_from_b, radius)]).remove(0)
 }
 
 /// Gap and place (midway between the surfaces) of the deepest of all patch points, metres.

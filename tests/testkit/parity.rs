@@ -1,10 +1,10 @@
 //! Random pairs of clouds, and how far two backends' results about them are apart.
 
-use crate::{Samples, aimed, random_pose, random_unit};
+use crate::{Samples, aimed_clouds, random_pose, random_unit};
 use crate::{sampled_box, sampled_plane, sampled_sphere};
 use std::ops::Range;
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{ContactPixel, PairQuery, PairResult, Params, PointCloud, Surface};
+use tldi::{ContactPixel, PairQuery, PairResult, PointCloud};
 
 /// Mean radius of the clouds of [`random_pairs`], metres.
 pub const PARITY_RADIUS: f32 = 0.02;
@@ -58,12 +58,9 @@ pub fn random_pairs(seeds: Range<u64>) -> Vec<RandomPair> {
 
 /// One query for each pair, with the default view and parameters.
 pub fn pair_queries(pairs: &[RandomPair]) -> Vec<PairQuery<'_>> {
+    let pairs = pairs.iter();
     pairs
-        .iter()
-        .map(|(a, b, pose)| {
-            let (a, b) = (Surface::Cloud(a), Surface::Cloud(b));
-            aimed(a, b, *pose, Params::for_radius(R))
-        })
+        .map(|(a, b, pose)| aimed_clouds(a, b, *pose, R))
         .collect()
 }
 

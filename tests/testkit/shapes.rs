@@ -24,10 +24,7 @@ impl Samples {
 
     /// A cloud without normals.
     pub fn bare_cloud(&self, radius: f32) -> PointCloud<'static> {
-        PointCloud::builder(self.points.clone())
-            .radius(radius)
-            .build()
-            .expect("analytic samples are valid")
+        cloud_of(self.points.clone(), radius)
     }
 
     /// The same surface in another frame.
@@ -55,6 +52,12 @@ impl Samples {
         self.points.push(point);
         self.normals.push(normal);
     }
+}
+
+/// A cloud of finite points without normals, with one radius in metres.
+pub fn cloud_of(points: Vec<Vec3>, radius: f32) -> PointCloud<'static> {
+    let cloud = PointCloud::builder(points).radius(radius).build();
+    cloud.expect("the points are finite")
 }
 
 /// A sphere about the origin, points about `spacing` metres apart (Fibonacci lattice).
