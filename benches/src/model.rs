@@ -1,7 +1,8 @@
 //! Meshes and points to measure with.
 
+use crate::bumpy_ball;
 use crate::protocol::normalised;
-use crate::{bumpy_ball, subdivided};
+use std::collections::HashMap;
 use std::path::Path;
 use tldi::glamx::Vec3;
 use tldi_sources::{ReadOptions, SourceError};
@@ -29,10 +30,23 @@ impl Model {
         })
     }
 
-    /// The same surface with more points, as a finer scan has them: every face in four, so many times.
+    /// The same surface with more points, as a finer scan has them: every face in four, so many times. The order of a face's
+    /// corners is that of stored rows: in another one, other points follow each other, and a case in 300 is answered otherwise.
     pub fn subdivided(mut self, times: u32) -> Self {
         for _ in 0..times {
-            self.faces = subdivided(&mut self.points, &self.faces);
+            let mut middles = HashMap::new();
+            let points = &mut self.points;
+            let mut middle = |a: u32, b: u32| {
+                *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                    points.push(points[a as usize].midpoint(points[b as usize]));
+                    (points.len() - 1) as u32
+                })
+            };
+            let split = |&[a, b, c]: &[u32; 3]| {
+                let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+            };
+            self.faces = self.faces.iter().flat_map(split).collect();
             self.name += ", subdivided";
         }
         self
