@@ -205,6 +205,33 @@ fn left_at(c: Column, first: u32, thickness: f32) -> f32 {
     return max(thin, select(middle, c.far, facing_of(c, first) == ENTRY));
 }
 
+// Whether layer `k` of unknown facing is where the ray enters the surface, more of which comes before the ray leaves the
+// other body. See the CPU's.
+fn is_entered_at(c: Column, k: u32, left: f32) -> bool {
+    if facing_of(c, k) != UNKNOWN {
+        return false;
+    }
+    for (var before = c.begin; before < k; before++) {
+        if !is_edge_on(layers[before].normal) {
+            return false;
+        }
+    }
+    return k + 1u < c.end && layers[min(k + 1u, c.end - 1u)].depth <= left;
+}
+
+// The same of where it is left, and more of which came after the ray entered the other body.
+fn is_left_at(c: Column, k: u32, entered: f32) -> bool {
+    if facing_of(c, k) != UNKNOWN {
+        return false;
+    }
+    for (var behind = k + 1u; behind < c.end; behind++) {
+        if !is_edge_on(layers[behind].normal) {
+            return false;
+        }
+    }
+    return k > c.begin && layers[max(k, c.begin + 1u) - 1u].depth >= entered;
+}
+
 // The layer of the body at the back that meets layer `kf` of the one in front, or NONE. On the other side of `a`, the
 // least way out counts.
 fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_other_side: bool) -> u32 {
@@ -219,8 +246,11 @@ fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_ot
         let is_sure = facing_of(front, kf) == EXIT && facing_of(back, kb) == ENTRY;
         let is_too_far = is_sure && depth > FARTHEST * max(left - entered, thickness);
         let is_opposed = opposed(layers[kb].normal, layers[kf].normal);
+        let is_within = depth > 0.0
+            && ((facing_of(back, kb) == ENTRY && is_entered_at(front, kf, left))
+                || (facing_of(front, kf) == EXIT && is_left_at(back, kb, entered)));
         let is_met = select(
-            depth <= thickness || (is_opposed && !is_too_far),
+            (depth <= thickness || (is_opposed && !is_too_far)) && !is_within,
             depth <= thickness && entered + depth <= left,
             is_other_side,
         );

@@ -5,6 +5,7 @@ mod common;
 
 mod debug_render;
 mod dispatcher;
+mod edges;
 mod manifolds;
 mod resolution;
 mod shallow;

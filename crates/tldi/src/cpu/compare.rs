@@ -168,6 +168,22 @@ impl<'a> Column<'a> {
             ..*self
         }
     }
+
+    /// Whether layer `k` of unknown facing is where the ray enters the surface: the first one, and more of the surface comes
+    /// before the ray leaves the other body, whose inside is known, at depth `left`. So it is not an exit in that body. A box
+    /// on a table, its front a little behind the table's edge, is not in the side of the table.
+    fn is_entered_at(&self, k: usize, left: f32) -> bool {
+        self.facing(&self.layers[k]) == Facing::Unknown
+            && self.layers[..k].iter().all(is_edge_on)
+            && (self.layers.get(k + 1)).is_some_and(|next| next.depth <= left)
+    }
+
+    /// The same of where it is left: the last one, and more of the surface comes after the ray entered the other body.
+    fn is_left_at(&self, k: usize, entered: f32) -> bool {
+        self.facing(&self.layers[k]) == Facing::Unknown
+            && self.layers[k + 1..].iter().all(is_edge_on)
+            && (self.layers[..k].last()).is_some_and(|last| last.depth >= entered)
+    }
 }
 
 /// Contacts in a pixel, where the ray leaves the body in `front` and enters the one in `back`. If there are other views,
@@ -188,23 +204,29 @@ fn contact_pixels(
         // What `front` has left behind altogether it does not touch.
         let entry = (back.layers.iter().enumerate())
             .filter(|(_, layer)| back.facing(layer) != Facing::Exit && !is_edge_on(layer))
-            .map(|(kb, layer)| (layer, left_at(&back.from(kb), params)))
-            .filter(|(_, left)| entered <= *left)
-            .find(|(layer, left)| {
+            .map(|(kb, layer)| (kb, layer, left_at(&back.from(kb), params)))
+            .filter(|(_, _, left)| entered <= *left)
+            .find(|(kb, layer, left)| {
                 let depth = exit.depth - layer.depth;
                 match order {
                     Order::BThenA => {
                         let is_sure = front.facing(exit) == Facing::Exit
                             && back.facing(layer) == Facing::Entry;
                         let way_back = (left - entered).max(params.thickness);
-                        depth <= params.thickness
-                            || opposed(layer, exit) && !(is_sure && depth > FARTHEST * way_back)
+                        let is_met = depth <= params.thickness
+                            || opposed(layer, exit) && !(is_sure && depth > FARTHEST * way_back);
+                        let is_within = depth > 0.0
+                            && (back.facing(layer) == Facing::Entry
+                                && front.is_entered_at(kf, *left)
+                                || front.facing(exit) == Facing::Exit
+                                    && back.is_left_at(*kb, entered));
+                        is_met && !is_within
                     }
                     // The least way out counts.
                     Order::AThenB => depth <= params.thickness && entered + depth <= *left,
                 }
             });
-        let Some((entry, _)) = entry else { continue };
+        let Some((_, entry, _)) = entry else { continue };
         // Outward normals in the view frame: the ray leaves the front body and enters the other.
         let normal_back = facing_camera(entry.normal, -1.0);
         let normal_front = facing_camera(exit.normal, 1.0);
