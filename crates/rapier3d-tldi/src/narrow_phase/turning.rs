@@ -145,18 +145,19 @@ impl Turning<'_> {
         (hits.into_iter().flatten()).min_by(|m, n| m.time_of_impact.total_cmp(&n.time_of_impact))
     }
 
-    /// What is met in a piece. In a fine one, the point that meets it must truly go into it before the motion ends. Where a
-    /// body rolls or tips over it does not: its middle falls, as all of it seems to do in a piece, but its lower end does not.
+    /// What is met in a piece. In a fine one, the point that meets it must truly go into it by more than a pixel before the
+    /// motion ends, as in straight motions. Where a body rolls or tips over it does not: its middle falls, as all of it seems to
+    /// do in a piece, but its lower end does not.
     fn met_by_moving(&self, piece: Piece) -> Option<ShapeCastHit> {
         let hit = self.seems_met_by_moving(piece)?;
-        let [fine, touching] =
-            [MAX_DISPLACEMENT, TOUCHING].map(|pixels| pixels * self.params.pixel_size);
+        let pixel = self.params.pixel_size;
+        let fine = MAX_DISPLACEMENT * pixel;
         if piece.displacement <= 0.0 || piece.displacement > fine {
             return Some(hit);
         }
         let goes_in = |rest: Piece| {
             let way = self.a_from_b(rest.to, rest.to) * hit.witness2 - hit.witness1;
-            way.dot(hit.normal1) < -touching
+            way.dot(hit.normal1) < -pixel
         };
         let mut rest = self.pieces(piece.from, self.end, fine);
         rest.any(goes_in).then_some(hit)

@@ -295,7 +295,8 @@ fn what_a_slope_holds_loses_its_speed_into_it() -> TestResult {
 }
 
 /// A capsule that tips over is fast and touches the floor all the while. Sweeps do not hold it: it would hang in the air and
-/// gather speed. Its energy never grows by more than half of what lifts it by its radius; held ones gained 18 times that.
+/// gather speed. Its energy grows by less than half of what lifts it by its radius, in steps twice as long by less than twice
+/// that. Held ones gained 15 to 28 times as much.
 #[test]
 fn what_tips_over_is_not_held() -> TestResult {
     let (radius, spacing) = (0.035, 0.005);
@@ -308,8 +309,13 @@ fn what_tips_over_is_not_held() -> TestResult {
                 false => ColliderBuilder::new(shape.clone()),
             })
         };
-        for (tilt, speed) in [(0.15, 0.1), (0.45, 0.0)] {
+        for (tilt, speed, rate, most_gained) in [
+            (0.15, 0.1, 60.0, 0.5),
+            (0.45, 0.0, 60.0, 0.5),
+            (0.15, 0.1, 30.0, 2.0),
+        ] {
             let (mut world, mut tldi) = attached();
+            world.integration_parameters.dt = 1.0 / rate;
             world.integration_parameters.length_unit = 0.1;
             let ground = RigidBodyBuilder::fixed().translation(-0.04 * Vector::Y);
             world.insert(ground, collider(&floor, of_floor)?);
@@ -326,13 +332,13 @@ fn what_tips_over_is_not_held() -> TestResult {
                 body.kinetic_energy() - body.mass() * gravity.dot(body.translation())
             };
             let at_first = energy(&world);
-            let allowed = 0.5 * world.bodies[body].mass() * gravity.length() * radius;
+            let allowed = most_gained * world.bodies[body].mass() * gravity.length() * radius;
             for step in 0..45 {
                 tldi.step(&mut world)?;
                 let gained = energy(&world) - at_first;
                 assert!(
                     gained < allowed,
-                    "cloud body {of_body}, cloud floor {of_floor}, {tilt} rad: {gained} J of {allowed} J in step {step}"
+                    "cloud body {of_body}, cloud floor {of_floor}, {tilt} rad, {rate} Hz: {gained} J of {allowed} J in step {step}"
                 );
             }
         }
