@@ -83,13 +83,12 @@ fn accuracy_of_samples() {
     });
 }
 
-/// Error, false negatives, the deepest of them, milliseconds of all cases of a model.
+/// Error, false negatives, the deepest of them, in all cases of a model.
 pub(crate) fn of_all_cases(model: &str, name: &str) -> Option<Vec<f64>> {
     let keys = [
         "error_pct",
         "false_negative_pct",
         "worst_false_negative_mean_radii",
-        "median_ms",
     ];
     let row = match name {
         "this project, pixel 1 r" => stored(&format!("more_cases/{model}.json")).remove(0),
@@ -107,6 +106,13 @@ pub(crate) fn of_all_cases(model: &str, name: &str) -> Option<Vec<f64>> {
         all.remove(2);
     }
     Some(all)
+}
+
+/// Milliseconds of the median case of a model's sample, in which all methods take turns.
+pub(crate) fn median_ms(rows: &[Value], variant: &str, setting: &str, value: f64) -> Option<f64> {
+    let is_it =
+        |row: &&Value| row["variant"] == variant && (number(row, setting) - value).abs() < 1e-6;
+    rows.iter().find(is_it).map(|row| number(row, "median_ms"))
 }
 
 #[test]

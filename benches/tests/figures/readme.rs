@@ -1,27 +1,31 @@
 //! The README.
 
-use crate::accuracy::of_all_cases;
+use crate::accuracy::{median_ms, of_all_cases};
 use crate::frames::frame;
 use crate::table::{is_rounded, numbers};
 use crate::{number, page, stored};
 
-/// Of the culled bit grid, times and errors divided by those of this library, by the radius of its balls. First for the
-/// balls that err least on each model, then for all larger ones.
+/// Of the culled bit grid, times (of a sample) and errors (of all cases) divided by those of this library, by the radius of its
+/// balls. First for the balls that err least on each model, then for all larger ones.
 fn balls() -> [Vec<[f64; 2]>; 2] {
     let (mut least, mut larger) = (Vec::new(), Vec::new());
     for model in ["bunny_watertight", "armadillo_86k"] {
         let ours = of_all_cases(model, "this project, pixel 1 r").expect("all cases");
+        let sample = stored(&format!("accuracy/speed_accuracy_{model}.json"));
+        let our_ms = median_ms(&sample, "default", "pixel_scale", 1.0).expect("the default");
         let rows = stored(&format!("more_cases/peers_{model}.json"));
         let grids = rows
             .iter()
             .filter(|row| row["variant"] == "bit grid, culled");
         let mut balls: Vec<_> = grids
             .map(|row| {
+                let radius = number(row, "radius_scale");
+                let ms = median_ms(&sample, "bit grid, culled", "radius_scale", radius);
                 let ratios = [
-                    number(row, "median_ms") / ours[3],
+                    ms.expect("the same balls in the sample") / our_ms,
                     number(row, "error_pct") / ours[0],
                 ];
-                (number(row, "radius_scale"), ratios)
+                (radius, ratios)
             })
             .collect();
         balls.sort_by(|m, n| m.1[1].total_cmp(&n.1[1]));
