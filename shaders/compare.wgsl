@@ -232,8 +232,8 @@ fn is_left_at(c: Column, k: u32, entered: f32) -> bool {
     return k > c.begin && layers[max(k, c.begin + 1u) - 1u].depth >= entered;
 }
 
-// The layer of the body at the back that meets layer `kf` of the one in front, or NONE. On the other side of `a`, the
-// least way out counts.
+// The layer of the body at the back that meets layer `kf` of the one in front, or NONE. On the other side of `a`, overlaps
+// count whose way back is FARTHEST times as long.
 fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_other_side: bool) -> u32 {
     let thickness = (*look).params.thickness;
     let entered = entered_at(front, kf, thickness);
@@ -251,7 +251,7 @@ fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_ot
                 || (facing_of(front, kf) == EXIT && is_left_at(back, kb, entered)));
         let is_met = select(
             (depth <= thickness || (is_opposed && !is_too_far)) && !is_within,
-            depth <= thickness && entered + depth <= left,
+            depth <= thickness && (depth <= 0.0 || left - entered > FARTHEST * max(depth, thickness)),
             is_other_side,
         );
         if is_met {

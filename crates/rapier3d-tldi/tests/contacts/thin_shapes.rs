@@ -48,6 +48,52 @@ fn sheets_hold_clouds() -> TestResult {
     Ok(())
 }
 
+/// A solid whose rim or corner came through a thin plate is pushed back, not further through.
+#[test]
+fn rims_through_a_plate_are_pushed_back() -> TestResult {
+    const R: f32 = 0.01;
+    let solids = [
+        SharedShape::cone(7.0 * R, 10.0 * R),
+        SharedShape::cylinder(6.0 * R, 9.0 * R),
+        SharedShape::cuboid(9.0 * R, 7.0 * R, 8.0 * R),
+    ];
+    for (k, solid) in solids.iter().enumerate() {
+        let cloud = PointCloudShape::new(sample_shape(&**solid, R)?);
+        for case in 0..12 {
+            let turn = 0.15 + 0.05 * case as f32;
+            let rotation = Rotation::from_scaled_axis(turn * Vector::new(0.8, 0.0, 0.6));
+            let lowest = solid.compute_aabb(&Pose::from_rotation(rotation)).mins.y;
+            // From 1.5 to 2.6 radii thick on both sides, and the lowest point 0.5 to 1.7 radii below.
+            let half = R * (1.5 + 0.1 * case as f32);
+            let below = R * (0.5 + 0.1 * ((5 * case) % 13) as f32);
+            let (mut world, mut tldi) = attached();
+            world.integration_parameters.length_unit = 20.0 * R;
+            let plate = ColliderBuilder::cuboid(30.0 * R, half, 30.0 * R);
+            world.insert(RigidBodyBuilder::fixed(), plate);
+            let place = Pose::from_parts(Vector::Y * (-half - below - lowest), rotation);
+            let body = RigidBodyBuilder::dynamic().pose(place);
+            world.insert(body, cloud_collider(cloud.clone()));
+            tldi.step(&mut world)?;
+            let manifolds =
+                || (world.narrow_phase.contact_pairs()).flat_map(|pair| pair.manifolds());
+            let deepest = |is_meant: fn(Vector) -> bool| {
+                let meant = manifolds().filter(|m| is_meant(m.data.normal));
+                let depths = meant.flat_map(|m| m.points.iter().map(|point| -point.dist / R));
+                depths.fold(0.0, f32::max)
+            };
+            let [up, down] = [deepest(|n| n.y > 0.0), deepest(|n| n.y <= 0.0)];
+            let what = format!(
+                "solid {k}, turned by {turn}, {:.1} r below: {up} and {down}",
+                below / R
+            );
+            assert!(up > 1.0, "{what}");
+            // What is measured against an exact surface is good to a fifth of a radius.
+            assert!(down <= 0.2, "{what}");
+        }
+    }
+    Ok(())
+}
+
 /// Lines pass, along an axis or not, and the pipeline names each of them once; the world goes on.
 #[test]
 fn lines_pass_and_are_named() -> TestResult {

@@ -223,7 +223,12 @@ fn contact_pixels(
                         is_met && !is_within
                     }
                     // The least way out counts.
-                    Order::AThenB => depth <= params.thickness && entered + depth <= *left,
+                    Order::AThenB => {
+                        // A rim that came through a plate goes out where it came from.
+                        let way_back = left - entered;
+                        depth <= params.thickness
+                            && (depth <= 0.0 || way_back > FARTHEST * depth.max(params.thickness))
+                    }
                 }
             });
         let Some((_, entry, _)) = entry else { continue };
