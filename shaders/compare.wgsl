@@ -232,8 +232,12 @@ fn is_left_at(c: Column, k: u32, entered: f32) -> bool {
     return k > c.begin && layers[max(k, c.begin + 1u) - 1u].depth >= entered;
 }
 
-// The layer of the body at the back that meets layer `kf` of the one in front, or NONE. On the other side of `a`, overlaps
-// count whose way back is FARTHEST times as long.
+// Whether one way out of an overlap is so much longer than the other that the other one counts.
+fn is_far_longer(way: f32, other: f32, thickness: f32) -> bool {
+    return way > FARTHEST * max(other, thickness);
+}
+
+// The layer of the body at the back that meets layer `kf` of the one in front, or NONE.
 fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_other_side: bool) -> u32 {
     let thickness = (*look).params.thickness;
     let entered = entered_at(front, kf, thickness);
@@ -244,14 +248,15 @@ fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_ot
         }
         let depth = layers[kf].depth - layers[kb].depth;
         let is_sure = facing_of(front, kf) == EXIT && facing_of(back, kb) == ENTRY;
-        let is_too_far = is_sure && depth > FARTHEST * max(left - entered, thickness);
+        let other_way = left - entered;
+        let is_too_far = is_sure && is_far_longer(depth, other_way, thickness);
         let is_opposed = opposed(layers[kb].normal, layers[kf].normal);
         let is_within = depth > 0.0
             && ((facing_of(back, kb) == ENTRY && is_entered_at(front, kf, left))
                 || (facing_of(front, kf) == EXIT && is_left_at(back, kb, entered)));
         let is_met = select(
             (depth <= thickness || (is_opposed && !is_too_far)) && !is_within,
-            depth <= thickness && (depth <= 0.0 || left - entered > FARTHEST * max(depth, thickness)),
+            depth <= thickness && (depth <= 0.0 || is_far_longer(other_way, depth, thickness)),
             is_other_side,
         );
         if is_met {

@@ -1,8 +1,8 @@
 //! Bodies that touch a surface in several places with several normals: corners of a tray, slots, links of a chain, rings
 //! around a pole. In the inner corners no single view sees all contacts, and middles of bodies tell nothing of the sides.
 
-use rapier3d::prelude::{PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
-use rapier3d_tldi::prelude::{TldiConfig, TldiPipeline};
+use rapier3d::prelude::{PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, SharedShape};
+use rapier3d_tldi::prelude::{TldiConfig, TldiPipeline, sample_shape};
 use std::f32::consts::{PI, TAU};
 use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi::{CameraPolicy, PairQuery, PairResult, Params, PointCloud, Surface, View};
@@ -154,6 +154,36 @@ fn both_walls_of_a_slot_are_met() {
         );
         let known = [(Vec3::X, gaps[0]), (-Vec3::X, gaps[1])];
         assert_eq!(fault(&result, &known), None, "case {k}");
+    }
+}
+
+/// A cone whose rim came through a thin plate is pushed back, not further through.
+#[test]
+fn a_rim_through_a_plate_is_pushed_back() {
+    let mut rng = fastrand::Rng::with_seed(35);
+    let cone = SharedShape::cone(7.0 * R, 10.0 * R);
+    let cone = sample_shape(&*cone, R).expect("a closed solid");
+    for k in 0..40 {
+        let plate_half = R * (1.5 + rng.f32());
+        let plate = block(Vec3::new(0.3, plate_half, 0.3), Vec3::ZERO, &mut rng);
+        let turn = (0.15 + 0.5 * rng.f32()) * Vec3::new(0.8, 0.0, 0.6);
+        let rotation = Quat::from_scaled_axis(turn);
+        let heights = cone.points().iter().map(|p| (rotation * *p).y);
+        let lowest = heights.fold(f32::INFINITY, f32::min);
+        let below = R * (0.5 + 1.2 * rng.f32());
+        let pose = Pose3::from_parts(Vec3::Y * (-plate_half - below - lowest), rotation);
+        let result = compared(&plate.cloud(R), &cone, pose, &mut rng, &[-Vec3::Y]);
+        let deepest = |sign: f32| {
+            let meant = (result.patches.iter()).filter(|patch| sign * patch.normal.y > 0.0);
+            let gaps = meant.flat_map(|patch| patch.points.iter().map(|point| point.gap / R));
+            -gaps.fold(0.0, f32::min)
+        };
+        let [up, down] = [1.0, -1.0].map(deepest);
+        // On the other side an overlap counts only where the way back is four times as long.
+        assert!(
+            up > 1.0 && 4.0 * down < up,
+            "case {k}, {below} m below: {up} r and {down} r"
+        );
     }
 }
 

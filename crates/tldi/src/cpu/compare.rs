@@ -208,13 +208,14 @@ fn contact_pixels(
             .filter(|(_, _, left)| entered <= *left)
             .find(|(kb, layer, left)| {
                 let depth = exit.depth - layer.depth;
+                let other_way = left - entered;
                 match order {
                     Order::BThenA => {
                         let is_sure = front.facing(exit) == Facing::Exit
                             && back.facing(layer) == Facing::Entry;
-                        let way_back = (left - entered).max(params.thickness);
                         let is_met = depth <= params.thickness
-                            || opposed(layer, exit) && !(is_sure && depth > FARTHEST * way_back);
+                            || opposed(layer, exit)
+                                && !(is_sure && is_far_longer(depth, other_way, params));
                         let is_within = depth > 0.0
                             && (back.facing(layer) == Facing::Entry
                                 && front.is_entered_at(kf, *left)
@@ -224,10 +225,8 @@ fn contact_pixels(
                     }
                     // The least way out counts.
                     Order::AThenB => {
-                        // A rim that came through a plate goes out where it came from.
-                        let way_back = left - entered;
                         depth <= params.thickness
-                            && (depth <= 0.0 || way_back > FARTHEST * depth.max(params.thickness))
+                            && (depth <= 0.0 || is_far_longer(other_way, depth, params))
                     }
                 }
             });
@@ -276,14 +275,20 @@ fn contact_pixels(
 /// but no overlap of 300 is falsely deep instead of 4; twice: depths of deep edges twice as wrong.
 const FACING: f32 = 0.5;
 
-/// The largest depth in ways out on the other side of both bodies. A body that was pushed most of the way through a wall
-/// still goes out where it came from. But where a ray passes both bodies at their rims, the other side is a layer away, and
-/// the axis has the wrong sign there. Half: no test of shallow contact changes; twice: links of a chain that touch are deep.
+/// How many times as long one way out of an overlap must be until the other one counts: the side is that of the axis. A body
+/// that was pushed most of the way through a wall, or the rim of one that came through a plate, goes out where it came from.
+/// But where a ray passes both bodies at their rims, the other side is a layer away, and the axis has the wrong sign there. Half: in half of 300 poses the rim of a cone goes further through a plate, as without
+/// this; twice: links of a chain that touch are deep.
 const FARTHEST: f32 = 4.0;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 2] =
     [("FACING", FACING as f64), ("FARTHEST", FARTHEST as f64)];
+
+/// Whether one way out is so much longer than the other that the other one counts.
+fn is_far_longer(way: f32, other: f32, params: &Params) -> bool {
+    way > FARTHEST * other.max(params.thickness)
+}
 
 /// Whether two layers face each other and the view, as surfaces do that push bodies apart.
 fn opposed(entry: &Layer, exit: &Layer) -> bool {
