@@ -277,8 +277,8 @@ const FACING: f32 = 0.5;
 
 /// How many times as long one way out of an overlap must be until the other one counts: the side is that of the axis. A body
 /// that was pushed most of the way through a wall, or the rim of one that came through a plate, goes out where it came from.
-/// But where a ray passes both bodies at their rims, the other side is a layer away, and the axis has the wrong sign there. Half: in half of 300 poses the rim of a cone goes further through a plate, as without
-/// this; twice: links of a chain that touch are deep.
+/// But where a ray passes both bodies at their rims, the other side is a layer away, and the axis has the wrong sign there.
+/// Half: the rim of a cone is pushed further through a plate in half of 300 poses; twice: links of a chain that touch are deep.
 const FARTHEST: f32 = 4.0;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
