@@ -20,6 +20,7 @@ fn query<'a>(a: Surface<'a>, b: Surface<'a>, a_from_b: Pose3, motion: Vec3) -> I
         touching: 0.0,
         core_only: false,
         penetration: None,
+        turned: &[],
         params: Params::for_radius(R),
     }
 }
@@ -412,6 +413,87 @@ fn what_is_in_a_sheet_leaves_it() {
         ] {
             let off = way(from, direction, penetration) - expected;
             assert!(off.abs() < 0.3 * R, "{off}: {direction}, {penetration:?}");
+        }
+    }
+}
+
+/// A bar in any pose over a floor without end: where its lowest point meets the floor, or that the motion ends before.
+#[test]
+fn bars_over_exact_floors() {
+    let mut rng = fastrand::Rng::with_seed(9);
+    let half = Vec3::new(0.3, 0.05, 0.1);
+    let samples = sampled_box(half, R, &mut rng);
+    let (plane, block) = (HalfSpace::new(Vector::Y), Cuboid::new(Vector::splat(20.0)));
+    let (plane, block) = (ExactShape(&plane), ExactShape(&block));
+    for cloud in [Samples::cloud, Samples::bare_cloud] {
+        let bar = cloud(&samples, R);
+        for case in 0..200 {
+            let mut pose = random_pose(&mut rng, 0.0);
+            let corner = (pose.rotation.inverse() * Vec3::Y).signum() * half;
+            let gap = (1.0 + 5.0 * rng.f32()) * R;
+            pose.translation.y = (pose.rotation * corner).y + gap;
+            let down = (random_unit(&mut rng) - 2.0 * Vec3::Y).normalize();
+            let truth = gap / -down.y;
+            let (floor, middle) = [(&plane, 0.0), (&block, -20.0)][case % 2];
+            let floor = Surface::Exact(floor);
+            pose.translation.y -= middle;
+            let length = truth + 4.0 * R * (rng.f32() - 0.5).signum();
+            let found = impact(&query(floor, Surface::Cloud(&bar), pose, length * down));
+            match found {
+                // Splats reach up to a radius beyond a corner, and rays pass it at up to half a diagonal of a pixel.
+                Some(found) => {
+                    let late = found.distance - truth;
+                    assert!(length > truth, "met {late} m late, after the motion's end");
+                    assert!((-R..1.5 * R).contains(&late), "{late} m late");
+                }
+                None => assert!(length < truth, "passes by {} m", length - truth),
+            }
+        }
+    }
+}
+
+/// A bar tips over about its lower end. Its middle falls, and in a motion without a turn so would its end; but that stays
+/// on the floor, unless later poses take it under.
+#[test]
+fn what_turns_meets_what_it_goes_into() {
+    let mut rng = fastrand::Rng::with_seed(10);
+    let half = Vec3::new(0.2, 0.03, 0.1);
+    let samples = sampled_box(half, R, &mut rng);
+    let ground = sampled_plane(1.0, R, &mut rng);
+    let plane = HalfSpace::new(Vector::Y);
+    let exact = Surface::Exact(&ExactShape(&plane));
+    for cloud in [Samples::cloud, Samples::bare_cloud] {
+        let (bar, floor) = (cloud(&samples, R), cloud(&ground, R));
+        for floor in [exact, Surface::Cloud(&floor)] {
+            let lower_end = Vec3::new(-half.x, -half.y, 0.0);
+            let turned_by = |angle: f32| {
+                let turn = Quat::from_rotation_z(angle);
+                Pose3::from_parts(0.1 * R * Vec3::Y - turn * lower_end, turn)
+            };
+            let (from, to) = (0.5, 0.3);
+            let mut motion = turned_by(to).translation - turned_by(from).translation;
+            let mut poses = [1, 2, 3, 4].map(|k| turned_by(from + 0.25 * k as f32 * (to - from)));
+            let start = turned_by(0.5 * (from + to)).rotation;
+            let seen = |motion: Vec3, turned: &[Pose3]| {
+                impact(&ImpactQuery {
+                    touching: 0.2 * R,
+                    core_only: true,
+                    turned,
+                    ..query(
+                        floor,
+                        Surface::Cloud(&bar),
+                        Pose3::from_parts(turned_by(from).translation, start),
+                        motion,
+                    )
+                })
+            };
+            assert!(seen(motion, &[]).is_some(), "its end seems to fall");
+            assert_eq!(seen(motion, &poses), None);
+            motion.y -= 3.0 * R;
+            for (k, pose) in poses.iter_mut().enumerate() {
+                pose.translation.y -= 0.75 * (k + 1) as f32 * R;
+            }
+            assert!(seen(motion, &poses).is_some(), "its end goes under");
         }
     }
 }

@@ -164,6 +164,7 @@ impl CloudQuery {
                 touching: 0.0,
                 core_only: false,
                 penetration: None,
+                turned: &[],
                 params,
             })
             .context("the motion cannot be followed: is the velocity sensible?")?;

@@ -207,6 +207,7 @@ fn impacts_are_on_the_way() {
                 touching: 0.0,
                 core_only: flags[1],
                 penetration: None,
+                turned: &[],
                 params: params.of(cloud_b.mean_radius()),
             };
             let answer = CpuBackend::new().impact(&query);

@@ -110,6 +110,7 @@ fn a_warm_backend_allocates_nothing() {
                         touching: 0.0,
                         core_only: false,
                         penetration: None,
+                        turned: &[],
                         params: Params::for_radius(r),
                     };
                     let impact = backend.impact(&cast).expect("the pair is supported");

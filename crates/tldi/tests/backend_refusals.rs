@@ -187,6 +187,7 @@ fn poses_that_are_not_rigid() {
             touching: 0.0,
             core_only: false,
             penetration: None,
+            turned: &[],
             params,
         });
         let Err(BackendError::Unsupported { reason, .. }) = cast else {
@@ -208,6 +209,7 @@ fn penetrations_are_finite() {
             touching: 0.0,
             core_only: false,
             penetration: Some(Penetration { normal, depth }),
+            turned: &[],
             params: Params::for_radius(0.01),
         };
         match CpuBackend::new().impact(&query) {

@@ -91,6 +91,7 @@ fn compare_and_cast() {
         touching: 0.0,
         core_only: false,
         penetration: None,
+        turned: &[],
         params,
     });
     let impact = impact

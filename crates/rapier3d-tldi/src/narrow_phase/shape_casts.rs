@@ -206,13 +206,14 @@ fn turning_impact(
             normal: from_1_to_2 * (motions[0].start.rotation.inverse() * found.normal),
             ..found
         }),
+        start,
         end,
         room: RefCell::default(),
     };
-    let hit = turning.impact(start);
+    let hit = turning.impact();
     shared.tell_coarser(turning.room.borrow().coarser());
     let hit = hit?;
-    if turning.is_blocked(start, &hit) {
+    if turning.is_blocked(&hit) {
         let world_from_a = motions[0].position_at_time(hit.time_of_impact);
         let blocked = Blocked {
             point: world_from_a * hit.witness1,
@@ -307,6 +308,7 @@ impl Straight<'_> {
             },
             core_only: !options.stop_at_penetration,
             penetration: None,
+            turned: &[],
             params: *params,
         };
         let mut room = Room::default();

@@ -4,16 +4,23 @@
 //! and the middle of the smaller shape moves straight. This displaces points. The displacement is
 //! added to the distance at which surfaces count as met, so an impact is found too early rather
 //! than too late. Some points do not lie in the way and only turn towards the other shape. Contacts
-//! within reach at the beginning of the piece find them. Most motions meet only what touches
-//! already. So pieces are long at first: as far as a body may turn that rapier calls slow. Only
-//! pieces in which something is met are cast again in short ones. The images of all pieces share one
-//! [`Room`]. Once it is used up, no piece is cast again.
+//! within reach at the beginning of the piece find them.
+//!
+//! What touches already seems to be met in every long piece: where a body rolls or tips over, all
+//! of it seems to fall with its middle. So a piece also knows the poses that the body truly takes
+//! until the motion ends. What meets the other shape must be taken into it by one of them.
+//!
+//! Most motions meet nothing. So pieces are long at first: as far as a body may turn that rapier
+//! calls slow. Only pieces in which something is met are cast again in short ones, but for those
+//! that end before it can be met. The images of all pieces share one [`Room`]. Once it is used up,
+//! no piece is cast again.
 
 use super::moving::{Moving, TOUCHING, hit_of};
 use super::parts::{ShapePair, rigid, surface};
 use super::straight_way::StraightWay;
 use crate::shape::exact::ExactShape;
 use crate::step::prepared::Shared;
+use arrayvec::ArrayVec;
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::{NonlinearRigidMotion, ShapeCastHit};
 use std::cell::RefCell;
@@ -52,7 +59,8 @@ pub(super) struct Turning<'a> {
     pub(super) params: Params,
     /// How they are in each other at first, in the frame of the first part.
     pub(super) penetration: Option<Penetration>,
-    /// The time until which it lasts.
+    /// The times between which it lasts.
+    pub(super) start: f32,
     pub(super) end: f32,
     /// Of the images of all pieces.
     pub(super) room: RefCell<Room>,
@@ -65,6 +73,13 @@ struct Piece {
     to: f32,
     /// What the rotation of its middle displaces points by, metres.
     displacement: f32,
+}
+
+/// What is met in a piece.
+struct Met {
+    hit: ShapeCastHit,
+    /// A bound of the time: the hit may be later by what a piece displaces points by.
+    not_before: f32,
 }
 
 impl Turning<'_> {
@@ -112,59 +127,63 @@ impl Turning<'_> {
         })
     }
 
-    /// The impact.
-    pub(super) fn impact(&self, start: f32) -> Option<ShapeCastHit> {
+    /// Poses from the second part's frame into the first one's, often enough that no point moves by more than
+    /// [`MAX_DISPLACEMENT`] off its way between two of them. None without a turn.
+    fn poses_after(&self, piece: &Piece) -> ArrayVec<Pose, { MAX_PIECES as usize }> {
+        if (self.motions.iter()).all(|motion| motion.angvel == Vector::ZERO) {
+            return ArrayVec::new();
+        }
         let fine = MAX_DISPLACEMENT * self.params.pixel_size;
-        let mut whole = self.pieces(start, self.end, fine);
+        let rest = self.pieces(piece.from, self.end, fine);
+        rest.map(|piece| self.a_from_b(piece.to, piece.to))
+            .collect()
+    }
+
+    /// The impact.
+    pub(super) fn impact(&self) -> Option<ShapeCastHit> {
+        let fine = MAX_DISPLACEMENT * self.params.pixel_size;
+        let mut whole = self.pieces(self.start, self.end, fine);
         if whole.len() == 1 {
-            return whole.find_map(|piece| self.met_by_moving(piece));
+            return whole.find_map(|piece| self.met_by_moving(piece).map(|met| met.hit));
         }
         let coarse = fine.max(SLOW * self.moving.parts[1].ccd_thickness());
-        self.pieces(start, self.end, coarse).find_map(|piece| {
-            let hit = self.hit_in(piece)?;
-            let mut finer = self.pieces(piece.from, piece.to, fine);
+        self.pieces(self.start, self.end, coarse).find_map(|piece| {
+            let met = self.met_in(piece)?;
+            let finer = self.pieces(piece.from, piece.to, fine);
             if finer.len() == 1 || self.room.borrow().is_used_up() {
-                return Some(hit);
+                return Some(met.hit);
             }
-            finer.find_map(|piece| self.hit_in(piece))
+            // The last one sees what would seem to touch already in the next long piece.
+            let last = finer.len() - 1;
+            let mut rest = (finer.enumerate())
+                .skip_while(|(k, finer)| *k < last && finer.to <= met.not_before);
+            rest.find_map(|(_, piece)| self.met_in(piece).map(|met| met.hit))
         })
     }
 
     /// Whether what is deep in contact is held there.
-    pub(super) fn is_blocked(&self, start: f32, hit: &ShapeCastHit) -> bool {
+    pub(super) fn is_blocked(&self, hit: &ShapeCastHit) -> bool {
         let middle = self.moving.parts[1].compute_local_aabb().center();
-        let [before, held] = [start, hit.time_of_impact].map(|t| self.a_from_b(t, t) * middle);
+        let [before, held] = [self.start, hit.time_of_impact].map(|t| self.a_from_b(t, t) * middle);
         let pixel = self.params.pixel_size;
         let is_deep = self.penetration.is_some_and(|p| p.depth > DEEP * pixel);
         is_deep && hit.time_of_impact < self.end && before.distance(held) <= BLOCKED * pixel
     }
 
     /// What is met first in a piece.
-    fn hit_in(&self, piece: Piece) -> Option<ShapeCastHit> {
-        let hits = [self.met_by_moving(piece), self.met_by_turning(piece)];
-        (hits.into_iter().flatten()).min_by(|m, n| m.time_of_impact.total_cmp(&n.time_of_impact))
+    fn met_in(&self, piece: Piece) -> Option<Met> {
+        let met = [self.met_by_moving(piece), self.met_by_turning(piece)];
+        met.into_iter().flatten().reduce(|m, n| Met {
+            hit: match m.hit.time_of_impact <= n.hit.time_of_impact {
+                true => m.hit,
+                false => n.hit,
+            },
+            not_before: m.not_before.min(n.not_before),
+        })
     }
 
-    /// What is met in a piece. In a fine one, the point that meets it must truly go into it by more than a pixel before the
-    /// motion ends, as in straight motions. Where a body rolls or tips over it does not: its middle falls, as all of it seems to
-    /// do in a piece, but its lower end does not.
-    fn met_by_moving(&self, piece: Piece) -> Option<ShapeCastHit> {
-        let hit = self.seems_met_by_moving(piece)?;
-        let pixel = self.params.pixel_size;
-        let fine = MAX_DISPLACEMENT * pixel;
-        if piece.displacement <= 0.0 || piece.displacement > fine {
-            return Some(hit);
-        }
-        let goes_in = |rest: Piece| {
-            let way = self.a_from_b(rest.to, rest.to) * hit.witness2 - hit.witness1;
-            way.dot(hit.normal1) < -pixel
-        };
-        let mut rest = self.pieces(piece.from, self.end, fine);
-        rest.any(goes_in).then_some(hit)
-    }
-
-    /// The same, as if the body had the rotation of the piece's middle all the while.
-    fn seems_met_by_moving(&self, piece: Piece) -> Option<ShapeCastHit> {
+    /// What is met in a piece, as if the body had the rotation of the piece's middle all the while.
+    fn met_by_moving(&self, piece: Piece) -> Option<Met> {
         let Piece {
             from,
             to,
@@ -184,6 +203,7 @@ impl Turning<'_> {
         let longer = way + f64::from(beyond) * way.try_normalize()?;
         let way = StraightWay::new(self.moving.parts, &frozen, longer, &self.params)?;
         let [a, b] = self.moving.parts.map(ExactShape);
+        let turned = self.poses_after(&piece);
         let query = ImpactQuery {
             a: surface(&a),
             b: surface(&b),
@@ -192,26 +212,32 @@ impl Turning<'_> {
             touching,
             core_only: true,
             penetration: self.penetration,
+            turned: &turned,
             params: self.params,
         };
         let impact = (self.shared).impact_on_the_spot(&query, &mut self.room.borrow_mut())?;
         // Not at the very start, which a solver takes for a contact that it has.
         let distance = way.from + f64::from(impact.distance);
-        let early = (distance - f64::from(displacement))
-            .max(0.5 * distance)
-            .max(f64::from(0.5 * touching));
-        let time = f64::from(from) + f64::from(to - from) * early / length;
+        let earliest = distance - f64::from(displacement);
+        let early = earliest.max(0.5 * distance).max(f64::from(0.5 * touching));
+        let time_at = |way: f64| (f64::from(from) + f64::from(to - from) * way / length) as f32;
         let moved = way.at(&frozen, impact.distance);
-        Some(hit_of(&impact, (time as f32).min(self.end), &moved))
+        Some(Met {
+            hit: hit_of(&impact, time_at(early).min(self.end), &moved),
+            not_before: time_at(earliest),
+        })
     }
 
-    fn met_by_turning(&self, Piece { from, to, .. }: Piece) -> Option<ShapeCastHit> {
+    fn met_by_turning(&self, Piece { from, to, .. }: Piece) -> Option<Met> {
         let touching = TOUCHING * self.params.pixel_size;
         let poses = [from, to].map(|time| self.a_from_b(time, time));
         let goes_on = to < self.end;
         let (share, impact) = self.closed_by_turning(poses, touching, goes_on)?;
         let time = from + (to - from) * share;
-        Some(hit_of(&impact, time, &self.a_from_b(time, time)))
+        Some(Met {
+            hit: hit_of(&impact, time, &self.a_from_b(time, time)),
+            not_before: from,
+        })
     }
 
     /// Of the contacts that a piece of the motion closes, the first one, and the share of the piece until then: what

@@ -124,6 +124,7 @@ impl CpuBackend {
     ///     touching: 0.0,
     ///     core_only: false,
     ///     penetration: None,
+    ///     turned: &[],
     ///     params: Params::for_radius(0.05),
     /// })?;
     /// let impact = impact.expect("the sheets meet");

@@ -53,6 +53,7 @@ const LEAST: f32 = (1 << 11) as f32;
 ///             touching: 0.0,
 ///             core_only: false,
 ///             penetration: None,
+///             turned: &[],
 ///             params: Params::for_radius(0.2),
 ///         },
 ///         &mut room,

@@ -93,8 +93,8 @@ pub(super) struct ExactView<'a> {
 pub(super) enum Scope {
     /// In the cloud's columns, if the surface is within this many metres of it there.
     Near(f32),
-    /// Where the cloud is, up to this many metres before and behind it.
-    Cloud(f32),
+    /// The same, up to this many metres before and behind the cloud.
+    Ahead(f32),
     /// Where the cloud is not, too, and around; up to this many metres before and behind it.
     Everywhere(f32),
 }
@@ -380,7 +380,7 @@ impl Side {
         let pixels = rect.pixels() as f32;
         let rays = match look.scope {
             Scope::Everywhere(_) => pixels,
-            Scope::Near(_) | Scope::Cloud(_) => pixels.min(fragments),
+            Scope::Near(_) | Scope::Ahead(_) => pixels.min(fragments),
         };
         Cost::new(rect, self.points.len(), fragments).with_rays(rays)
     }
@@ -399,7 +399,7 @@ impl Side {
         let mut seen = self.project(view)?;
         let border = match look.scope {
             Scope::Everywhere(_) => BORDER,
-            Scope::Near(_) | Scope::Cloud(_) => 0,
+            Scope::Near(_) | Scope::Ahead(_) => 0,
         };
         seen.rect = seen.rect.grown(border);
         // Where the surface is not, nothing meets it.
@@ -440,13 +440,17 @@ impl Side {
         let (mut seen, rect, covered) = self.project_with(view, look, shared)?;
         let reach;
         (seen.rect, reach) = match look.scope {
-            Scope::Near(reach) => {
+            Scope::Near(reach) | Scope::Ahead(reach) => {
                 let imaging = self.meet_exact(view, &seen, covered, &look.exact, reach, shared)?;
                 self.image(view, &imaging, Some(&shared.touching));
-                // The part that the cloud is deep in, doubled for places without samples.
-                (imaging.rect, 2.0 * self.deepest)
+                let through = match look.scope {
+                    // The part that the cloud is deep in, doubled for places without samples.
+                    Scope::Near(_) => 2.0 * self.deepest,
+                    _ => reach,
+                };
+                (imaging.rect, through)
             }
-            Scope::Cloud(reach) | Scope::Everywhere(reach) => {
+            Scope::Everywhere(reach) => {
                 self.whole_image(view, &seen, rect);
                 (rect, reach)
             }

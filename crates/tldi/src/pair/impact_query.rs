@@ -26,6 +26,11 @@ pub struct ImpactQuery<'a> {
     /// The penetration of `b` into `a` before the motion, if its side of `a` is known. On its way
     /// there, `b` passes the surface that it is in.
     pub penetration: Option<Penetration>,
+    /// Where `b` turns, too: poses that it truly takes later, from its frame into that of `a`. A point of `b` then meets
+    /// `a` only if one of them takes it more than a pixel behind the surface there. Where a body rolls or tips over, its
+    /// middle falls, as all of it seems to do in a motion without a turn, but its lower end does not. Empty without a
+    /// turn: the motion alone decides.
+    pub turned: &'a [Pose3],
     /// Parameters of the images; `prediction` adds to the region that is looked at.
     pub params: Params,
 }

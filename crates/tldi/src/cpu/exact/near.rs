@@ -63,7 +63,7 @@ impl Side {
 
     /// Fills `kept` with the points that may be within `reach` metres of the surface, and `support` with those within
     /// `beyond` metres more; with coarser ones farther away.
-    fn in_near_cells(&mut self, exact: &Placed, reach: f32, beyond: f32) {
+    pub(crate) fn in_near_cells(&mut self, exact: &Placed, reach: f32, beyond: f32) {
         let cells = &mut self.cell_distances;
         cells.begin(self.points.points(), reach);
         self.support.clear();

@@ -6,6 +6,7 @@
 
 use crate::contact::lone_points::LonePoints;
 use crate::cpu::cull::{self, PointRadii, Region};
+use crate::cpu::exact::placed::Placed;
 use crate::cpu::fold::ViewFold;
 use crate::cpu::motion::core::{BORDER, CORE, CoreScratch, OUTSIDE, RIM};
 use crate::cpu::motion::meeting::Meeting;
@@ -41,6 +42,11 @@ impl Scratch {
         }
         let camera = VirtualCamera::along(query.motion, query.params.pixel_size);
         self.cull_swept(query, &camera)?;
+        let rings = [query.a, query.b].map(|surface| ring(&surface, &query.params).widest());
+        let reach = length + query.params.prediction + rings[0].max(rings[1]);
+        if !self.reaches_exact(query, reach) {
+            return None;
+        }
         let look = Look {
             surfaces: [query.a, query.b],
             a_from_b: &query.a_from_b,
@@ -51,7 +57,7 @@ impl Scratch {
         // The rim of an exact surface that moves is not that of the cloud.
         let scope = match query.b {
             Surface::Exact(_) => Scope::Everywhere(length),
-            _ => Scope::Cloud(length),
+            _ => Scope::Ahead(reach),
         };
         let seen = self.look_at(&look, length + query.params.thickness, scope);
         if let Some(by) = self.shared.room.take_wanted() {
@@ -101,6 +107,21 @@ impl Scratch {
             normal: (frame_from_view * normal).normalize_or(-camera.axis()),
             coarser: (coarser > 1.0).then_some(coarser),
         })
+    }
+
+    /// Whether a culled point may be within `reach` metres of an exact surface, if one of both is exact.
+    fn reaches_exact(&mut self, query: &ImpactQuery, reach: f32) -> bool {
+        let (side, surface, frame_from_surface) = match (query.a, query.b) {
+            (Surface::Exact(surface), _) => (&mut self.b, surface, &Pose3::IDENTITY),
+            (_, Surface::Exact(surface)) => (&mut self.a, surface, &query.a_from_b),
+            _ => return true,
+        };
+        let exact = Placed {
+            surface,
+            frame_from_surface,
+        };
+        side.in_near_cells(&exact, reach, 0.0);
+        !side.kept.is_empty()
     }
 
     /// Fills both sides with the points that the motion can bring together. `None` if there are none.
@@ -214,8 +235,23 @@ impl Motion<'_> {
                 && (meeting.distance >= query.touching || approach > query.params.pixel_size)
         };
         met.flat_map(leading)
-            .filter(|meeting| meeting.distance > beyond && in_way(meeting))
+            .filter(|meeting| meeting.distance > beyond && in_way(meeting) && self.goes_in(meeting))
             .min_by(|m, n| m.distance.total_cmp(&n.distance))
+    }
+
+    /// Whether the point of `b` that meets `a` goes in by more than a pixel later, if that is known.
+    fn goes_in(&self, meeting: &Meeting) -> bool {
+        let query = self.query;
+        if query.turned.is_empty() {
+            return true;
+        }
+        let frame_from_view = self.camera.view_from_frame.rotation.inverse();
+        let normal = frame_from_view * meeting.met_normal;
+        let place = self.point(meeting.pixel, meeting.depth);
+        let before = self.point(meeting.pixel, meeting.depth - meeting.distance);
+        let of_b = query.a_from_b.inverse() * before;
+        let height = |pose: &Pose3| normal.dot(*pose * of_b - place);
+        (query.turned.iter()).any(|pose| height(pose) < -query.params.pixel_size)
     }
 
     /// The place in a pixel at `depth` metres, in the frame of the query.

@@ -13,8 +13,10 @@ pub(crate) struct Meeting {
     pub(crate) depth: f32,
     /// Least cosine between the motion and the normals of both.
     pub(crate) facing: f32,
-    /// Unit normal towards the moving surface, in the view frame.
+    /// Unit normal towards the moving surface, in the view frame: between those of both.
     pub(crate) normal: Vec3,
+    /// Unit normal of the surface that is met, towards the moving one, in the view frame.
+    pub(crate) met_normal: Vec3,
 }
 
 impl Meeting {
@@ -27,6 +29,7 @@ impl Meeting {
             distance: depth - back(leading, params),
             facing,
             depth,
+            met_normal: against(met.normal),
             normal: (against(met.normal) + against(leading.normal)).normalize_or(-Vec3::Z),
         }
     }
