@@ -198,9 +198,9 @@ fn poses_that_are_not_rigid() {
 }
 
 #[test]
-fn penetrations_are_finite() {
+fn penetrations_and_later_poses_are_finite() {
     let cloud = two_points();
-    let cast = |normal, depth| {
+    let cast = |normal, depth, later| {
         let query = ImpactQuery {
             a: Surface::Cloud(&cloud),
             b: Surface::Cloud(&cloud),
@@ -209,7 +209,7 @@ fn penetrations_are_finite() {
             touching: 0.0,
             core_only: false,
             penetration: Some(Penetration { normal, depth }),
-            turned: &[],
+            turned: &[Pose3::IDENTITY, Pose3::from_translation(later)],
             params: Params::for_radius(0.01),
         };
         match CpuBackend::new().impact(&query) {
@@ -218,9 +218,10 @@ fn penetrations_are_finite() {
             Err(other) => panic!("{other}"),
         }
     };
-    assert_eq!(cast(Vec3::Y, 0.1), None);
-    refused(cast(Vec3::NAN, 0.1), "penetration");
-    refused(cast(Vec3::Y, f32::INFINITY), "penetration");
+    assert_eq!(cast(Vec3::Y, 0.1, Vec3::X), None);
+    refused(cast(Vec3::NAN, 0.1, Vec3::X), "penetration");
+    refused(cast(Vec3::Y, f32::INFINITY, Vec3::X), "penetration");
+    refused(cast(Vec3::Y, 0.1, Vec3::NAN), "turned");
 }
 
 /// Farther apart, depths would all count as the last one that can be told.

@@ -186,6 +186,9 @@ impl ImpactQuery<'_> {
         if !self.penetration.is_none_or(is_finite) {
             return Err("normal and depth of the penetration must be finite");
         }
+        if !self.turned.iter().all(Pose3::is_finite) {
+            return Err("the poses of turned must be finite");
+        }
         is_countable(&[self.a, self.b], self.params.pixel_size)
     }
 }
