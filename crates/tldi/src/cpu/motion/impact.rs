@@ -4,6 +4,7 @@
 //! ray enters the other one. The least of these distances is the distance to the impact. The images hold all that the
 //! motion passes, so no surface is too thin, and none too fast.
 
+use crate::cloud::reach::Ring;
 use crate::contact::lone_points::LonePoints;
 use crate::cpu::cull::{self, PointRadii, Region};
 use crate::cpu::exact::placed::Placed;
@@ -41,9 +42,10 @@ impl Scratch {
             return None;
         }
         let camera = VirtualCamera::along(query.motion, query.params.pixel_size);
-        self.cull_swept(query, &camera)?;
-        let rings = [query.a, query.b].map(|surface| ring(&surface, &query.params).widest());
-        let reach = length + query.params.prediction + rings[0].max(rings[1]);
+        let rings = [query.a, query.b].map(|surface| ring(&surface, &query.params));
+        let widest_ring = rings[0].widest().max(rings[1].widest());
+        self.cull_swept(query, &camera, rings, widest_ring)?;
+        let reach = length + query.params.prediction + widest_ring;
         if !self.reaches_exact(query, reach) {
             return None;
         }
@@ -125,9 +127,13 @@ impl Scratch {
     }
 
     /// Fills both sides with the points that the motion can bring together. `None` if there are none.
-    fn cull_swept(&mut self, query: &ImpactQuery, camera: &VirtualCamera) -> Option<()> {
-        let [ring_a, ring_b] = [query.a, query.b].map(|surface| ring(&surface, &query.params));
-        let widest_ring = ring_a.widest().max(ring_b.widest());
+    fn cull_swept(
+        &mut self,
+        query: &ImpactQuery,
+        camera: &VirtualCamera,
+        [ring_a, ring_b]: [Ring; 2],
+        widest_ring: f32,
+    ) -> Option<()> {
         let widest = query.params.prediction + widest_ring;
         let way = query.motion.length() * Vec3::Z;
         let view_from_a = camera.view_from_frame;
