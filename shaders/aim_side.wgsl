@@ -139,7 +139,8 @@ fn orientation(pair: u32) -> i32 {
     let before = side_of(pair, sheet, -motion);
     var by_memory = 0;
     if pairs[pair].has_last != 0u {
-        by_memory = conclusive(dot(axis, pairs[pair].last_axis));
+        let remembered = dot(axis, pairs[pair].last_axis);
+        by_memory = select(0, select(-1, 1, remembered > 0.0), abs(remembered) >= WELL_SEEN);
     }
     let by_places = side_by_places(pair);
     by_memory = select(by_memory, 0, by_places == -by_memory);
@@ -157,5 +158,8 @@ fn orientation(pair: u32) -> i32 {
     told = select(by_place, told, told != 0);
     told = select(conclusive(of_b - of_a), told, told != 0);
     told = select(conclusive(by_position), told, told != 0);
-    return select(2 * told, select(-1, 1, by_position >= 0.0), told == 0);
+    // Where `b` moves along the axis, it comes from where that points away from.
+    let moves = dot(motion, axis);
+    let guess = select(by_position, moves, moves != 0.0);
+    return select(2 * told, select(-1, 1, guess >= 0.0), told == 0);
 }

@@ -49,8 +49,7 @@ pub const MAX_VIEWS: usize = 3;
 const WELL_SEEN: f32 = 0.643;
 
 /// Mean of n·v, over the normals that face an axis, below which their signs say nothing about the side. (A ring around
-/// a deep contact has normals all around the axis.) It is also the least cosine between an axis and the last one. Half
-/// or twice: no change.
+/// a deep contact has normals all around the axis.) Half or twice: no change.
 const CONCLUSIVE: f32 = 0.3;
 
 /// Weight of the direction to `b`, if `b` plainly lies or comes from there, beside the normals of a
@@ -171,13 +170,16 @@ fn aim_at_zone(
 
 /// The axis or its opposite, such that it points from `b` towards `a`; and whether anything told.
 ///
-/// A body keeps its side, unless the near points plainly tell another. This holds it on a sheet without an inside.
-/// Next, the near points decide; then the place where the body plainly lies. The outside of one surface alone only
-/// decides about deep bodies: it may be thin and passed already.
+/// A body keeps its side of what the last axis saw well, unless the near points plainly tell another. This holds it on a sheet
+/// without an inside. Of a floor, an axis that looked at the wall beside it remembers nothing. Next, the near points decide;
+/// then the place where the body plainly lies. The outside of one surface alone only decides about deep bodies: it may be
+/// thin and passed already. If nothing tells, `b` comes from where it moves away from.
 fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3, bool) {
     let conclusive = |sign: f32| (sign.abs() >= CONCLUSIVE).then_some(sign > 0.0);
     let by_places = side_by_places(sides, axis);
-    let by_memory = conclusive(approach.last_axis.map_or(0.0, |last| axis.dot(last)))
+    let remembered = approach.last_axis.map_or(0.0, |last| axis.dot(last));
+    let by_memory = (remembered.abs() >= WELL_SEEN)
+        .then_some(remembered > 0.0)
         .filter(|&remembered| by_places != Some(!remembered));
     let [of_a, of_b] = sides.each_ref().map(|side| side.mean_along(axis));
     let larger = sides[usize::from(!approach.body.is_b)];
@@ -188,7 +190,9 @@ fn oriented(axis: Vec3, sides: &[ZoneNormals; 2], approach: &Approach) -> (Vec3,
         .or_else(|| approach.side_by_position(axis, sheet))
         .or_else(|| conclusive(of_b - of_a))
         .or_else(|| conclusive(by_position));
-    if agrees.unwrap_or(by_position >= 0.0) {
+    let moves = approach.motion.dot(axis);
+    let guess = if moves != 0.0 { moves } else { by_position };
+    if agrees.unwrap_or(guess >= 0.0) {
         (axis, agrees.is_some())
     } else {
         (-axis, agrees.is_some())
@@ -411,6 +415,30 @@ mod tests {
         };
         assert_eq!(axis(0.0), -Vec3::Y);
         assert_eq!(axis(-0.3), Vec3::Y);
+    }
+
+    /// An axis that looked along a floor, at a wall beside it, does not tell on which side of the floor a body is.
+    #[test]
+    fn a_wall_that_was_looked_at_tells_nothing_of_the_floor() {
+        let floor = [Vec3::Y; 10];
+        let sides = [zone(&floor, false), zone(&floor, false)];
+        for tilt in [-0.4f32, -0.2, 0.2, 0.4] {
+            let last = Vec3::new((1.0 - tilt * tilt).sqrt(), tilt, 0.0);
+            let approach = at_sheet(0.2 * Vec3::Y, Vec3::ZERO, Some(last));
+            // The last axis draws the new one a little towards itself.
+            assert!(zone_axes(sides, &approach)[0].y < -0.9, "{tilt}");
+        }
+    }
+
+    /// Where a body's middle tells nothing, as of a large one that touches uneven ground beside it, the motion does.
+    #[test]
+    fn what_falls_comes_from_above() {
+        let floor = [Vec3::Y; 10];
+        let sides = [zone(&floor, false), zone(&floor, false)];
+        for height in [-0.15, -0.1, 0.0, 0.1] {
+            let approach = at_sheet(height * Vec3::Y, -0.05 * Vec3::Y, None);
+            assert_eq!(zone_axes(sides, &approach), [-Vec3::Y], "{height}");
+        }
     }
 
     /// A motion along a slope does not tell from which side of it a body came.
