@@ -49,8 +49,6 @@ impl GapFit {
         let mut ring = ArrayVec::<(u32, usize), MOST_NEIGHBORS>::new();
         // The first of the ring in each of the 5 × 5 pixels: others in the same pixel are rare.
         let mut first = [NONE; PLACES];
-        let mut moments = BASIS[MIDDLE] * contacts[k as usize].gap;
-        let mut pattern = 1u32 << MIDDLE;
         ring.push((k, MIDDLE));
         first[MIDDLE] = k;
         let mut push_neighbors = |ring: &mut ArrayVec<_, MOST_NEIGHBORS>, of: u32, at: usize| {
@@ -64,8 +62,6 @@ impl GapFit {
                 }
                 if !ring.is_full() {
                     ring.push((l, place));
-                    moments += BASIS[place] * contacts[l as usize].gap;
-                    pattern |= 1 << place;
                 }
             }
         };
@@ -73,6 +69,11 @@ impl GapFit {
         for near in 1..ring.len() {
             let (of, at) = ring[near];
             push_neighbors(&mut ring, of, at);
+        }
+        let (mut moments, mut pattern) = (Vec4::ZERO, 0u32);
+        for &(l, place) in &ring {
+            moments += BASIS[place] * contacts[l as usize].gap;
+            pattern |= 1 << place;
         }
         let places = ring.iter().map(|(_, place)| *place);
         if ring.len() != pattern.count_ones() as usize {

@@ -12,6 +12,7 @@ use crate::cpu::normals::sorted::{Grid, Sorted};
 use crate::cpu::zone::AroundPlaces;
 use crate::{Aabb, BLOCK, ContactPixel, PairQuery, PairResult, PointCloud, Surface};
 use glamx::{Mat3, Pose3, Vec3};
+use std::ops::Range;
 
 /// Neighbours that tell how dense points are. Clouds of fewer have no lone points.
 const NEIGHBORS: usize = 4;
@@ -160,6 +161,23 @@ impl Surroundings {
         best
     }
 
+    /// Whether `cloud` has as many neighbours of `place` from `beyond` to `reach` metres away as tell how dense points are.
+    fn has_neighbors(&self, cloud: &PointCloud, place: Vec3, beyond: f32, reach: f32) -> bool {
+        if reach > self.known(place) {
+            let [.., (farthest, _)] = self.nearest(cloud, place, beyond, reach);
+            return farthest.is_finite();
+        }
+        let [x, y, z] = &self.sorted.coordinates;
+        let in_row = |row: Range<usize>| {
+            let points = x[row.clone()].iter().zip(&y[row.clone()]).zip(&z[row]);
+            let squared = points.map(|((x, y), z)| Vec3::new(*x, *y, *z).distance_squared(place));
+            let are_near = squared.map(|d| (d >= beyond * beyond) & (d <= reach * reach));
+            are_near.map(u32::from).sum::<u32>()
+        };
+        let rows = self.sorted.rows(self.grid.cell_of(place));
+        rows.map(in_row).into_iter().sum::<u32>() >= NEIGHBORS as u32
+    }
+
     /// The point of `cloud` nearest to `place`, if it stands alone.
     fn lone_point(&self, cloud: &PointCloud, place: Vec3) -> Option<Vec3> {
         let [same, reach] = [SAME_POINT, REACH].map(|radii| radii * cloud.mean_radius());
@@ -169,10 +187,8 @@ impl Surroundings {
         // The nearest ones may stand alone as well.
         let usual = apart.sqrt() / ALONE;
         let is_alone = apart.is_finite()
-            && neighbors.iter().any(|&(_, neighbor)| {
-                let [.., (fourth, _)] = self.nearest(cloud, neighbor, same, usual);
-                fourth.is_finite()
-            });
+            && (neighbors.iter())
+                .any(|&(_, neighbor)| self.has_neighbors(cloud, neighbor, same, usual));
         is_alone.then_some(point)
     }
 }

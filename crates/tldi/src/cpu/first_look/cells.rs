@@ -12,6 +12,7 @@ use crate::cpu::first_look::cell_plane::{CellPlane, Sums, moved};
 use crate::cpu::lanes::multiversioned;
 use crate::cpu::rect::Rect;
 use crate::{Facing, Layer, Tldi, VirtualCamera};
+use arrayvec::ArrayVec;
 use glamx::Vec3;
 use std::ops::Range;
 
@@ -44,7 +45,14 @@ pub(crate) struct Cells {
     firsts: Vec<u32>,
     cells: Vec<Cell>,
     planes: Vec<CellPlane>,
+    /// Cells that are on no plane with those around them, and which these are.
+    rough: Vec<(u32, Neighbors)>,
+    /// Those that adopt a plane, and which.
+    adopted: Vec<(u32, CellPlane)>,
 }
+
+/// The cells around one that continue it, at most one a pixel, and how far they are aside, in pixels.
+type Neighbors = ArrayVec<(u32, [f32; 2]), 8>;
 
 /// Where a point is in its pixel, in [`STEPS`].
 #[derive(Clone, Copy, Default)]
@@ -98,15 +106,14 @@ impl Cells {
         self.sort(columns, kept, exits, imaging);
         self.gather(imaging);
         self.fit(&imaging.rect);
+        self.sharpen();
         let Rect { origin, size } = imaging.rect;
         out.begin(imaging.camera, origin, size);
-        for (k, pixel) in pixels(&imaging.rect).enumerate() {
+        for pixel in 0..imaging.rect.pixels() {
             let first = out.layers.len();
-            for cell in self.of_pixel(k) {
-                let plane = self.sharpened(cell, pixel, &imaging.rect);
-                if plane.variance < f32::INFINITY {
-                    out.layers
-                        .push(self.layer(cell, &plane, exits.is_some(), imaging));
+            for cell in self.of_pixel(pixel) {
+                if self.planes[cell].variance < f32::INFINITY {
+                    out.layers.push(self.layer(cell, exits.is_some(), imaging));
                 }
             }
             out.layers[first..].sort_unstable_by(|l, m| {
@@ -121,7 +128,6 @@ impl Cells {
         self.firsts[k] as usize..self.firsts[k + 1] as usize
     }
 
-    /// The cells around one that continue it, at most one a pixel, and how far they are aside, in pixels.
     #[inline(always)]
     fn neighbors(
         &self,
@@ -159,44 +165,51 @@ impl Cells {
     /// Fits a plane to each cell and its neighbours.
     fn fit(&mut self, rect: &Rect) {
         self.planes.clear();
+        self.rough.clear();
         for (k, pixel) in pixels(rect).enumerate() {
             for cell in self.of_pixel(k) {
                 let own = &self.cells[cell];
+                let mut neighbors = Neighbors::new();
                 let mut all = own.sums;
                 self.neighbors(cell, pixel, rect, |next, aside| {
+                    neighbors.push((next as u32, aside));
                     let next = &self.cells[next];
                     let [x, y] = aside.map(|d| d * STEPS);
                     let moved = moved(&next.sums, [x, y, (next.middle - own.middle) as f32]);
                     all.iter_mut().zip(moved).for_each(|(all, sum)| *all += sum);
                 });
                 let plane = CellPlane::of(&own.sums, &all);
+                if plane.variance > square(ON_PLANE) && plane.variance < f32::INFINITY {
+                    self.rough.push((cell as u32, neighbors));
+                }
                 self.planes.push(plane);
             }
         }
     }
 
-    /// The plane of a cell. If the cell and its neighbours lie on no common plane, it is the flattest plane of a neighbour
-    /// that passes through the cell: beside an edge, the plane of one face.
-    fn sharpened(&self, cell: usize, pixel: [usize; 2], rect: &Rect) -> CellPlane {
-        let plane = self.planes[cell];
-        let square = |pixels: f32| (pixels * STEPS).powi(2);
-        if plane.variance <= square(ON_PLANE) || plane.variance == f32::INFINITY {
-            return plane;
-        }
-        let own = &self.cells[cell];
-        let [least, most] = [own.near, own.far].map(|depth| (depth - own.middle) as f32);
-        let reached = least - ON_PLANE * STEPS..=most + ON_PLANE * STEPS;
-        let mut flattest = None;
-        self.neighbors(cell, pixel, rect, |next, [x, y]| {
-            let plane = self.planes[next];
-            let there = (self.cells[next].middle - own.middle) as f32 + plane.above;
-            let above = there - STEPS * (plane.slope[0] * x + plane.slope[1] * y);
-            let is_flatter = flattest.is_none_or(|best: CellPlane| plane.variance < best.variance);
-            if is_flatter && plane.variance <= square(FLAT) && reached.contains(&above) {
-                flattest = Some(CellPlane { above, ..plane });
+    /// A cell that lies on no common plane with its neighbours takes the flattest plane of a neighbour that passes through
+    /// the cell: beside an edge, the plane of one face.
+    fn sharpen(&mut self) {
+        self.adopted.clear();
+        for (cell, neighbors) in &self.rough {
+            let own = &self.cells[*cell as usize];
+            let [least, most] = [own.near, own.far].map(|depth| (depth - own.middle) as f32);
+            let reached = least - ON_PLANE * STEPS..=most + ON_PLANE * STEPS;
+            let mut flattest: Option<CellPlane> = None;
+            for (next, [x, y]) in neighbors {
+                let plane = self.planes[*next as usize];
+                let there = (self.cells[*next as usize].middle - own.middle) as f32 + plane.above;
+                let above = there - STEPS * (plane.slope[0] * x + plane.slope[1] * y);
+                let is_flatter = flattest.is_none_or(|best| plane.variance < best.variance);
+                if is_flatter && plane.variance <= square(FLAT) && reached.contains(&above) {
+                    flattest = Some(CellPlane { above, ..plane });
+                }
             }
-        });
-        flattest.unwrap_or(plane)
+            self.adopted.extend(flattest.map(|plane| (*cell, plane)));
+        }
+        for (cell, plane) in &self.adopted {
+            self.planes[*cell as usize] = *plane;
+        }
     }
 
     /// Counting sort of the points by pixel.
@@ -259,15 +272,9 @@ impl Cells {
         self.firsts.push(self.cells.len() as u32);
     }
 
-    /// The layer of a cell on a plane.
-    fn layer(
-        &self,
-        cell: usize,
-        plane: &CellPlane,
-        oriented: bool,
-        imaging: &CellImaging,
-    ) -> Layer {
-        let own = &self.cells[cell];
+    /// The layer of a cell.
+    fn layer(&self, cell: usize, oriented: bool, imaging: &CellImaging) -> Layer {
+        let (own, plane) = (&self.cells[cell], &self.planes[cell]);
         let step = imaging.pixel_size / STEPS;
         let metres = |steps: i32| imaging.near + steps as f32 * step;
         // A plane that is seen steeply ends where its points do.
@@ -316,6 +323,11 @@ fn locate(columns: &Columns, kept: &[u32], imaging: &CellImaging, located: &mut 
         *to = (if inside { (y * width + x) as u32 } else { count }, point);
     }
 }
+}
+
+/// In steps, of a distance in pixels.
+fn square(pixels: f32) -> f32 {
+    (pixels * STEPS).powi(2)
 }
 
 /// Columns and rows of the pixels of a rectangle, row by row, from its first.

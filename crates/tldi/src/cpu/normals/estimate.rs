@@ -7,8 +7,9 @@
 
 use crate::cpu::fold::{SpaceFold, is_coarse};
 use crate::cpu::lanes::multiversioned;
+use crate::cpu::normals::gathered::Gathered;
 use crate::cpu::normals::planes::{Batch, LANES, Neighborhood, PartialMoments, Plane};
-use crate::cpu::normals::sorted::{MAX_CANDIDATES, RUN, Sorted};
+use crate::cpu::normals::sorted::Sorted;
 use glamx::Vec3;
 
 /// Memory of the stage, kept from call to call.
@@ -16,25 +17,11 @@ use glamx::Vec3;
 pub(crate) struct NormalScratch {
     fold: SpaceFold,
     pub(crate) sorted: Sorted,
-    candidates: Candidates,
+    /// Coordinates of the points around a cell.
+    candidates: Gathered<3>,
     batch: Batch,
     /// Of each sorted point the plane of its neighbourhood, where it was wanted.
     pub(crate) planes: Vec<Plane>,
-}
-
-/// Coordinates of the points around a cell, in whole lanes, and room for a run of no meaning.
-struct Candidates {
-    coordinates: [[f32; MAX_CANDIDATES + RUN]; 3],
-    count: usize,
-}
-
-impl Default for Candidates {
-    fn default() -> Self {
-        Self {
-            coordinates: [[0.0; MAX_CANDIDATES + RUN]; 3],
-            count: 0,
-        }
-    }
 }
 
 /// Estimates normals at some of the points of `support`. `targets` gets their ids, and `normals`
@@ -86,7 +73,12 @@ pub(crate) fn estimate(
         let entry = &sorted.entries[k as usize];
         if entry.cell != cell {
             cell = entry.cell;
-            candidates.gather(sorted, cell as usize);
+            let out_of_reach = [f32::INFINITY; 3];
+            candidates.gather(
+                sorted.rows(cell as usize),
+                &sorted.coordinates,
+                out_of_reach,
+            );
         }
         let sums = batch.push(k);
         moments(
@@ -112,46 +104,13 @@ pub(crate) fn estimate(
     }
 }
 
-impl Candidates {
-    /// Collects the points of a cell and its neighbours, filled up to whole lanes with points out of
-    /// reach.
-    fn gather(&mut self, sorted: &Sorted, cell: usize) {
-        let rows = sorted.rows(cell);
-        let total: usize = rows.iter().map(|row| row.len()).sum();
-        let mut n = 0;
-        if total <= MAX_CANDIDATES {
-            for row in rows {
-                for first in row.clone().step_by(RUN) {
-                    let at = n + (first - row.start);
-                    for (to, from) in self.coordinates.iter_mut().zip(&sorted.coordinates) {
-                        to[at..at + RUN].copy_from_slice(&from[first..first + RUN]);
-                    }
-                }
-                n += row.len();
-            }
-        } else {
-            sorted.around(cell, |k| {
-                for (to, from) in self.coordinates.iter_mut().zip(&sorted.coordinates) {
-                    to[n] = from[k];
-                }
-                n += 1;
-            });
-        }
-        self.count = n.next_multiple_of(LANES);
-        for to in &mut self.coordinates {
-            to[n..self.count].fill(f32::INFINITY);
-        }
-    }
-}
-
 multiversioned! {
 /// Of the candidates within the neighbourhood of `p`. `out` gets all lanes: if they were added up here, compilers would make
 /// scalars of them.
-fn moments(p: Vec3, radius_squared: f32, candidates: &Candidates, out: &mut PartialMoments) {
+fn moments(p: Vec3, radius_squared: f32, candidates: &Gathered<3>, out: &mut PartialMoments) {
     let mut sums = [[0.0f32; LANES]; 10];
-    let [x, y, z] = candidates.coordinates.each_ref().map(|c| c.as_chunks::<LANES>().0);
-    let chunks = x.iter().zip(y).zip(z).take(candidates.count / LANES);
-    for ((x, y), z) in chunks {
+    let [x, y, z] = candidates.lanes();
+    for ((x, y), z) in x.iter().zip(y).zip(z) {
         for l in 0..LANES {
             let (dx, dy, dz) = (x[l] - p.x, y[l] - p.y, z[l] - p.z);
             let near = dx * dx + dy * dy + dz * dz <= radius_squared;

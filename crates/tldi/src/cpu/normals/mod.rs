@@ -1,6 +1,7 @@
 //! Unit normals of the points that are modelled: estimated, then sharpened beside edges.
 
 pub(crate) mod estimate;
+mod gathered;
 pub(crate) mod planes;
 pub(crate) mod sharpen;
 pub(crate) mod sorted;

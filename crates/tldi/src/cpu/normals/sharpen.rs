@@ -9,9 +9,9 @@
 use crate::contact::ramp::ramp;
 use crate::cpu::lanes::multiversioned;
 use crate::cpu::normals::estimate::NormalScratch;
+use crate::cpu::normals::gathered::Gathered;
 use crate::cpu::normals::planes::{LANES, Neighborhood, Plane, SUPPORT};
-use crate::cpu::normals::sorted::{MAX_CANDIDATES, Sorted};
-use bytemuck::Zeroable;
+use crate::cpu::normals::sorted::{RUN, Sorted};
 use glamx::Vec3;
 
 /// Variance at which neighbours are plainly not on a plane, in units of that up to which they are. Half or twice: no
@@ -29,52 +29,60 @@ pub(crate) const CONSTANTS: [(&str, f64); 2] =
 #[derive(Default)]
 pub(crate) struct SharpenScratch {
     flat: FlatPlanes,
+    around: Gathered<VALUES>,
     /// Sorted points that are not on their planes.
     rough: Vec<u32>,
     /// Those that adopt a plane, and which.
     adopted: Vec<(u32, Plane)>,
 }
 
-/// Flat planes of points around a cell, in whole lanes.
-#[derive(Zeroable)]
-struct FlatPlanes {
-    position: [[f32; MAX_CANDIDATES]; 3],
-    normal: [[f32; MAX_CANDIDATES]; 3],
-    variance: [f32; MAX_CANDIDATES],
-    height: [f32; MAX_CANDIDATES],
-    count: usize,
-}
+/// What is known of a flat plane: its point, its normal, and its variance and height as in [`Plane`].
+const VALUES: usize = 8;
 
-impl Default for FlatPlanes {
-    fn default() -> Self {
-        Self::zeroed()
-    }
+/// In place of a plane: out of reach of any point.
+const NO_PLANE: [f32; VALUES] = {
+    let far = f32::INFINITY;
+    [far, far, far, 0.0, 0.0, 0.0, far, 0.0]
+};
+
+/// The flat planes, in the order of the sorted points that they are of.
+#[derive(Default)]
+struct FlatPlanes {
+    /// How many there are before each sorted point, and in all.
+    before: Vec<usize>,
+    /// And [`RUN`] more of no meaning.
+    values: [Vec<f32>; VALUES],
 }
 
 impl FlatPlanes {
-    /// Collects those with less than a `misfit`.
-    fn gather(&mut self, sorted: &Sorted, planes: &[Plane], cell: u32, misfit: f32) {
-        let mut n = 0;
-        let mut put = |position: Vec3, plane: &Plane| {
-            let [x, y, z] = &mut self.position;
-            (x[n], y[n], z[n]) = (position.x, position.y, position.z);
-            let [x, y, z] = &mut self.normal;
-            (x[n], y[n], z[n]) = (plane.normal.x, plane.normal.y, plane.normal.z);
-            self.variance[n] = plane.variance;
-            self.height[n] = plane.height;
-            n += 1;
-        };
+    /// Finds those with less than a `misfit`.
+    fn find(&mut self, sorted: &Sorted, planes: &[Plane], misfit: f32) {
+        let Self { before, values } = self;
+        before.clear();
+        before.reserve(planes.len() + 1);
+        for values in &mut *values {
+            values.resize(planes.len() + RUN, 0.0);
+        }
         let mut count = 0;
-        sorted.around(cell as usize, |k| {
-            if planes[k].variance < misfit {
-                put(sorted.position(k), &planes[k]);
+        for (k, plane) in planes.iter().enumerate() {
+            before.push(count);
+            if plane.variance < misfit {
+                let ([x, y, z], [u, v, w]) = (sorted.position(k).into(), plane.normal.into());
+                let known = [x, y, z, u, v, w, plane.variance, plane.height];
+                for (to, value) in values.iter_mut().zip(known) {
+                    to[count] = value;
+                }
                 count += 1;
             }
-        });
-        for _ in count..usize::next_multiple_of(count, LANES) {
-            put(Vec3::INFINITY, &Plane::UNKNOWN);
         }
-        self.count = n;
+        before.push(count);
+    }
+
+    /// Collects those around a cell.
+    fn gather(&self, sorted: &Sorted, cell: u32, around: &mut Gathered<VALUES>) {
+        let rows = sorted.rows(cell as usize);
+        let rows = rows.map(|row| self.before[row.start]..self.before[row.end]);
+        around.gather(rows, &self.values, NO_PLANE);
     }
 }
 
@@ -89,6 +97,7 @@ pub(crate) fn sharpen(
     let NormalScratch { sorted, planes, .. } = estimated;
     let SharpenScratch {
         flat,
+        around: flat_around,
         rough,
         adopted,
     } = scratch;
@@ -98,16 +107,20 @@ pub(crate) fn sharpen(
     rough.clear();
     rough.extend(sorted.wanted().filter(|k| is_rough(k, planes)));
     for _ in 0..2 {
+        if rough.is_empty() {
+            break;
+        }
+        flat.find(sorted, planes, limits[1]);
         adopted.clear();
         let cell = |k: &u32| sorted.entries[*k as usize].cell;
         for in_cell in rough.chunk_by(|k, l| cell(k) == cell(l)) {
-            flat.gather(sorted, planes, cell(&in_cell[0]), limits[1]);
-            if flat.count == 0 {
+            flat.gather(sorted, cell(&in_cell[0]), flat_around);
+            if flat_around.is_empty() {
                 continue;
             }
             for &k in in_cell {
                 let (point, own) = (sorted.position(k as usize), &planes[k as usize]);
-                let Some((face, weight)) = mean(point, own, limits, flat) else {
+                let Some((face, weight)) = mean(point, own, limits, flat_around) else {
                     continue;
                 };
                 let share = ramp(own.variance / on_plane, [1.0, OFF_PLANE]) * weight.min(1.0);
@@ -126,7 +139,12 @@ pub(crate) fn sharpen(
 
 /// The mean, at `point`, of the flat planes around it, and their total weight. Its normal is on the side of the point's
 /// `own`. `limits` bound the square distance and the misfit.
-fn mean(point: Vec3, own: &Plane, limits: [f32; 2], flat: &FlatPlanes) -> Option<(Plane, f32)> {
+fn mean(
+    point: Vec3,
+    own: &Plane,
+    limits: [f32; 2],
+    flat: &Gathered<VALUES>,
+) -> Option<(Plane, f32)> {
     let [weight, x, y, z, variance, height] = sums(point, own.normal, limits, flat);
     let normal = Vec3::new(x, y, z).try_normalize()?;
     let plane = Plane::new(normal, variance / weight, height / weight);
@@ -135,14 +153,13 @@ fn mean(point: Vec3, own: &Plane, limits: [f32; 2], flat: &FlatPlanes) -> Option
 
 multiversioned! {
 /// Sums of the weights of the planes, which fall from 1 where they fit, and of weighted normals, variances and heights.
-fn sums(p: Vec3, side: Vec3, [reach, most]: [f32; 2], flat: &FlatPlanes) -> [f32; 6] {
+fn sums(p: Vec3, side: Vec3, [reach, most]: [f32; 2], flat: &Gathered<VALUES>) -> [f32; 6] {
     let per_misfit = 1.0 / most;
     let mut sums = [[0.0f32; LANES]; 6];
-    let of = |c: &[f32; MAX_CANDIDATES], k: usize| c.as_chunks::<LANES>().0[k];
-    for k in 0..flat.count / LANES {
-        let [x, y, z] = flat.position.each_ref().map(|c| of(c, k));
-        let [nx, ny, nz] = flat.normal.each_ref().map(|c| of(c, k));
-        let (variance, height) = (of(&flat.variance, k), of(&flat.height, k));
+    let [x, y, z, nx, ny, nz, variance, height] = flat.lanes();
+    for k in 0..x.len() {
+        let ([x, y, z], [nx, ny, nz]) = ([x[k], y[k], z[k]], [nx[k], ny[k], nz[k]]);
+        let (variance, height) = (variance[k], height[k]);
         for l in 0..LANES {
             let (dx, dy, dz) = (p.x - x[l], p.y - y[l], p.z - z[l]);
             let above = nx[l] * dx + ny[l] * dy + nz[l] * dz + height[l];

@@ -151,24 +151,6 @@ impl Sorted {
         all.filter(|(entry, _)| entry.wanted).map(|(_, k)| k)
     }
 
-    /// Tells `put` which points are in a cell and its neighbours: all, or of more than
-    /// [`MAX_CANDIDATES`] an even selection.
-    #[inline(always)]
-    pub(crate) fn around(&self, cell: usize, mut put: impl FnMut(usize)) {
-        let rows = self.rows(cell);
-        let total: usize = rows.iter().map(|row| row.len()).sum();
-        let step = total.div_ceil(MAX_CANDIDATES).max(1);
-        let mut skip = 0;
-        for row in rows {
-            let mut k = row.start + skip;
-            while k < row.end {
-                put(k);
-                k += step;
-            }
-            skip = k - row.end;
-        }
-    }
-
     /// The points in a cell and its neighbours: three cells in a row along x are consecutive.
     #[inline(always)]
     pub(crate) fn rows(&self, cell: usize) -> [Range<usize>; 9] {
