@@ -62,6 +62,10 @@ fn facing_place(pair: u32, s: u32, sign: f32) -> PlaceAlong {
 
 // Whether the axis points from `b` towards `a` (1) or the other way (-1), as far as the near points tell; or 0.
 fn side_by_places(pair: u32) -> i32 {
+    let flags = vec2u(pairs[pair].sides[0].flags, pairs[pair].sides[1].flags) & vec2u(ORIENTED);
+    if flags.x != flags.y {
+        return 0;
+    }
     let a_ahead = facing_place(pair, 0u, -1.0);
     let b_ahead = facing_place(pair, 1u, 1.0);
     let a_back = facing_place(pair, 0u, 1.0);
@@ -73,8 +77,7 @@ fn side_by_places(pair: u32) -> i32 {
         let scatter = max(a_ahead.scatter + b_ahead.scatter, a_back.scatter + b_back.scatter);
         return select(0, select(-1, 1, further > 0.0), abs(further) > scatter);
     }
-    let are_oriented = (pairs[pair].sides[0].flags & pairs[pair].sides[1].flags & ORIENTED) != 0u;
-    return select(0, i32(is_ahead) - i32(is_back), are_oriented);
+    return i32(is_ahead) - i32(is_back);
 }
 
 // 1: true, -1: false, 0: inconclusive.

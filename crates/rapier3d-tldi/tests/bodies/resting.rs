@@ -151,3 +151,41 @@ fn mixed_compound_rests_on_cuboid() -> TestResult {
         0.1,
     )
 }
+
+/// Bodies with slanted sides that begin one or two radii deep in a bare floor, their middles above it, are pushed up.
+#[test]
+fn slanted_bodies_stay_above_a_bare_floor() -> TestResult {
+    const R: f32 = 0.02;
+    const COUNT: i32 = 40;
+    const HALF: f32 = 0.1;
+    let corners = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
+    let corners = corners.map(|[x, z]| HALF * Vector::new(x, -1.0, z));
+    let pyramid = [&corners[..], &[HALF * Vector::Y]].concat();
+    let pyramid = SharedShape::convex_hull(&pyramid).ok_or("no hull")?;
+    for body in [pyramid, SharedShape::cone(HALF, HALF)] {
+        for depth in [1.0, 2.0] {
+            for seed in 0..8 {
+                let mut rng = fastrand::Rng::with_seed(seed);
+                let mut at = |k: i32| R * ((k - COUNT / 2) as f32 + rng.f32() - 0.5);
+                let floor: Vec<Vector> = (0..COUNT * COUNT)
+                    .map(|k| Vector::new(at(k % COUNT), 0.0, at(k / COUNT)))
+                    .collect();
+                let floor = PointCloud::builder(floor).radius(R).build()?.into_owned();
+                let (mut world, mut tldi) = attached();
+                world.insert(RigidBodyBuilder::fixed(), tldi.collider(floor));
+                let turn = Vector::Y * seed as f32;
+                let start = dynamic_at(HALF - depth * R)
+                    .rotation(turn)
+                    .linvel(-2.0 * Vector::Y);
+                let (handle, _) = world.insert(start, ColliderBuilder::new(body.clone()));
+                for _ in 0..60 {
+                    tldi.step(&mut world)?;
+                }
+                let height = world.bodies[handle].translation().y;
+                let case = format!("{:?} {depth} {seed}", body.shape_type());
+                assert!((height - HALF).abs() < R, "{case}: {height}");
+            }
+        }
+    }
+    Ok(())
+}

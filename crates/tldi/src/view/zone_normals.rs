@@ -98,16 +98,19 @@ fn gap([a, b]: &[ZoneNormals; 2], axis: Vec3, sign: f32) -> Option<(f32, f32)> {
 /// one order only. Otherwise the mean places decide, if they differ by more than the points scatter. `None`: neither tells.
 ///
 /// Where the outsides are not known all near points count. So two links of a chain are told, whose middles lie on the
-/// wrong sides, but not surfaces that are in each other by as much as their points scatter.
+/// wrong sides, but not surfaces that are in each other by as much as their points scatter. If the outside of one is known,
+/// a part of it would be compared with all of the other: a cone whose base is under a sheet would be told to be below.
 pub(crate) fn side_by_places(sides: &[ZoneNormals; 2], axis: Vec3) -> Option<bool> {
-    let are_oriented = sides.iter().all(|side| side.oriented);
+    if sides[0].oriented != sides[1].oriented {
+        return None;
+    }
     match [1.0, -1.0].map(|sign| gap(sides, axis, sign)) {
         [Some((gap, scatter)), Some((opposite, other_scatter))] => {
             let further = 0.5 * (gap - opposite);
             (further.abs() > scatter.max(other_scatter)).then_some(further > 0.0)
         }
-        [Some(_), None] => are_oriented.then_some(true),
-        [None, Some(_)] => are_oriented.then_some(false),
+        [Some(_), None] => Some(true),
+        [None, Some(_)] => Some(false),
         [None, None] => None,
     }
 }
@@ -136,5 +139,29 @@ mod tests {
                 assert_eq!(side_by_places(&sides, Vec3::Y), told, "{far} {apart}");
             }
         }
+    }
+
+    /// Nothing is told of a bare sheet and a pyramid whose outside is known. Its base is under the sheet, its middle is not.
+    #[test]
+    fn slanted_faces_are_not_compared_with_a_bare_sheet() {
+        let flank = Vec3::new(0.8, 0.6, 0.0);
+        let (normals, points): (Vec<_>, Vec<_>) = (0..40)
+            .map(|k| match k % 2 {
+                0 => (-Vec3::Y, -0.02 * Vec3::Y),
+                _ => (flank, -0.001 * k as f32 * Vec3::Y),
+            })
+            .unzip();
+        let pyramid = ZoneNormals {
+            normals: &normals,
+            points: &points,
+            oriented: true,
+        };
+        let sheet = ZoneNormals {
+            normals: &[Vec3::Y; 40],
+            points: &[Vec3::ZERO; 40],
+            oriented: false,
+        };
+        assert_eq!(side_by_places(&[sheet, pyramid], Vec3::Y), None);
+        assert_eq!(side_by_places(&[pyramid, sheet], Vec3::Y), None);
     }
 }
