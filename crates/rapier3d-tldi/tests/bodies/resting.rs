@@ -155,14 +155,15 @@ fn mixed_compound_rests_on_cuboid() -> TestResult {
 /// Bodies with slanted sides that begin one or two radii deep in a bare floor, their middles above it, are pushed up.
 #[test]
 fn slanted_bodies_stay_above_a_bare_floor() -> TestResult {
+    // Metres: the floor's radius, and half the height of the bodies.
     const R: f32 = 0.02;
     const COUNT: i32 = 40;
-    const HALF: f32 = 0.1;
+    const HALF_HEIGHT: f32 = 0.1;
     let corners = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
-    let corners = corners.map(|[x, z]| HALF * Vector::new(x, -1.0, z));
-    let pyramid = [&corners[..], &[HALF * Vector::Y]].concat();
+    let corners = corners.map(|[x, z]| HALF_HEIGHT * Vector::new(x, -1.0, z));
+    let pyramid = [&corners[..], &[HALF_HEIGHT * Vector::Y]].concat();
     let pyramid = SharedShape::convex_hull(&pyramid).ok_or("no hull")?;
-    for body in [pyramid, SharedShape::cone(HALF, HALF)] {
+    for body in [pyramid, SharedShape::cone(HALF_HEIGHT, HALF_HEIGHT)] {
         for depth in [1.0, 2.0] {
             for seed in 0..8 {
                 let mut rng = fastrand::Rng::with_seed(seed);
@@ -174,7 +175,7 @@ fn slanted_bodies_stay_above_a_bare_floor() -> TestResult {
                 let (mut world, mut tldi) = attached();
                 world.insert(RigidBodyBuilder::fixed(), tldi.collider(floor));
                 let turn = Vector::Y * seed as f32;
-                let start = dynamic_at(HALF - depth * R)
+                let start = dynamic_at(HALF_HEIGHT - depth * R)
                     .rotation(turn)
                     .linvel(-2.0 * Vector::Y);
                 let (handle, _) = world.insert(start, ColliderBuilder::new(body.clone()));
@@ -183,7 +184,7 @@ fn slanted_bodies_stay_above_a_bare_floor() -> TestResult {
                 }
                 let height = world.bodies[handle].translation().y;
                 let case = format!("{:?} {depth} {seed}", body.shape_type());
-                assert!((height - HALF).abs() < R, "{case}: {height}");
+                assert!((height - HALF_HEIGHT).abs() < R, "{case}: {height}");
             }
         }
     }

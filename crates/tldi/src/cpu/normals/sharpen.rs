@@ -29,7 +29,7 @@ pub(crate) const CONSTANTS: [(&str, f64); 2] =
 #[derive(Default)]
 pub(crate) struct SharpenScratch {
     flat: FlatPlanes,
-    around: Gathered<VALUES>,
+    flat_around: Gathered<VALUES>,
     /// Sorted points that are not on their planes.
     rough: Vec<u32>,
     /// Those that adopt a plane, and which.
@@ -97,7 +97,7 @@ pub(crate) fn sharpen(
     let NormalScratch { sorted, planes, .. } = estimated;
     let SharpenScratch {
         flat,
-        around: flat_around,
+        flat_around,
         rough,
         adopted,
     } = scratch;
