@@ -12,8 +12,23 @@ pub(super) fn by_distance(
 ) -> impl Iterator<Item = (f32, Range<usize>)> {
     blocks.iter().enumerate().map(move |(block, bounds)| {
         let nearest = place.clamp(bounds.min, bounds.max);
-        let first = block * BLOCK;
-        let indices = first..(first + BLOCK).min(count);
-        (nearest.distance_squared(place), indices)
+        (nearest.distance_squared(place), indices(block, count))
     })
+}
+
+/// The indices of the points of the blocks whose bounds meet `place`.
+pub(super) fn meeting(
+    blocks: &[Aabb],
+    count: usize,
+    place: Aabb,
+) -> impl Iterator<Item = Range<usize>> {
+    let found = blocks.iter().enumerate();
+    (found.filter(move |(_, bounds)| bounds.intersects(&place)))
+        .map(move |(block, _)| indices(block, count))
+}
+
+/// The points of a block.
+fn indices(block: usize, count: usize) -> Range<usize> {
+    let first = block * BLOCK;
+    first..(first + BLOCK).min(count)
 }

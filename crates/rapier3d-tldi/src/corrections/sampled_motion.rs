@@ -6,7 +6,6 @@
 
 use crate::corrections::blocks;
 use nalgebra::{SMatrix, SVector};
-use rapier3d::glamx::Vec3;
 use rapier3d::math::{Pose, Vector};
 use tldi::{Aabb, PointCloud};
 
@@ -77,58 +76,72 @@ impl Probe {
         }
     }
 
-    /// The points around the line up to `reach` metres away: across it, in radii, and along it, metres.
-    fn around(
+    /// Heights of the points around the line that are up to `reach` metres away along it.
+    fn heights(
         &self,
         blocks: &[Aabb],
         point: impl Fn(usize) -> Vector,
         count: usize,
         reach: f32,
-    ) -> Vec<Vec3> {
+    ) -> Heights {
         let (u, v) = self.normal.any_orthonormal_pair();
-        let about = self.radius.hypot(reach);
-        let mut near = Vec::new();
-        for (squared, indices) in blocks::by_distance(blocks, count, self.point) {
-            if squared > about * about {
-                continue;
+        // Half the edges of the cylinder's bounds: those of its line, and of a disc across it.
+        let across = (Vector::ONE - self.normal * self.normal).max(Vector::ZERO);
+        let half = reach * self.normal.abs() + self.radius * across.map(f32::sqrt);
+        let bounds = Aabb {
+            min: self.point - half,
+            max: self.point + half,
+        };
+        let mut heights = Heights::default();
+        for i in blocks::meeting(blocks, count, bounds).flatten() {
+            let from = (point(i) - self.point) / self.radius;
+            let (a, b) = (from.dot(u), from.dot(v));
+            let height = from.dot(self.normal) * self.radius;
+            if a * a + b * b <= 1.0 && height.abs() <= reach {
+                heights.add(a, b, height);
             }
-            near.extend(indices.filter_map(|i| {
-                let from = (point(i) - self.point) / self.radius;
-                let (a, b) = (from.dot(u), from.dot(v));
-                let height = from.dot(self.normal) * self.radius;
-                let is_near = a * a + b * b <= 1.0 && height.abs() <= reach;
-                is_near.then_some(Vec3::new(a, b, height))
-            }));
         }
-        near
+        heights
     }
 }
 
-/// Height on the line of the surface through `points` that fits them best: the first `N` terms of a paraboloid.
-/// `None` where they are too few, or in a row.
-fn height<const N: usize>(points: &[Vec3]) -> Option<Height> {
-    if points.len() < POINTS_PER_TERM * N {
-        return None;
+/// Heights of points around a line, metres, and where they are across it, in radii of the probe: the normal equations of a
+/// paraboloid's least squares.
+#[derive(Default)]
+struct Heights {
+    count: usize,
+    matrix: SMatrix<f32, PARABOLOID, PARABOLOID>,
+    moments: SVector<f32, PARABOLOID>,
+    squares: f32,
+}
+
+impl Heights {
+    fn add(&mut self, a: f32, b: f32, height: f32) {
+        let terms = SVector::from([1.0, a, b, a * a, a * b, b * b]);
+        self.count += 1;
+        self.matrix += terms * terms.transpose();
+        self.moments += height * terms;
+        self.squares += height * height;
     }
-    let terms = |p: &Vec3| {
-        let all = [1.0, p.x, p.y, p.x * p.x, p.x * p.y, p.y * p.y];
-        SVector::<f32, N>::from_fn(|k, _| all[k])
-    };
-    let (mut matrix, mut moments) = (SMatrix::<f32, N, N>::zeros(), SVector::<f32, N>::zeros());
-    for p in points {
-        let terms = terms(p);
-        matrix += terms * terms.transpose();
-        moments += p.z * terms;
+
+    /// Height on the line of the surface that fits the points best: the first `N` terms of a paraboloid. `None` where they
+    /// are too few, or in a row.
+    fn on_line<const N: usize>(&self) -> Option<Height> {
+        if self.count < POINTS_PER_TERM * N {
+            return None;
+        }
+        let matrix = self.matrix.fixed_view::<N, N>(0, 0).clone_owned();
+        let moments = self.moments.fixed_rows::<N>(0);
+        let inverse = matrix.cholesky()?.inverse();
+        let fit = inverse * moments;
+        let squares = (self.squares - fit.dot(&moments)).max(0.0);
+        let variance = squares / (self.count - N) as f32;
+        let height = Height {
+            value: fit[0],
+            standard_error: (variance * inverse[(0, 0)]).sqrt(),
+        };
+        (height.value.is_finite() && height.standard_error.is_finite()).then_some(height)
     }
-    let inverse = matrix.cholesky()?.inverse();
-    let fit = inverse * moments;
-    let squares = points.iter().map(|p| (p.z - fit.dot(&terms(p))).powi(2));
-    let variance = squares.sum::<f32>() / (points.len() - N) as f32;
-    let height = Height {
-        value: fit[0],
-        standard_error: (variance * inverse[(0, 0)]).sqrt(),
-    };
-    (height.value.is_finite() && height.standard_error.is_finite()).then_some(height)
 }
 
 /// How far the surface of `cloud` moved in the last frame along the unit `normal` at `point`, metres, seen from what carries
@@ -147,24 +160,22 @@ pub(crate) fn way_along(
         radius: AROUND * radius,
     };
     let points = cloud.points();
-    let now = probe.around(cloud.blocks(), |i| points[i], cloud.len(), AROUND * radius);
+    let now = probe.heights(cloud.blocks(), |i| points[i], cloud.len(), AROUND * radius);
     let of = |old: &Snapshot, steps: f32| {
         let reach = (AROUND + steps * FARTHEST) * radius;
         let old_from_now = old.base_from_points.inv_mul(base_from_points);
         let probe = probe.moved(&old_from_now);
-        probe.around(&old.blocks, |i| old.points[i], old.points.len(), reach)
+        probe.heights(&old.blocks, |i| old.points[i], old.points.len(), reach)
     };
-    let points = [of(earlier, 2.0), of(before, 1.0), now];
+    let heights = [of(earlier, 2.0), of(before, 1.0), now];
     // Few noisy points tell a plane best; what bends is no plane, and seems noisy.
-    steady_way(
-        points.each_ref().map(|points| height::<PLANE>(points)),
-        radius,
-    )
-    .or_else(|| {
-        let heights = points.each_ref().map(|points| height::<PARABOLOID>(points));
-        steady_way(heights, radius)
-    })
-    .unwrap_or(0.0)
+    let plane = heights.each_ref().map(Heights::on_line::<PLANE>);
+    steady_way(plane, radius)
+        .or_else(|| {
+            let paraboloid = heights.each_ref().map(Heights::on_line::<PARABOLOID>);
+            steady_way(paraboloid, radius)
+        })
+        .unwrap_or(0.0)
 }
 
 /// The last way, metres, where the heights of three tell two in the same direction: the shorter.

@@ -216,10 +216,9 @@ impl TldiPipeline {
     /// [`IntegrationParameters::max_corrective_velocity`], 1.5 m/s in a world of human size) the
     /// velocity of the surface, as an inelastic impact would. [`step`](Self::step) does so.
     ///
-    /// The velocity of clouds that [`deform`](Self::deform) is known. That of clouds with
-    /// [new points](Self::set_points) is measured along the normal of the contact, from the points of
-    /// the last two steps; noise, and a surface that jumps once, have none. Cost: for each contact of
-    /// such a cloud a pass over the points in the blocks around it.
+    /// The velocity of clouds that [`deform`](Self::deform) is known, that of clouds with [new points](Self::set_points) is
+    /// measured along the normal of the contact. Cost: for each contact of such a cloud a pass over the points in the blocks
+    /// around it.
     ///
     /// A surface pushes what rapier's solver lets it push: no bodies that
     /// [dominate](rapier3d::dynamics::RigidBody::dominance_group), no sensors, no colliders whose solver groups exclude each

@@ -1,7 +1,7 @@
 //! What surfaces that deform do to bodies, whatever these are, against what rapier does with a surface that its body moves.
 
-use crate::common::square;
 use crate::common::worlds::{HALF, TestResult, attached, dynamic_at, insert_floor};
+use crate::common::{SPACING, square};
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
 
@@ -178,6 +178,50 @@ fn floors_that_are_seen_every_few_steps_have_their_speed() -> TestResult {
                 let case = format!("{velocity} m/s, every {every}, repeats {repeats}");
                 assert!(off < most, "{case}: {off} m of {most}");
             }
+        }
+    }
+    Ok(())
+}
+
+/// How deep a body sinks at most into a floor of new points in every step, metres. The floor comes to rise at `speed` m/s
+/// within half a second.
+fn sinks(collider: ColliderBuilder, half_height: f32, speed: f32) -> Result<f32, TldiError> {
+    let (mut world, mut tldi) = attached();
+    let floor = insert_floor(&mut world, FLOOR);
+    let (body, _) = world.insert(dynamic_at(half_height), collider);
+    let dt = world.integration_parameters.dt;
+    let mut rng = fastrand::Rng::with_seed(4);
+    let (mut height, mut deepest) = (0.0_f32, 0.0_f32);
+    for k in 0..120 {
+        height += speed * (k as f32 * dt / 0.5).min(1.0) * dt;
+        let aside = SPACING * Vector::new(rng.f32(), 0.0, rng.f32());
+        tldi.set_points(
+            &mut world,
+            floor,
+            &floor_at(height * Vector::Y + aside),
+            None,
+        )?;
+        tldi.step(&mut world)?;
+        let below = world.bodies[body].translation().y - half_height;
+        deepest = deepest.max(height - below);
+    }
+    Ok(deepest)
+}
+
+/// New points tell how fast a floor rises: bodies ride on it, thin ones as well. What rises by less than 0.2 r̄ a step is not
+/// told from noise. Rapier's correction alone follows 40 ms, 2.4 steps, behind: 0.5 r̄ at most, and depths are good to 0.15 r̄.
+/// Without the floor's speed it is 1 r̄ at 1 m/s.
+#[test]
+fn floors_of_new_points_carry_bodies() -> TestResult {
+    for speed in [0.5, 1.0, 2.0] {
+        let plate = ColliderBuilder::cuboid(HALF, SPACING, HALF);
+        for (name, body, half_height) in [
+            ("box", box_collider(), HALF),
+            ("ball", ColliderBuilder::ball(HALF), HALF),
+            ("plate", plate, SPACING),
+        ] {
+            let deepest = sinks(body, half_height, speed)?;
+            assert!(deepest < 0.7 * SPACING, "{name}, {speed} m/s: {deepest} m");
         }
     }
     Ok(())

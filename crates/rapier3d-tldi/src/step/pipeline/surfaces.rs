@@ -14,6 +14,12 @@ impl TldiPipeline {
     /// ([`PointCloudShape::refresh_mass`] lets it follow the points). For the frames of a sensor there is
     /// [`CloudStream`](crate::CloudStream).
     ///
+    /// Points of two frames in a row tell how fast the surface comes nearer, or goes away, along the normal of a contact; what
+    /// moves by less than 0.2 mean radii a frame counts as noise. How it slides is not known: [`deform`](Self::deform) tells it.
+    /// The solver gets the speed if the step has the pipeline's hooks, as [`step`](Self::step) does; the collider's
+    /// [`ActiveHooks::MODIFY_SOLVER_CONTACTS`] is set. Cost: for each contact, a pass over the points of the blocks around it
+    /// in three frames.
+    ///
     /// Called with other points in every step, it keeps what touches the collider awake for ever;
     /// with the points that the cloud has it does nothing. Bodies that share the points keep the
     /// old ones.
@@ -125,7 +131,8 @@ impl TldiPipeline {
         Ok(())
     }
 
-    /// Changes the shape of a cloud's collider, and remembers that it was.
+    /// Changes the shape of a cloud's collider, and remembers that it was. The hooks see its contacts from now on: they tell
+    /// rapier's solver how the surface moves.
     fn change_shape(
         &mut self,
         colliders: &mut ColliderSet,
@@ -135,11 +142,10 @@ impl TldiPipeline {
         // The batch of a step that was not finished shares the shape: without it the change is
         // made in place.
         self.shared.batch_mut().clear();
-        let shape = colliders
-            .get_mut(collider)
-            .and_then(|collider| collider.shape_mut().as_shape_mut::<PointCloudShape>())
-            .ok_or(TldiError::NotACloud(collider))?;
+        let found = (colliders.get_mut(collider)).ok_or(TldiError::NoSuchCollider(collider))?;
+        let shape = (found.shape_mut().as_shape_mut()).ok_or(TldiError::NotACloud(collider))?;
         change(shape).map_err(|source| TldiError::Cloud { collider, source })?;
+        found.set_active_hooks(found.active_hooks() | ActiveHooks::MODIFY_SOLVER_CONTACTS);
         if !self.changed.contains(&collider) {
             self.changed.push(collider);
         }
@@ -240,10 +246,6 @@ impl TldiPipeline {
         if dt > 0.0 {
             let after = cloud_of(colliders, collider)?;
             self.motions.record(collider, before, after, dt);
-            if let Some(collider) = colliders.get_mut(collider) {
-                let hooks = collider.active_hooks() | ActiveHooks::MODIFY_SOLVER_CONTACTS;
-                collider.set_active_hooks(hooks);
-            }
         } else {
             self.motions.forget(collider);
         }
