@@ -1,7 +1,7 @@
 //! From candidate pairs to the entries of a batch.
 
 use crate::TldiConfig;
-use crate::narrow_phase::parts::{Hint, ShapePair, append_part_pairs};
+use crate::narrow_phase::parts::{Comparison, Hint, ShapePair, append_part_pairs};
 use crate::shape::exact::ExactShape;
 use crate::step::candidates::{Candidate, contact_reach, effective_prediction, parent_of, pose_of};
 use crate::step::measured::Measured;
@@ -296,7 +296,10 @@ impl PairMemory {
                             lost_for: 0,
                         }
                     }),
-                    true => found(&self.older_axes, key).and_then(|last| last.lost(pos12)),
+                    // One that was outdated for the comparison stays so.
+                    true => (part.comparison.as_ref())
+                        .and_then(Comparison::last_axis)
+                        .and_then(|_| found(&self.older_axes, key)?.lost(pos12)),
                 };
                 self.axes.extend(axis.map(|axis| (key, axis)));
             }
@@ -338,7 +341,11 @@ mod tests {
         let mut remembered = |axis: Vector, contacts: Vec<ContactPixel>| {
             let pair = ShapePair::new(&*shape.0, &*shape.0, Pose::IDENTITY, 0.1);
             let mut batch = Batch::default();
-            let hint = |_, _: Option<&Pose>, _| Hint::default();
+            let last_axis = memory.axis(colliders, [0, 0], &pair, &turned);
+            let hint = |_, _: Option<&Pose>, _| Hint {
+                last_axis,
+                ..Hint::default()
+            };
             let mut sides = Vec::new();
             let config = TldiConfig::default();
             append_part_pairs(pair, &config, &mut batch.parts, &mut sides, hint);
