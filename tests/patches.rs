@@ -159,6 +159,23 @@ fn a_ball_in_a_groove_is_pushed_by_its_walls() {
     assert!(300 * off <= pushing, "{off} of {pushing} patches are off");
 }
 
+/// A ball that comes near, of whose gaps only the least are within the prediction (2 R), has one point, straight below it.
+#[test]
+fn a_ball_that_comes_near_has_one_point() {
+    for radius in [10.0 * R, 15.0 * R, 25.0 * R] {
+        for seed in 0..12 {
+            let mut rng = fastrand::Rng::with_seed(seed);
+            let floor = sampled_plane(40.0 * R, R, &mut rng).bare_cloud(R);
+            let ball = sampled_sphere(radius, R).bare_cloud(R);
+            let gap = R * (1.5 + 0.2 * rng.f32());
+            let place = Vec3::new(3.0 * R * rng.f32(), radius + gap, 3.0 * R * rng.f32());
+            let found = compare_clouds(&floor, &ball, Pose3::from_parts(place, Quat::IDENTITY), R);
+            let points: Vec<_> = found.patches.iter().flat_map(|p| &p.points).collect();
+            assert_eq!(points.len(), 1, "{radius} {seed}: {points:?}");
+        }
+    }
+}
+
 /// Where noise leaves open where a ball touches, its contact is as wide as that and holds its lowest point, so that it
 /// lies; without noise it is a single point, on which it rolls.
 #[test]

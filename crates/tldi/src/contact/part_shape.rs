@@ -38,10 +38,10 @@ const DEEPEST_BAND: f32 = 0.1;
 /// each of 6 seeds instead of none.
 const DEEPER: f32 = 0.4;
 
-/// Roughness, in pixels, above which a bend of the surfaces does not count. Gaps that rise through all of the support
-/// band, as around a ball's contact, deviate from a plane by 0.29; those of a small face whose rim is blurred by
-/// estimated normals by 0.1. Half: no change; twice: 17 of 159 stability rows fail instead of none, and depths are 47 %
-/// worse.
+/// Roughness above which a bend of the surfaces counts, as a share of the band of gaps that is seen: [`SUPPORT_BAND`], or
+/// what the prediction leaves of it; at least [`LEAST_ROUGHNESS`]. Gaps that rise through all of it, as around a ball's contact, deviate from a plane by
+/// 0.29; those of a small face whose rim is blurred by estimated normals by 0.1. Half: no change; twice: 17 of 159
+/// stability rows fail instead of none, and depths are 47 % worse.
 const LEAST_RISE: f32 = 0.15;
 
 /// Share of the variance of normals across a valley that a steady turn explains at least. Measured: 0.98 and more of
@@ -152,7 +152,10 @@ impl Shape {
         points.clear();
         points.extend(in_band.map(|(contact, smooth)| self.point(contact.middle(), smooth.gap)));
         let supports = supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
-        let rises = supports.roughness >= LEAST_RISE * params.pixel_size;
+        let band = SUPPORT_BAND * params.pixel_size;
+        let seen = (params.prediction - self.least_gap).clamp(0.0, band);
+        let noise = LEAST_ROUGHNESS * params.pixel_size;
+        let rises = supports.roughness >= noise.max(LEAST_RISE * seen);
         let roughness = supports.roughness_about_bowl;
         if rises && let Some(lowest) = &supports.lowest_of_bowl {
             return part.on_bowl(lowest, roughness, tangents);
