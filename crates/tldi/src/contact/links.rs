@@ -29,8 +29,10 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(crate) struct Links {
     /// Indices of the contact pixels, the lower one first.
     pub(crate) pairs: Vec<(u32, u32)>,
-    /// Scratch for each contact pixel: first its links, then whether its component leads out, last its new index or [`NONE`].
+    /// How many others each contact pixel is linked with.
     counts: Vec<u32>,
+    /// Scratch for each contact pixel: whether its component leads out, then its new index or [`NONE`].
+    marks: Vec<u32>,
     /// Where the neighbours of each contact pixel start in `neighbors`, and their end.
     starts: Vec<u32>,
     neighbors: Vec<u32>,
@@ -83,8 +85,8 @@ impl Links {
     ///
     /// Contact pixels deeper than a layer need neighbours that confirm them, and go with their links if they have too
     /// few; others still touch. If nothing tells the inside (`tells_inside`), what is deep may be the space between two
-    /// limbs, too. Then deep pixels count if they continue others at which the surfaces are apart. Where there are none
-    /// of these, all count if the surfaces were seen to cross (`result.collides`).
+    /// limbs, too. Then deep pixels count if they continue others at which the surfaces are apart. Where no confirmed
+    /// penetration does, all count if the surfaces were seen to cross (`result.collides`).
     pub(crate) fn confirm(
         &mut self,
         result: &mut PairResult,
@@ -94,27 +96,24 @@ impl Links {
     ) {
         let is_deep =
             |c: &ContactPixel| c.point_a.distance(c.point_b) > params.thickness && c.gap < 0.0;
-        self.counts.clear();
-        self.counts.resize(result.contacts.len(), 0);
-        for &(k, l) in &self.pairs {
-            self.counts[k as usize] += 1;
-            self.counts[l as usize] += 1;
-        }
-        for (count, contact) in self.counts.iter_mut().zip(&mut result.contacts) {
-            if *count < CONFIRMING {
+        self.count(result.contacts.len());
+        self.marks.clear();
+        let counted = self.counts.iter().zip(&mut result.contacts);
+        self.marks.extend(counted.map(|(&count, contact)| {
+            if count < CONFIRMING {
                 if is_deep(contact) {
-                    *count = NONE;
-                    continue;
+                    return NONE;
                 }
-                let confirmed = *count as f32 / CONFIRMING as f32 * params.thickness;
+                let confirmed = count as f32 / CONFIRMING as f32 * params.thickness;
                 contact.gap = contact.gap.max(-confirmed);
             }
-        }
-        self.keep_counted(&mut result.contacts);
+            0
+        }));
+        self.keep_marked(&mut result.contacts);
         if !tells_inside && result.contacts.iter().any(is_deep) {
             let is_any_proven = self.mark_unproven(&result.contacts, is_deep, roots);
             if is_any_proven || !result.collides {
-                self.keep_counted(&mut result.contacts);
+                self.keep_marked(&mut result.contacts);
             }
         }
         self.index(&result.contacts);
@@ -125,17 +124,28 @@ impl Links {
         result.collides |= result.contacts.iter().any(is_deep);
     }
 
-    /// Sets `counts` to [`NONE`] for the contact pixels that are deep and do not continue others at which the surfaces
+    /// Fills `counts` for so many contact pixels.
+    fn count(&mut self, contacts: usize) {
+        self.counts.clear();
+        self.counts.resize(contacts, 0);
+        for &(k, l) in &self.pairs {
+            self.counts[k as usize] += 1;
+            self.counts[l as usize] += 1;
+        }
+    }
+
+    /// Sets `marks` to [`NONE`] for the contact pixels that are deep and do not continue others at which the surfaces
     /// are apart: from within an overlap the gap passes through zero, the space between limbs ends where they meet.
-    /// Returns whether any that are deep do.
+    /// Returns whether any penetration does so that its neighbours confirm, however deep.
     fn mark_unproven(
         &mut self,
         contacts: &[ContactPixel],
         is_deep: impl Fn(&ContactPixel) -> bool,
         roots: &mut Vec<u32>,
     ) -> bool {
+        self.count(contacts.len());
         self.components(contacts.len(), roots);
-        let leads_out = &mut self.counts;
+        let leads_out = &mut self.marks;
         leads_out.clear();
         leads_out.resize(contacts.len(), 0);
         for (contact, &root) in contacts.iter().zip(&*roots) {
@@ -144,20 +154,20 @@ impl Links {
         let mut is_any_proven = false;
         // The root of a component comes first, and is read by all others of it.
         for (k, contact) in contacts.iter().enumerate().rev() {
-            let is_out = self.counts[roots[k] as usize] == 1;
-            is_any_proven |= is_out && is_deep(contact);
-            self.counts[k] = if is_out || !is_deep(contact) { 1 } else { NONE };
+            let is_out = self.marks[roots[k] as usize] == 1;
+            is_any_proven |= is_out && contact.gap < 0.0 && self.counts[k] >= CONFIRMING;
+            self.marks[k] = if is_out || !is_deep(contact) { 1 } else { NONE };
         }
         is_any_proven
     }
 
-    /// Keeps the contact pixels that have no [`NONE`] in `counts`, and the links between them.
-    fn keep_counted(&mut self, contacts: &mut Vec<ContactPixel>) {
-        let kept = self.counts.iter_mut().filter(|count| **count != NONE);
-        for (index, count) in (0..).zip(kept) {
-            *count = index;
+    /// Keeps the contact pixels that have no [`NONE`] in `marks`, and the links between them.
+    fn keep_marked(&mut self, contacts: &mut Vec<ContactPixel>) {
+        let kept = self.marks.iter_mut().filter(|mark| **mark != NONE);
+        for (index, mark) in (0..).zip(kept) {
+            *mark = index;
         }
-        let new_index = &self.counts;
+        let new_index = &self.marks;
         retain_by_index(contacts, |k, _| new_index[k] != NONE);
         self.pairs.retain_mut(|(k, l)| {
             (*k, *l) = (new_index[*k as usize], new_index[*l as usize]);
@@ -350,16 +360,18 @@ mod tests {
         // A box that is sunk in a sheet: its bottom is deep all over, and its sides are seen to cross.
         let sunk = crossing(apart.clone());
         assert_eq!((sunk.contacts.len(), sunk.collides), (60, true));
-        // The space between limbs beside limbs that meet.
-        let mut beside = sloping(6.0);
-        beside.extend(apart.iter().map(|contact| ContactPixel {
-            pixel: [contact.pixel[0] + 20, contact.pixel[1]],
-            ..*contact
-        }));
-        beside.sort_by_key(|contact| (contact.pixel[1], contact.pixel[0]));
-        let result = crossing(beside);
-        assert!(result.contacts.iter().all(|contact| contact.pixel[0] < 20));
-        assert!(result.collides && result.gap.is_some_and(|gap| gap < -4.0 * PIXEL));
+        // The space between limbs beside limbs that meet, which need not be deep.
+        for from in [6.0, 1.5] {
+            let mut beside = sloping(from);
+            beside.extend(apart.iter().map(|contact| ContactPixel {
+                pixel: [contact.pixel[0] + 20, contact.pixel[1]],
+                ..*contact
+            }));
+            beside.sort_by_key(|contact| (contact.pixel[1], contact.pixel[0]));
+            let result = crossing(beside);
+            assert!(result.contacts.iter().all(|contact| contact.pixel[0] < 20));
+            assert!(result.collides && result.gap == Some(-from * PIXEL));
+        }
     }
 
     #[test]
