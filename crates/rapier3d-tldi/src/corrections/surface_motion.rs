@@ -318,8 +318,8 @@ fn mean_near(cloud: &PointCloud<'_>, values: &[Vector], point: Vector) -> Vector
     if total > 0.0 { sum / total } else { nearest.1 }
 }
 
-/// Hooks around the user's own, which give the velocities of surfaces with other points to rapier's solver, and let sweeps (CCD) pass
-/// pairs whose contacts the user's hooks take away.
+/// Hooks around the user's own, which give the velocities of surfaces with other points to rapier's solver, and let sweeps
+/// (CCD) pass pairs whose contacts the user's hooks take away.
 /// Get them from [`TldiPipeline::hooks`](crate::TldiPipeline::hooks).
 ///
 /// ```
