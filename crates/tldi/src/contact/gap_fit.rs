@@ -133,7 +133,7 @@ mod tests {
         let params = Params::for_radius(1.0);
         let mut links = Links::default();
         links.find(&result.contacts, &params);
-        links.confirm(&mut result, &params, true, &mut Vec::new());
+        links.confirm(&mut result, &params, None, &mut Vec::new());
         let middle = pixels.iter().position(|p| *p == [0, 0]);
         let middle = middle.expect("is among them") as u32;
         GapFit::default().gap(middle, &result.contacts, &links)

@@ -84,14 +84,15 @@ impl Links {
     /// overwritten.
     ///
     /// Contact pixels deeper than a layer need neighbours that confirm them, and go with their links if they have too
-    /// few; others still touch. If nothing tells the inside (`tells_inside`), what is deep may be the space between two
-    /// limbs, too. Then deep pixels count if they continue others at which the surfaces are apart. Where no confirmed
-    /// penetration does, all count if the surfaces were seen to cross (`result.collides`).
+    /// few; others still touch. If nothing tells the inside, what is deep may be the space between two limbs, too. Then deep
+    /// pixels count if they continue others at which the surfaces are apart. Where no confirmed penetration of more than
+    /// `least_proof` metres does, all count if the surfaces were seen to cross (`result.collides`). `None`: a surface tells
+    /// its inside.
     pub(crate) fn confirm(
         &mut self,
         result: &mut PairResult,
         params: &Params,
-        tells_inside: bool,
+        least_proof: Option<f32>,
         roots: &mut Vec<u32>,
     ) {
         let is_deep =
@@ -110,8 +111,10 @@ impl Links {
             0
         }));
         self.keep_marked(&mut result.contacts);
-        if !tells_inside && result.contacts.iter().any(is_deep) {
-            let is_any_proven = self.mark_unproven(&result.contacts, is_deep, roots);
+        if let Some(least) = least_proof
+            && result.contacts.iter().any(is_deep)
+        {
+            let is_any_proven = self.mark_unproven(&result.contacts, is_deep, least, roots);
             if is_any_proven || !result.collides {
                 self.keep_marked(&mut result.contacts);
             }
@@ -136,11 +139,12 @@ impl Links {
 
     /// Sets `marks` to [`NONE`] for the contact pixels that are deep and do not continue others at which the surfaces
     /// are apart: from within an overlap the gap passes through zero, the space between limbs ends where they meet.
-    /// Returns whether any penetration does so that its neighbours confirm, however deep.
+    /// Returns whether any penetration of more than `least_proof` does so that its neighbours confirm.
     fn mark_unproven(
         &mut self,
         contacts: &[ContactPixel],
         is_deep: impl Fn(&ContactPixel) -> bool,
+        least_proof: f32,
         roots: &mut Vec<u32>,
     ) -> bool {
         self.count(contacts.len());
@@ -155,7 +159,7 @@ impl Links {
         // The root of a component comes first, and is read by all others of it.
         for (k, contact) in contacts.iter().enumerate().rev() {
             let is_out = self.marks[roots[k] as usize] == 1;
-            is_any_proven |= is_out && contact.gap < 0.0 && self.counts[k] >= CONFIRMING;
+            is_any_proven |= is_out && contact.gap < -least_proof && self.counts[k] >= CONFIRMING;
             self.marks[k] = if is_out || !is_deep(contact) { 1 } else { NONE };
         }
         is_any_proven
@@ -303,7 +307,8 @@ mod tests {
         let params = Params::for_radius(PIXEL);
         let mut links = Links::default();
         links.find(&result.contacts, &params);
-        links.confirm(&mut result, &params, tells_inside, &mut Vec::new());
+        let least_proof = (!tells_inside).then_some(0.0);
+        links.confirm(&mut result, &params, least_proof, &mut Vec::new());
         let count = result.contacts.len();
         let pixel = |k: u32| result.contacts[k as usize].pixel;
         for (k, l) in &links.pairs {

@@ -74,7 +74,7 @@ impl PatchScratch {
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         let _stage = stage!("patches");
         self.link(result, params);
-        self.reduce_linked(result, params, true);
+        self.reduce_linked(result, params, None);
     }
 
     /// [`reduce`](Self::reduce) without the contact pixels of points that stand alone: flying pixels
@@ -101,17 +101,18 @@ impl PatchScratch {
         if are_lone_points {
             self.links.find(&result.contacts, &query.params);
         }
-        self.finish(result, query);
+        self.finish(result, query, 0.0);
         are_lone_points
     }
 
     /// [`reduce`](Self::reduce) of the contact pixels of a first look, in which nothing stands alone. The surfaces are
-    /// taken to cross: the caller has to prove it.
+    /// taken to cross: the caller has to prove it. A large pixel may hold surfaces that only touch, so overlaps of less than
+    /// a layer prove nothing: where bodies coincide, they are all over.
     pub(crate) fn reduce_coarse(&mut self, result: &mut PairResult, query: &PairQuery) {
         let _stage = stage!("patches");
         result.collides = true;
         self.link(result, &query.params);
-        self.finish(result, query);
+        self.finish(result, query, query.params.thickness);
     }
 
     fn link(&mut self, result: &mut PairResult, params: &Params) {
@@ -121,17 +122,23 @@ impl PatchScratch {
         self.links.find(&result.contacts, params);
     }
 
-    /// Reduces linked contact pixels by what is known of both surfaces.
-    fn finish(&mut self, result: &mut PairResult, query: &PairQuery) {
+    /// Reduces linked contact pixels by what is known of both surfaces. `least_proof`: see [`Links::confirm`].
+    fn finish(&mut self, result: &mut PairResult, query: &PairQuery, least_proof: f32) {
         let tells_inside = query.a.is_oriented() || query.b.is_oriented();
-        self.reduce_linked(result, &query.params, tells_inside);
+        let least_proof = (!tells_inside).then_some(least_proof);
+        self.reduce_linked(result, &query.params, least_proof);
         let fitted = self.smooth.iter().map(|pixel| pixel.gap);
         allow_for_noise(result, fitted.reduce(f32::min), query);
     }
 
-    fn reduce_linked(&mut self, result: &mut PairResult, params: &Params, tells_inside: bool) {
+    fn reduce_linked(
+        &mut self,
+        result: &mut PairResult,
+        params: &Params,
+        least_proof: Option<f32>,
+    ) {
         self.links
-            .confirm(result, params, tells_inside, &mut self.group);
+            .confirm(result, params, least_proof, &mut self.group);
         let (contacts, out) = (&result.contacts, &mut result.patches);
         out.clear();
         self.smooth.clear();
