@@ -151,10 +151,10 @@ impl Shape {
         let in_band = part.in_band();
         points.clear();
         points.extend(in_band.map(|(contact, smooth)| self.point(contact.middle(), smooth.gap)));
-        let supports = supports(points, self.normal, LEAST_ROUGHNESS * params.pixel_size);
+        let noise = LEAST_ROUGHNESS * params.pixel_size;
+        let supports = supports(points, self.normal, noise);
         let band = SUPPORT_BAND * params.pixel_size;
         let seen = (params.prediction.max(band) - self.least_gap).clamp(0.0, band);
-        let noise = LEAST_ROUGHNESS * params.pixel_size;
         let rises = supports.roughness >= noise.max(LEAST_RISE * seen);
         let roughness = supports.roughness_about_bowl;
         if rises && let Some(lowest) = &supports.lowest_of_bowl {
