@@ -3,6 +3,7 @@
 pub(crate) mod batching;
 pub(crate) mod candidates;
 pub(crate) mod measured;
+pub(crate) mod pair_memory;
 pub(crate) mod pipeline;
 pub(crate) mod prepared;
 pub(crate) mod report;

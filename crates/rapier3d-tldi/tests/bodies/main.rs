@@ -10,3 +10,4 @@ mod pipeline;
 mod refusals;
 mod resting;
 mod rolling;
+mod sides;

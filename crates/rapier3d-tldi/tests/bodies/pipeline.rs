@@ -70,49 +70,6 @@ fn teleport_after_the_batch_is_a_miss() -> TestResult {
     Ok(())
 }
 
-/// A body that is put under the floor it rests on is below it, not above and deep in it.
-#[test]
-fn side_is_forgotten_where_a_body_is_put_elsewhere() -> TestResult {
-    let (mut world, mut tldi) = attached();
-    insert_floor(&mut world, 0.8);
-    let (body, _) = world.insert(dynamic_at(HALF), tldi.collider(cloud(&cube(HALF))));
-    for _ in 0..5 {
-        tldi.step(&mut world)?;
-    }
-    let depth = 0.005;
-    world.bodies[body].set_translation(Vector::Y * (depth - HALF), true);
-    let report = tldi.step(&mut world)?;
-    assert_eq!(report.pairs_in_contact, 1);
-    let told = report.max_penetration;
-    assert!(told < depth + REST_TOLERANCE, "{told} m");
-    Ok(())
-}
-
-/// So is that of a body that is put where bounds meet, but not surfaces, and comes back a step later.
-#[test]
-fn side_is_forgotten_before_a_body_comes_back() -> TestResult {
-    let (mut world, mut tldi) = attached();
-    world.gravity = Vector::ZERO;
-    world.insert(RigidBodyBuilder::fixed(), ColliderBuilder::ball(HALF));
-    let body = RigidBodyBuilder::dynamic().translation(2.0 * HALF * Vector::X);
-    let (body, _) = world.insert(body, tldi.collider(cloud(&cube(HALF))));
-    for _ in 0..5 {
-        tldi.step(&mut world)?;
-    }
-    // An edge towards the ball, 0.03 m from it.
-    let diagonal = (Vector::X + Vector::Y) / 2.0_f32.sqrt();
-    let middle = -(HALF + 2.0_f32.sqrt() * HALF + 0.03) * diagonal;
-    world.bodies[body].set_translation(middle, true);
-    world.bodies[body].set_linvel(diagonal, true);
-    for step in 0..20 {
-        let told = tldi.step(&mut world)?.max_penetration;
-        assert!(told < HALF / 4.0, "step {step}: {told} m");
-    }
-    assert!(world.bodies[body].linvel().dot(diagonal) < 0.1);
-    assert!(world.bodies[body].translation().x < -HALF);
-    Ok(())
-}
-
 /// Without `prepare` everything is compared on the spot and the outcome is the same.
 #[test]
 fn plain_rapier_step_works_too() -> TestResult {
