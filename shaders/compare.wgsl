@@ -16,6 +16,9 @@ struct Column {
     is_body: bool,
     near: f32,
     far: f32,
+    // Whether the image shows little but an edge: there the surface ends, at `far` where it is in front.
+    shows_edge: bool,
+    is_in_front: bool,
 }
 
 // What all pixels of a view share.
@@ -34,11 +37,26 @@ fn column(s: u32, pixel: u32) -> Column {
         false,
         -INFINITE,
         INFINITE,
+        false,
+        false,
     );
 }
 
+// Whether layer `k` is an end of a surface that shows little but an edge. See the CPU's.
+fn is_end(c: Column, k: u32) -> bool {
+    return c.shows_edge && is_edge_on(layers[k].normal);
+}
+
+fn depth_of(c: Column, k: u32) -> f32 {
+    return select(layers[k].depth, select(layers[k].near, layers[k].far, c.is_in_front), is_end(c, k));
+}
+
+fn normal_of(c: Column, k: u32) -> vec3f {
+    return select(layers[k].normal, vec3f(0.0, 0.0, 1.0), is_end(c, k));
+}
+
 fn facing_of(c: Column, k: u32) -> i32 {
-    return select(layers[k].facing, UNKNOWN, c.is_turned);
+    return select(layers[k].facing, UNKNOWN, c.is_turned || is_end(c, k));
 }
 
 fn is_best_seen(look: ptr<function, Look>, normal: vec3f) -> bool {
@@ -164,9 +182,9 @@ fn facing_camera(normal: vec3f, sign: f32) -> vec3f {
 }
 
 // How much the normal of a layer counts for a body. See the CPU's.
-fn share_of(k: u32, side: f32) -> f32 {
+fn share_of(c: Column, k: u32, side: f32) -> f32 {
     let agreement = layers[k].agreement;
-    let is_edge = agreement * side * layers[k].normal.z > 0.0;
+    let is_edge = agreement * side * normal_of(c, k).z > 0.0;
     return select(1.0, abs(agreement), is_edge);
 }
 
@@ -178,14 +196,14 @@ fn opposed(entry: vec3f, leaving: vec3f) -> bool {
 
 // Depth at which the ray entered the part of a body that it leaves through layer `last`.
 fn entered_at(c: Column, last: u32, thickness: f32) -> f32 {
-    let thin = layers[last].depth - thickness;
+    let thin = depth_of(c, last) - thickness;
     for (var k = last; k > c.begin; k--) {
         let before = k - 1u;
-        if is_edge_on(layers[before].normal) {
+        if is_edge_on(normal_of(c, before)) {
             continue;
         }
-        let is_odd = facing_of(c, last) == EXIT && layers[before].facing != ENTRY;
-        return select(layers[before].depth, thin, is_odd);
+        let is_odd = facing_of(c, last) == EXIT && facing_of(c, before) != ENTRY;
+        return select(depth_of(c, before), thin, is_odd);
     }
     let middle = select(thin, 0.5 * (c.near + c.far), c.is_body);
     return min(thin, select(middle, c.near, facing_of(c, last) == EXIT));
@@ -193,13 +211,13 @@ fn entered_at(c: Column, last: u32, thickness: f32) -> f32 {
 
 // Depth at which the ray leaves the part of a body that it enters through layer `first`.
 fn left_at(c: Column, first: u32, thickness: f32) -> f32 {
-    let thin = layers[first].depth + thickness;
+    let thin = depth_of(c, first) + thickness;
     for (var behind = first + 1u; behind < c.end; behind++) {
-        if is_edge_on(layers[behind].normal) {
+        if is_edge_on(normal_of(c, behind)) {
             continue;
         }
-        let is_odd = facing_of(c, first) == ENTRY && layers[behind].facing != EXIT;
-        return select(layers[behind].depth, thin, is_odd);
+        let is_odd = facing_of(c, first) == ENTRY && facing_of(c, behind) != EXIT;
+        return select(depth_of(c, behind), thin, is_odd);
     }
     let middle = select(thin, 0.5 * (c.near + c.far), c.is_body);
     return max(thin, select(middle, c.far, facing_of(c, first) == ENTRY));
@@ -212,11 +230,11 @@ fn is_entered_at(c: Column, k: u32, left: f32) -> bool {
         return false;
     }
     for (var before = c.begin; before < k; before++) {
-        if !is_edge_on(layers[before].normal) {
+        if !is_edge_on(normal_of(c, before)) {
             return false;
         }
     }
-    return k + 1u < c.end && layers[min(k + 1u, c.end - 1u)].depth <= left;
+    return k + 1u < c.end && depth_of(c, min(k + 1u, c.end - 1u)) <= left;
 }
 
 // The same of where it is left, and more of which came after the ray entered the other body.
@@ -225,11 +243,11 @@ fn is_left_at(c: Column, k: u32, entered: f32) -> bool {
         return false;
     }
     for (var behind = k + 1u; behind < c.end; behind++) {
-        if !is_edge_on(layers[behind].normal) {
+        if !is_edge_on(normal_of(c, behind)) {
             return false;
         }
     }
-    return k > c.begin && layers[max(k, c.begin + 1u) - 1u].depth >= entered;
+    return k > c.begin && depth_of(c, max(k, c.begin + 1u) - 1u) >= entered;
 }
 
 // Whether one way out of an overlap is so much longer than the other that the other one counts.
@@ -243,14 +261,14 @@ fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_ot
     let entered = entered_at(front, kf, thickness);
     for (var kb = back.begin; kb < back.end; kb++) {
         let left = left_at(back, kb, thickness);
-        if facing_of(back, kb) == EXIT || is_edge_on(layers[kb].normal) || entered > left {
+        if facing_of(back, kb) == EXIT || is_edge_on(normal_of(back, kb)) || entered > left {
             continue;
         }
-        let depth = layers[kf].depth - layers[kb].depth;
+        let depth = depth_of(front, kf) - depth_of(back, kb);
         let is_sure = facing_of(front, kf) == EXIT && facing_of(back, kb) == ENTRY;
         let other_way = left - entered;
         let is_too_far = is_sure && is_far_longer(depth, other_way, thickness);
-        let is_opposed = opposed(layers[kb].normal, layers[kf].normal);
+        let is_opposed = opposed(normal_of(back, kb), normal_of(front, kf));
         let is_within = depth > 0.0
             && ((facing_of(back, kb) == ENTRY && is_entered_at(front, kf, left))
                 || (facing_of(front, kf) == EXIT && is_left_at(back, kb, entered)));
@@ -278,7 +296,7 @@ fn contact_pixels(
 ) {
     let pair = view / MAX_VIEWS;
     for (var kf = front.begin; kf < front.end; kf++) {
-        if facing_of(front, kf) == ENTRY || is_edge_on(layers[kf].normal) {
+        if facing_of(front, kf) == ENTRY || is_edge_on(normal_of(front, kf)) {
             continue;
         }
         let kb = met_by(look, front, back, kf, is_other_side);
@@ -286,10 +304,10 @@ fn contact_pixels(
             continue;
         }
         // Outward unit normals in the view frame: the ray leaves the body in front and enters the other.
-        let normal_back = facing_camera(layers[kb].normal, -1.0);
-        let normal_front = facing_camera(layers[kf].normal, 1.0);
+        let normal_back = facing_camera(normal_of(back, kb), -1.0);
+        let normal_front = facing_camera(normal_of(front, kf), 1.0);
         let normal = unit_or(normal_back - normal_front, vec3f(0.0, 0.0, -1.0));
-        let gap = (layers[kb].depth - layers[kf].depth) * abs(normal.z);
+        let gap = (depth_of(back, kb) - depth_of(front, kf)) * abs(normal.z);
         if !is_best_seen(look, normal) {
             continue;
         }
@@ -305,16 +323,16 @@ fn contact_pixels(
             continue;
         }
         let at = batch.pairs * PAIR_WORDS + slot * CONTACT_WORDS;
-        let ka = select(kb, kf, is_other_side);
-        let of_b = select(kf, kb, is_other_side);
+        let depth_a = select(depth_of(back, kb), depth_of(front, kf), is_other_side);
+        let depth_b = select(depth_of(front, kf), depth_of(back, kb), is_other_side);
         atomicStore(&found[at], view);
         atomicStore(&found[at + CONTACT_PIXEL], u32(pixel.x));
         atomicStore(&found[at + CONTACT_PIXEL + 1u], u32(pixel.y));
-        atomicStore(&found[at + CONTACT_DEPTHS], bitcast<u32>(layers[ka].depth));
-        atomicStore(&found[at + CONTACT_DEPTHS + 1u], bitcast<u32>(layers[of_b].depth));
+        atomicStore(&found[at + CONTACT_DEPTHS], bitcast<u32>(depth_a));
+        atomicStore(&found[at + CONTACT_DEPTHS + 1u], bitcast<u32>(depth_b));
         atomicStore(&found[at + CONTACT_GAP], bitcast<u32>(gap));
-        let shortened_back = share_of(kb, -1.0) * normal_back;
-        let shortened_front = share_of(kf, 1.0) * normal_front;
+        let shortened_back = share_of(back, kb, -1.0) * normal_back;
+        let shortened_front = share_of(front, kf, 1.0) * normal_front;
         let shortened_a = select(shortened_back, shortened_front, is_other_side);
         let shortened_b = select(shortened_front, shortened_back, is_other_side);
         for (var k = 0u; k < 3u; k++) {
@@ -324,20 +342,32 @@ fn contact_pixels(
     }
 }
 
+// Whether most pixels that show anything of a side show it edge-on. See the CPU's.
+fn shows_edge(s: u32, view: u32) -> bool {
+    return bitcast<i32>(atomicLoad(&work[batch.views_at + view * VIEW_WORDS + EDGES + s])) > 0;
+}
+
 // The column with what is known of its body.
 fn with_body(c: Column, s: u32, view: u32) -> Column {
     let is_body = (views[view].flags & (BODY << s)) != 0u;
     let near = select(-INFINITE, views[view].near[s], is_body);
     let far = select(INFINITE, views[view].far[s], is_body);
-    return Column(c.begin, c.end, c.is_turned, is_body, near, far);
+    // What is edge-on in both views says nothing.
+    let is_edge = shows_edge(s, view) && !shows_edge(1u - s, view);
+    return Column(c.begin, c.end, c.is_turned, is_body, near, far, is_edge, false);
+}
+
+// The column as the body in front, or at the back.
+fn placed(c: Column, is_in_front: bool) -> Column {
+    return Column(c.begin, c.end, c.is_turned, c.is_body, c.near, c.far, c.shows_edge, is_in_front);
 }
 
 fn turned_from(c: Column, met: i32, from_behind: bool) -> Column {
     var is_turned = from_behind;
     for (var k = c.begin; k < c.end; k++) {
-        is_turned = is_turned && layers[k].facing != met;
+        is_turned = is_turned && facing_of(c, k) != met;
     }
-    return Column(c.begin, c.end, is_turned, c.is_body, c.near, c.far);
+    return Column(c.begin, c.end, is_turned, c.is_body, c.near, c.far, c.shows_edge, c.is_in_front);
 }
 
 @compute @workgroup_size(256)
@@ -395,9 +425,9 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     let turned_a = turned_from(a, ENTRY, (flags & FROM_BEHIND) != 0u);
     let turned_b = turned_from(b, EXIT, (flags & (FROM_BEHIND << 1u)) != 0u);
     let at = views[view].rect_origin + vec2i(pixel);
-    contact_pixels(&look, turned_b, turned_a, false, view, at);
+    contact_pixels(&look, placed(turned_b, true), placed(turned_a, false), false, view, at);
     let facts = &pairs[pair].sides;
     if ((*facts)[0].flags & (*facts)[1].flags & ORIENTED) != 0u {
-        contact_pixels(&look, a, b, true, view, at);
+        contact_pixels(&look, placed(a, true), placed(b, false), true, view, at);
     }
 }

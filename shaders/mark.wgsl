@@ -33,8 +33,10 @@ fn splat_of(view: u32, i: u32, normal_in_frame: vec3f) -> Splat {
     let oriented = (pairs[pair].sides[side % 2u].flags & (HAS_NORMALS | ORIENTED)) == (HAS_NORMALS | ORIENTED);
     var splat: Splat;
     splat.class_bits = u32(!oriented || normal.z > 0.0);
-    if abs(normal.z) < EDGE_ON {
+    splat.steps = params.slope_damping * params.pixel_size * pairs[pair].depth_inv_step;
+    if is_edge_on(normal) {
         splat.class_bits = 2u;
+        splat.steps = 0.0;
     }
     splat.class_bits = (splat.class_bits << DEPTH_BITS) | u32(abs(normal.z) < STEEP);
     let steepest = vec2f(1.0e18);
@@ -46,7 +48,6 @@ fn splat_of(view: u32, i: u32, normal_in_frame: vec3f) -> Splat {
     splat.centre = p.xy / params.pixel_size;
     splat.radius = splat_radius(survivors[i].radius, params.pixel_size) / params.pixel_size;
     splat.depth = (p.z - views[view].depth_zero) * pairs[pair].depth_inv_step;
-    splat.steps = params.slope_damping * params.pixel_size * pairs[pair].depth_inv_step;
     splat.facing = abs(normal.z);
     // Centres at i + 0.5 within reach, and the pixel that holds the point.
     let own = floor(splat.centre);

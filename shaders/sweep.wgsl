@@ -13,6 +13,9 @@ const MOST_FRAGMENTS: u32 = 1024u;
 
 var<workgroup> total: atomic<u32>;
 var<workgroup> base: u32;
+// Where it is counted what the first pixel's image shows edge-on, and the group's part of it.
+var<workgroup> main_at: u32;
+var<workgroup> main_edges: atomic<i32>;
 
 fn sift(begin: u32, start: u32, count: u32) {
     var root = start;
@@ -204,6 +207,46 @@ fn layer_of(start: u32, end: u32, oriented: bool, knows_faces: bool, view: u32) 
     return layer;
 }
 
+// Writes the layers of a pixel, in order of depth, then of facing. 1 if all of them are edge-on, -1 if not.
+fn write_layers(begin: u32, end: u32, first_layer: u32, view: u32, s: u32) -> i32 {
+    let merge_steps = pairs[view / MAX_VIEWS].sides[s].merge_steps;
+    var are_edge_on = true;
+    let flags = pairs[view / MAX_VIEWS].sides[s].flags;
+    let oriented = (flags & (HAS_NORMALS | ORIENTED)) == (HAS_NORMALS | ORIENTED);
+    // Estimated ones are sharpened.
+    let knows_faces = oriented || (flags & HAS_NORMALS) == 0u;
+    var slot = first_layer;
+    var start = begin;
+    for (var i = begin; i < end; i++) {
+        let is_last = i + 1u == end;
+        if is_last || !is_same_layer(fragments[i].x, fragments[min(i + 1u, end - 1u)].x, merge_steps) {
+            let layer = layer_of(start, i + 1u, oriented, knows_faces, view);
+            var place = slot;
+            // Ends: `place` falls.
+            while place > first_layer {
+                let before = layers[place - 1u];
+                let is_behind = before.depth > layer.depth
+                    || (before.depth == layer.depth && before.facing > layer.facing);
+                if !is_behind {
+                    break;
+                }
+                layers[place] = before;
+                place--;
+            }
+            layers[place] = layer;
+            are_edge_on = are_edge_on && is_edge_on(layer.normal);
+            slot++;
+            start = i + 1u;
+        }
+    }
+    return select(-1, 1, are_edge_on);
+}
+
+// Where it is counted what is edge-on.
+fn edges_at(view: u32, s: u32) -> u32 {
+    return batch.views_at + view * VIEW_WORDS + EDGES + s;
+}
+
 @compute @workgroup_size(256)
 fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let k = group_index(group) * GROUP + lane;
@@ -240,44 +283,25 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
     workgroupBarrier();
     if lane == 0u {
         base = atomicAdd(&work[LAYERS], atomicLoad(&total));
+        main_at = select(NONE, edges_at(view, s), exists);
     }
     workgroupBarrier();
-    if !exists {
-        return;
-    }
     let first_layer = base + own;
     let fitting = first_layer + count <= batch.layers;
-    atomicStore(&work[begin_at(s, pixel)], first_layer);
-    atomicStore(&work[end_at(s, pixel)], select(first_layer, first_layer + count, fitting));
-    if !fitting {
-        return;
+    if exists {
+        atomicStore(&work[begin_at(s, pixel)], first_layer);
+        atomicStore(&work[end_at(s, pixel)], select(first_layer, first_layer + count, fitting));
     }
-    let flags = pairs[view / MAX_VIEWS].sides[s].flags;
-    let oriented = (flags & (HAS_NORMALS | ORIENTED)) == (HAS_NORMALS | ORIENTED);
-    // Estimated ones are sharpened.
-    let knows_faces = oriented || (flags & HAS_NORMALS) == 0u;
-    var slot = first_layer;
-    var start = begin;
-    for (var i = begin; i < end; i++) {
-        let is_last = i + 1u == end;
-        if is_last || !is_same_layer(fragments[i].x, fragments[min(i + 1u, end - 1u)].x, merge_steps) {
-            // In order of depth, then of facing.
-            let layer = layer_of(start, i + 1u, oriented, knows_faces, view);
-            var place = slot;
-            // Ends: `place` falls.
-            while place > first_layer {
-                let before = layers[place - 1u];
-                let is_behind = before.depth > layer.depth
-                    || (before.depth == layer.depth && before.facing > layer.facing);
-                if !is_behind {
-                    break;
-                }
-                layers[place] = before;
-                place--;
-            }
-            layers[place] = layer;
-            slot++;
-            start = i + 1u;
+    if exists && fitting && count > 0u {
+        let surplus = write_layers(begin, end, first_layer, view, s);
+        if edges_at(view, s) == main_at {
+            atomicAdd(&main_edges, surplus);
+        } else {
+            atomicAdd(&work[edges_at(view, s)], bitcast<u32>(surplus));
         }
+    }
+    workgroupBarrier();
+    if lane == 0u && main_at != NONE {
+        atomicAdd(&work[main_at], bitcast<u32>(atomicLoad(&main_edges)));
     }
 }

@@ -1,7 +1,7 @@
 //! Bodies that come to rest on each other, clouds and shapes of rapier's in all pairings.
 
 use crate::common::worlds::{HALF, REST_TOLERANCE, TestResult, attached, dynamic_at, settle};
-use crate::common::{cube, shape, square};
+use crate::common::{SPACING, cube, shape, square};
 use rapier3d::parry::utils::Array2;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -52,6 +52,34 @@ fn cloud_rests_on_cloud() -> TestResult {
             floor_first,
             HALF,
         )?;
+    }
+    Ok(())
+}
+
+/// Boards that are thinner than their points are apart rest on an edge, if something keeps them upright.
+#[test]
+fn boards_rest_on_their_edges() -> TestResult {
+    let floor = || cloud_collider(shape(&square(0.8)));
+    let own_floor = || ColliderBuilder::cuboid(0.8, 0.1, 0.8).translation(-0.1 * Vector::Y);
+    for thickness in [0.0, 0.25 * SPACING, SPACING] {
+        let board: Vec<Vector> = square(HALF)
+            .iter()
+            .flat_map(|p| [0.5, -0.5].map(|side| *p + side * thickness * Vector::Y))
+            .collect();
+        for (lean, floor) in [0.0_f32, 3.0].into_iter().zip([floor(), own_floor()]) {
+            let turn = Rotation::from_rotation_z((90.0 - lean).to_radians());
+            let heights = board.iter().map(|p| (turn * *p).y);
+            let height = -heights.fold(f32::INFINITY, f32::min);
+            let (mut world, mut tldi) = attached();
+            world.insert(RigidBodyBuilder::fixed(), floor);
+            let pose = Pose::from_parts((height + 0.03) * Vector::Y, turn);
+            let body = RigidBodyBuilder::dynamic().pose(pose).lock_rotations();
+            let (body, _) = world.insert(body, cloud_collider(shape(&board)));
+            settle(&mut world, &mut tldi)?;
+            let rests_at = world.bodies[body].translation().y;
+            let is_close = (rests_at - height).abs() < REST_TOLERANCE;
+            assert!(is_close, "{thickness} m, {lean}°: {rests_at}, not {height}");
+        }
     }
     Ok(())
 }

@@ -5,29 +5,13 @@
 
 use super::crossings::{Crossings, best_seen};
 use super::fold::ViewFold;
+use super::pixel_column::{PixelColumn, Span, shows_edge};
 use super::sweep::{is_edge_on, share_of};
 use crate::stage::stage;
 use crate::view::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera};
 use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
-
-/// Depths between which a body lies, by its bounds, where its size says that it is one.
-///
-/// Where a layer is missing, the smaller surface of a pair counts as a body: it reaches at least to the middle of its bounds,
-/// and at most to their end if oriented normals tell that its inside begins there. The larger one counts as a sheet without
-/// a volume or, with such normals, as a solid without an end.
-#[derive(Clone, Copy)]
-pub(crate) struct Span {
-    pub(crate) near: f32,
-    pub(crate) far: f32,
-}
-
-impl Span {
-    fn middle(self) -> f32 {
-        0.5 * (self.near + self.far)
-    }
-}
 
 /// What is known of a view beside its images.
 #[derive(Clone, Copy, Default)]
@@ -73,6 +57,11 @@ pub(crate) fn compare(
     let [width, height] = a.size;
     let frame_from_view = a.camera.view_from_frame.inverse();
     let others = seen.others(&a.camera);
+    // What is edge-on in both views says nothing.
+    let [a_shows_edge, b_shows_edge] = match [a, b].map(shows_edge) {
+        [true, true] => [false; 2],
+        edges => edges,
+    };
     for j in 0..height {
         for i in 0..width {
             let k = (j * width + i) as usize;
@@ -97,12 +86,12 @@ pub(crate) fn compare(
                 others: &others,
             };
             let [behind_a, behind_b] = seen.from_behind;
-            let front = Column::new(lb, Facing::Exit, behind_b, seen.bodies[1]);
-            let back = Column::new(la, Facing::Entry, behind_a, seen.bodies[0]);
+            let of_a = PixelColumn::new(la, seen.bodies[0], a_shows_edge);
+            let of_b = PixelColumn::new(lb, seen.bodies[1], b_shows_edge);
+            let (back, front) = (of_a.at_back(behind_a), of_b.in_front(behind_b));
             contact_pixels([front, back], Order::BThenA, &at, params, result);
             if seen.tells_facing {
-                let front = Column::new(la, Facing::Exit, false, seen.bodies[0]);
-                let back = Column::new(lb, Facing::Entry, false, seen.bodies[1]);
+                let (front, back) = (of_a.in_front(false), of_b.at_back(false));
                 contact_pixels([front, back], Order::AThenB, &at, params, result);
             }
         }
@@ -128,83 +117,27 @@ struct PixelView<'a> {
     others: &'a [Vec3],
 }
 
-/// A surface's layers in one pixel.
-#[derive(Clone, Copy)]
-struct Column<'a> {
-    layers: &'a [Layer],
-    /// A sheet seen from behind: what its layers face says nothing.
-    is_turned: bool,
-    body: Option<Span>,
-}
-
-impl<'a> Column<'a> {
-    /// `met` is what the layers face that the other surface can meet.
-    fn new(layers: &'a [Layer], met: Facing, from_behind: bool, body: Option<Span>) -> Self {
-        let is_turned = from_behind && layers.iter().all(|layer| layer.facing != met);
-        Self {
-            layers,
-            is_turned,
-            body,
-        }
-    }
-
-    fn facing(&self, layer: &Layer) -> Facing {
-        match self.is_turned {
-            true => Facing::Unknown,
-            false => layer.facing,
-        }
-    }
-
-    fn up_to(&self, last: usize) -> Self {
-        Self {
-            layers: &self.layers[..=last],
-            ..*self
-        }
-    }
-
-    fn from(&self, first: usize) -> Self {
-        Self {
-            layers: &self.layers[first..],
-            ..*self
-        }
-    }
-
-    /// Whether layer `k` of unknown facing is where the ray enters the surface: the first one, and more of the surface comes
-    /// before the ray leaves the other body, whose inside is known, at depth `left`. So it is not an exit in that body. A box
-    /// on a table, its front a little behind the table's edge, is not in the side of the table.
-    fn is_entered_at(&self, k: usize, left: f32) -> bool {
-        self.facing(&self.layers[k]) == Facing::Unknown
-            && self.layers[..k].iter().all(is_edge_on)
-            && (self.layers.get(k + 1)).is_some_and(|next| next.depth <= left)
-    }
-
-    /// The same of where it is left: the last one, and more of the surface comes after the ray entered the other body.
-    fn is_left_at(&self, k: usize, entered: f32) -> bool {
-        self.facing(&self.layers[k]) == Facing::Unknown
-            && self.layers[k + 1..].iter().all(is_edge_on)
-            && (self.layers[..k].last()).is_some_and(|last| last.depth >= entered)
-    }
-}
-
 /// Contacts in a pixel, where the ray leaves the body in `front` and enters the one in `back`. If there are other views,
 /// surfaces that are apart by more than contacts are asked for count, too, until
 /// [`WayOut::keep_least`](crate::contact::way_out::WayOut::keep_least).
 fn contact_pixels(
-    [front, back]: [Column; 2],
+    [front, back]: [PixelColumn; 2],
     order: Order,
     at: &PixelView,
     params: &Params,
     result: &mut PairResult,
 ) {
-    for (kf, exit) in front.layers.iter().enumerate() {
+    for kf in 0..front.len() {
+        let exit = &front.layer(kf);
         if front.facing(exit) == Facing::Entry || is_edge_on(exit) {
             continue;
         }
-        let entered = entered_at(&front.up_to(kf), params);
+        let entered = front.entered_at(kf, params);
         // What `front` has left behind altogether it does not touch.
-        let entry = (back.layers.iter().enumerate())
+        let entry = (0..back.len())
+            .map(|kb| (kb, back.layer(kb)))
             .filter(|(_, layer)| back.facing(layer) != Facing::Exit && !is_edge_on(layer))
-            .map(|(kb, layer)| (kb, layer, left_at(&back.from(kb), params)))
+            .map(|(kb, layer)| (kb, layer, back.left_at(kb, params)))
             .filter(|(_, _, left)| entered <= *left)
             .find(|(kb, layer, left)| {
                 let depth = exit.depth - layer.depth;
@@ -230,7 +163,9 @@ fn contact_pixels(
                     }
                 }
             });
-        let Some((_, entry, _)) = entry else { continue };
+        let Some((_, ref entry, _)) = entry else {
+            continue;
+        };
         // Outward normals in the view frame: the ray leaves the front body and enters the other.
         let normal_back = facing_camera(entry.normal, -1.0);
         let normal_front = facing_camera(exit.normal, 1.0);
@@ -297,37 +232,6 @@ fn opposed(entry: &Layer, exit: &Layer) -> bool {
         facing_camera(exit.normal, 1.0),
     );
     n.z <= -FACING && m.z >= FACING && n.dot(m) <= -FACING
-}
-
-/// Depth at which the ray entered the body that it leaves at the last layer of `column`. If the entry is missing, the body's
-/// bounds decide. Two exits in a row mean that a layer was missed: only one thickness counts.
-fn entered_at(column: &Column, params: &Params) -> f32 {
-    let Some((exit, before)) = column.layers.split_last() else {
-        return f32::INFINITY;
-    };
-    let thin = exit.depth - params.thickness;
-    let before = before.iter().rfind(|l| !is_edge_on(l));
-    match (column.facing(exit), before) {
-        (Facing::Exit, None) => thin.min(column.body.map_or(f32::NEG_INFINITY, |body| body.near)),
-        (Facing::Exit, Some(l)) if l.facing != Facing::Entry => thin,
-        (_, Some(l)) => l.depth,
-        (_, None) => thin.min(column.body.map_or(f32::INFINITY, Span::middle)),
-    }
-}
-
-/// Depth at which the ray leaves the part of a body that it enters through the first of `layers`.
-fn left_at(column: &Column, params: &Params) -> f32 {
-    let Some((entry, behind)) = column.layers.split_first() else {
-        return f32::NEG_INFINITY;
-    };
-    let thin = entry.depth + params.thickness;
-    let behind = behind.iter().find(|l| !is_edge_on(l));
-    match (column.facing(entry), behind) {
-        (Facing::Entry, None) => thin.max(column.body.map_or(f32::INFINITY, |body| body.far)),
-        (Facing::Entry, Some(l)) if l.facing != Facing::Exit => thin,
-        (_, Some(l)) => l.depth,
-        (_, None) => thin.max(column.body.map_or(f32::NEG_INFINITY, Span::middle)),
-    }
 }
 
 /// `normal` or its opposite, such that its z has the given sign.
@@ -442,53 +346,5 @@ mod tests {
         let at_edge = image([None, None, Some(wall)]);
         let sheet = image([None, sheet, sheet]);
         assert!(pierces(&at_edge, &sheet, [2, 1], &params));
-    }
-
-    /// Where a ray entered what it leaves last, and left what it enters first, for a thickness of 2.
-    #[test]
-    fn rays_that_missed_a_layer_tell_nothing_of_the_inside() {
-        let params = Params::for_radius(1.0);
-        let entry = |depth| layer(depth, Facing::Entry);
-        let exit = |depth| layer(depth, Facing::Exit);
-        let unknown = |depth| layer(depth, Facing::Unknown);
-        fn column(layers: &[Layer]) -> Column<'_> {
-            Column {
-                layers,
-                is_turned: false,
-                body: None,
-            }
-        }
-        let entered = |layers: &[Layer]| entered_at(&column(layers), &params);
-        assert_eq!(entered(&[entry(1.0), exit(9.0)]), 1.0);
-        assert_eq!(entered(&[exit(9.0)]), f32::NEG_INFINITY);
-        // The entry belongs to the first exit.
-        assert_eq!(entered(&[entry(1.0), exit(3.0), exit(9.0)]), 7.0);
-        assert_eq!(entered(&[unknown(1.0), unknown(9.0)]), 1.0);
-        let left = |layers: &[Layer]| left_at(&column(layers), &params);
-        assert_eq!(left(&[entry(1.0), exit(9.0)]), 9.0);
-        assert_eq!(left(&[entry(1.0)]), f32::INFINITY);
-        assert_eq!(left(&[entry(1.0), entry(5.0), exit(9.0)]), 3.0);
-        // What is seen edge-on is passed over.
-        let mut edge_on = exit(5.0);
-        edge_on.normal = Vec3::X;
-        assert_eq!(left(&[entry(1.0), edge_on, exit(9.0)]), 9.0);
-        // A body ends with its bounds, but holds at least its layer.
-        let body = Some(Span {
-            near: -2.0,
-            far: 12.0,
-        });
-        let of_body = |layers: &[Layer], of: fn(&Column, &Params) -> f32| {
-            let column = Column {
-                body,
-                ..column(layers)
-            };
-            of(&column, &params)
-        };
-        assert_eq!(of_body(&[exit(9.0)], entered_at), -2.0);
-        assert_eq!(of_body(&[entry(1.0)], left_at), 12.0);
-        assert_eq!(of_body(&[unknown(9.0)], entered_at), 5.0);
-        assert_eq!(of_body(&[unknown(1.0)], left_at), 5.0);
-        assert_eq!(of_body(&[exit(-3.0)], entered_at), -5.0);
-        assert_eq!(of_body(&[entry(13.0)], left_at), 15.0);
     }
 }

@@ -18,6 +18,7 @@ mod lanes;
 mod motion;
 pub(crate) mod normals;
 mod pair;
+mod pixel_column;
 pub(crate) mod rect;
 pub(crate) mod room;
 mod scratch;

@@ -1,13 +1,14 @@
 //! What one pair needs while it is compared, and the steps that all looks at it share.
 
 use super::columns::{Tiles, Touching};
-use super::compare::{Seen, Span};
+use super::compare::Seen;
 use super::crossings::Crossings;
 use super::exact::placed::Placed;
 use super::first_look::window::Window;
 use super::fold::ViewFold;
 use super::motion::core::CoreScratch;
 use super::motion::meeting::Meeting;
+use super::pixel_column::Span;
 use super::rect::Rect;
 use super::room::{Cost, Room};
 use super::side::{CloudView, ExactView, Scope, Side};

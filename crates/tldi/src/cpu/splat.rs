@@ -162,7 +162,7 @@ pub(crate) struct Splat {
     slope: [f32; 2],
     /// Depth of the point, in depth steps.
     depth: f32,
-    /// Depth steps per pixel of (damped) rise.
+    /// Depth steps per pixel of (damped) rise; none where its plane is edge-on.
     steps: f32,
     /// |n·v|: the share of the disc's area that is left in the view.
     facing: f32,
@@ -338,7 +338,8 @@ impl Splat {
             Projection::Perspective { .. } => view.normalize_or(Vec3::Z),
         };
         let along = normal.dot(direction);
-        let class = if along.abs() < EDGE_ON {
+        let is_edge_on = along.abs() < EDGE_ON;
+        let class = if is_edge_on {
             2
         } else {
             u32::from(!oriented || along > 0.0)
@@ -367,7 +368,10 @@ impl Splat {
                 false => [0.0; 2],
             },
             depth: (view.z - scale.zero) * scale.inv_step,
-            steps: params.slope_damping * pixel_size * scale.inv_step,
+            steps: match is_edge_on {
+                true => 0.0,
+                false => params.slope_damping * pixel_size * scale.inv_step,
+            },
             facing: along.abs(),
             class: class << DEPTH_BITS | u32::from(along.abs() < STEEP),
             normal: [
