@@ -177,8 +177,13 @@ fn fragment(
         z if cloud.normals_oriented() && z <= 0.0 => 0,
         _ => 1,
     };
+    // What is edge-on has the depth of its point.
+    let slope_share = match class {
+        2 => 0.0,
+        _ => f64::from(params.slope_damping),
+    };
     Some(Some(OracleFragment {
-        depth: p.z + f64::from(params.slope_damping) * rise,
+        depth: p.z + slope_share * rise,
         weight: (1.0 + 254.0 * share.max(0.0) * n.z.abs()).floor(),
         class,
         normal: n,

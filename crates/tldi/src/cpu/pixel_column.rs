@@ -37,7 +37,7 @@ pub(super) struct PixelColumn<'a> {
 /// at such a pixel, and beside the faces of a body it tells nothing: the walls of a box go on above its bottom. But where a
 /// surface shows little else, it ends there.
 pub(super) fn shows_edge(image: &Tldi) -> bool {
-    let pixels = (0..image.offsets.len() - 1).map(|k| image.layers_of(k));
+    let pixels = (0..image.pixel_count()).map(|k| image.layers_of(k));
     let surplus = pixels.filter(|layers| !layers.is_empty()).map(|layers| {
         match layers.iter().all(is_edge_on) {
             true => 1,
