@@ -30,16 +30,10 @@ struct Look {
 }
 
 fn column(s: u32, pixel: u32) -> Column {
-    return Column(
-        atomicLoad(&work[begin_at(s, pixel)]),
-        atomicLoad(&work[end_at(s, pixel)]),
-        false,
-        false,
-        -INFINITE,
-        INFINITE,
-        false,
-        false,
-    );
+    var c: Column;
+    c.begin = atomicLoad(&work[begin_at(s, pixel)]);
+    c.end = atomicLoad(&work[end_at(s, pixel)]);
+    return c;
 }
 
 // Whether layer `k` is an end of a surface that shows little but an edge. See the CPU's.
@@ -347,27 +341,36 @@ fn shows_edge(s: u32, view: u32) -> bool {
     return bitcast<i32>(atomicLoad(&work[batch.views_at + view * VIEW_WORDS + EDGES + s])) > 0;
 }
 
-// The column with what is known of its body.
-fn with_body(c: Column, s: u32, view: u32) -> Column {
-    let is_body = (views[view].flags & (BODY << s)) != 0u;
-    let near = select(-INFINITE, views[view].near[s], is_body);
-    let far = select(INFINITE, views[view].far[s], is_body);
-    // What is edge-on in both views says nothing.
-    let is_edge = shows_edge(s, view) && !shows_edge(1u - s, view);
-    return Column(c.begin, c.end, c.is_turned, is_body, near, far, is_edge, false);
+// The column with what is known of its side.
+fn of_side(c: Column, s: u32, view: u32) -> Column {
+    var known = c;
+    known.is_body = (views[view].flags & (BODY << s)) != 0u;
+    known.near = select(-INFINITE, views[view].near[s], known.is_body);
+    known.far = select(INFINITE, views[view].far[s], known.is_body);
+    known.shows_edge = shows_edge(s, view);
+    return known;
 }
 
-// The column as the body in front, or at the back.
-fn placed(c: Column, is_in_front: bool) -> Column {
-    return Column(c.begin, c.end, c.is_turned, c.is_body, c.near, c.far, c.shows_edge, is_in_front);
-}
-
-fn turned_from(c: Column, met: i32, from_behind: bool) -> Column {
-    var is_turned = from_behind;
+// `met` is what the layers face that the other surface can meet.
+fn turned_column(c: Column, met: i32, from_behind: bool) -> Column {
+    var column = c;
+    column.is_turned = from_behind;
     for (var k = c.begin; k < c.end; k++) {
-        is_turned = is_turned && facing_of(c, k) != met;
+        column.is_turned = column.is_turned && facing_of(c, k) != met;
     }
-    return Column(c.begin, c.end, is_turned, c.is_body, c.near, c.far, c.shows_edge, c.is_in_front);
+    return column;
+}
+
+// As the body that rays leave where they enter the other one.
+fn in_front(c: Column, from_behind: bool) -> Column {
+    var column = c;
+    column.is_in_front = true;
+    return turned_column(column, EXIT, from_behind);
+}
+
+// As the body that rays enter where they leave the other one.
+fn at_back(c: Column, from_behind: bool) -> Column {
+    return turned_column(c, ENTRY, from_behind);
 }
 
 @compute @workgroup_size(256)
@@ -420,14 +423,14 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     if (flags & IS_FURTHER) != 0u {
         return;
     }
-    a = with_body(a, 0u, view);
-    b = with_body(b, 1u, view);
-    let turned_a = turned_from(a, ENTRY, (flags & FROM_BEHIND) != 0u);
-    let turned_b = turned_from(b, EXIT, (flags & (FROM_BEHIND << 1u)) != 0u);
+    a = of_side(a, 0u, view);
+    b = of_side(b, 1u, view);
+    let back = at_back(a, (flags & FROM_BEHIND) != 0u);
+    let front = in_front(b, (flags & (FROM_BEHIND << 1u)) != 0u);
     let at = views[view].rect_origin + vec2i(pixel);
-    contact_pixels(&look, placed(turned_b, true), placed(turned_a, false), false, view, at);
+    contact_pixels(&look, front, back, false, view, at);
     let facts = &pairs[pair].sides;
     if ((*facts)[0].flags & (*facts)[1].flags & ORIENTED) != 0u {
-        contact_pixels(&look, placed(a, true), placed(b, false), true, view, at);
+        contact_pixels(&look, in_front(a, false), at_back(b, false), true, view, at);
     }
 }

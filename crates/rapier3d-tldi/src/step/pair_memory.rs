@@ -227,6 +227,29 @@ mod tests {
     use rapier3d::geometry::ColliderBuilder;
     use tldi::{ContactPixel, PointCloud};
 
+    /// While rapier turns the larger collider, the axis stays in world space. Where the user turns it, the axis follows.
+    #[test]
+    fn axes_follow_the_user() {
+        let [before, turned] = [0.0, 0.5].map(|angle| BySize {
+            first_is_smaller: false,
+            world_from_larger: Pose::rotation(angle * Vector::Z),
+            middle: Vector::ZERO,
+        });
+        let last = LastAxis {
+            axis: Vector::X,
+            first_is_smaller: false,
+            middle: Vector::ZERO,
+            height: 0.1,
+            lost_for: 0,
+        };
+        let is_close = |axis: Option<Vector>, to: Vector| axis.unwrap().distance(to) < 1e-6;
+        let by_rapier = last.after(&before, &turned).in_world(&turned);
+        assert!(is_close(by_rapier, Vector::X), "{by_rapier:?}");
+        let by_user = last.in_world(&turned);
+        let expected = turned.world_from_larger.rotation * Vector::X;
+        assert!(is_close(by_user, expected), "{by_user:?}");
+    }
+
     /// The axis of points that came near without touching says nothing of the side of a body.
     #[test]
     fn axes_are_remembered_of_contacts() {

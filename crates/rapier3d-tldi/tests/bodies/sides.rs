@@ -1,7 +1,7 @@
 //! On which side of a surface a body is: remembered while it touches, whatever rapier does, and forgotten where the user
 //! puts it elsewhere.
 
-use crate::common::worlds::{HALF, REST_TOLERANCE, TestResult, attached, dynamic_at, insert_floor};
+use crate::common::worlds::{HALF, REST_TOLERANCE, TestResult, attached, dynamic_at};
 use crate::common::{SPACING, cloud, cube, square};
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -18,16 +18,24 @@ fn assert_shallow(world: &mut PhysicsWorld, tldi: &mut TldiPipeline) -> TestResu
     Ok(())
 }
 
-/// A body that is put under the floor it rests on is below it, not above and deep in it.
+/// A plank of rapier's own; its body and half its thickness, metres.
+fn insert_plank(world: &mut PhysicsWorld) -> (RigidBodyHandle, f32) {
+    let half = 0.01;
+    let body = RigidBodyBuilder::kinematic_position_based();
+    let (body, _) = world.insert(body, ColliderBuilder::cuboid(0.4, half, 0.4));
+    (body, half)
+}
+
+/// A body that is put under the plank it rests on is below it, not above and deep in it.
 #[test]
 fn side_is_forgotten_where_a_body_is_put_elsewhere() -> TestResult {
     let (mut world, mut tldi) = attached();
-    insert_floor(&mut world, 0.8);
-    let (body, _) = world.insert(dynamic_at(HALF), tldi.collider(cloud(&cube(HALF))));
+    let (_, plank) = insert_plank(&mut world);
+    let (body, _) = world.insert(dynamic_at(plank + HALF), tldi.collider(cloud(&cube(HALF))));
     for _ in 0..5 {
         tldi.step(&mut world)?;
     }
-    world.bodies[body].set_translation(Vector::Y * (DEPTH - HALF), true);
+    world.bodies[body].set_translation(Vector::Y * (DEPTH - plank - HALF), true);
     assert_shallow(&mut world, &mut tldi)
 }
 
@@ -54,14 +62,6 @@ fn side_is_forgotten_before_a_body_comes_back() -> TestResult {
     assert!(world.bodies[body].linvel().dot(diagonal) < 0.1);
     assert!(world.bodies[body].translation().x < -HALF);
     Ok(())
-}
-
-/// A plank of rapier's own; its body and half its thickness, metres.
-fn insert_plank(world: &mut PhysicsWorld) -> (RigidBodyHandle, f32) {
-    let half = 0.01;
-    let body = RigidBodyBuilder::kinematic_position_based();
-    let (body, _) = world.insert(body, ColliderBuilder::cuboid(0.4, half, 0.4));
-    (body, half)
 }
 
 /// So is that of a body whose points are put elsewhere, while its pose stays.

@@ -57,11 +57,7 @@ pub(crate) fn compare(
     let [width, height] = a.size;
     let frame_from_view = a.camera.view_from_frame.inverse();
     let others = seen.others(&a.camera);
-    // What is edge-on in both views says nothing.
-    let [a_shows_edge, b_shows_edge] = match [a, b].map(shows_edge) {
-        [true, true] => [false; 2],
-        edges => edges,
-    };
+    let [a_shows_edge, b_shows_edge] = [a, b].map(shows_edge);
     for j in 0..height {
         for i in 0..width {
             let k = (j * width + i) as usize;
