@@ -27,6 +27,8 @@ struct Look {
     // Axes of the other views, in the frame of this one.
     others: array<vec3f, 2>,
     other_count: u32,
+    // Whether `a` is in front of `b`: these are on the other side of each other than the axis says.
+    is_beyond: bool,
 }
 
 fn column(s: u32, pixel: u32) -> Column {
@@ -289,6 +291,7 @@ fn contact_pixels(
     pixel: vec2i,
 ) {
     let pair = view / MAX_VIEWS;
+    let is_a_in_front = is_other_side || (*look).is_beyond;
     for (var kf = front.begin; kf < front.end; kf++) {
         if facing_of(front, kf) == ENTRY || is_edge_on(normal_of(front, kf)) {
             continue;
@@ -317,8 +320,8 @@ fn contact_pixels(
             continue;
         }
         let at = batch.pairs * PAIR_WORDS + slot * CONTACT_WORDS;
-        let depth_a = select(depth_of(back, kb), depth_of(front, kf), is_other_side);
-        let depth_b = select(depth_of(front, kf), depth_of(back, kb), is_other_side);
+        let depth_a = select(depth_of(back, kb), depth_of(front, kf), is_a_in_front);
+        let depth_b = select(depth_of(front, kf), depth_of(back, kb), is_a_in_front);
         atomicStore(&found[at], view);
         atomicStore(&found[at + CONTACT_PIXEL], u32(pixel.x));
         atomicStore(&found[at + CONTACT_PIXEL + 1u], u32(pixel.y));
@@ -327,13 +330,28 @@ fn contact_pixels(
         atomicStore(&found[at + CONTACT_GAP], bitcast<u32>(gap));
         let shortened_back = share_of(back, kb, -1.0) * normal_back;
         let shortened_front = share_of(front, kf, 1.0) * normal_front;
-        let shortened_a = select(shortened_back, shortened_front, is_other_side);
-        let shortened_b = select(shortened_front, shortened_back, is_other_side);
+        let shortened_a = select(shortened_back, shortened_front, is_a_in_front);
+        let shortened_b = select(shortened_front, shortened_back, is_a_in_front);
         for (var k = 0u; k < 3u; k++) {
             atomicStore(&found[at + CONTACT_NORMALS + k], bitcast<u32>(shortened_a[k]));
             atomicStore(&found[at + CONTACT_NORMALS + 3u + k], bitcast<u32>(shortened_b[k]));
         }
     }
+}
+
+// Whether `b` is on the other side of `a` than the axis says, if nothing but a guess told that. See the CPU's `WaysOut`.
+fn is_beyond(pair: u32, view: u32) -> bool {
+    let facts = &pairs[pair].sides;
+    let is_oriented = (((*facts)[0].flags | (*facts)[1].flags) & ORIENTED) != 0u;
+    let at = pair * PAIR_WORDS + WAYS + view % MAX_VIEWS * VIEW_WAYS + FACE_WAYS;
+    let back = atomicLoad(&found[at]);
+    if is_oriented || pairs[pair].policy == FIXED_VIEW || pairs[pair].has_last != 0u || back == 0u {
+        return false;
+    }
+    let way_on = unordered(atomicLoad(&found[at + 1u]));
+    let motion = pairs[pair].motion;
+    let moved = select(0.0, length(motion), dot(motion, views[view].axis) > 0.0);
+    return unordered(back) > FARTHEST * max(way_on, moved) + pairs[pair].params.thickness;
 }
 
 // Whether most pixels that show anything of a side show it edge-on. See the CPU's.
@@ -385,15 +403,21 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     if in_image >= views[view].pixel_count {
         return;
     }
+    let pair = view / MAX_VIEWS;
+    let flags = views[view].flags;
+    var look: Look;
+    look.params = pairs[pair].params;
+    if (flags & IS_FURTHER) == 0u {
+        look.is_beyond = is_beyond(pair, view);
+        if in_image == 0u && look.is_beyond {
+            atomicStore(&found[pair * PAIR_WORDS + BEYOND + view % MAX_VIEWS], 1u);
+        }
+    }
     var a = column(0u, k);
     var b = column(1u, k);
     if a.begin == a.end || b.begin == b.end {
         return;
     }
-    let pair = view / MAX_VIEWS;
-    var look: Look;
-    look.params = pairs[pair].params;
-    let flags = views[view].flags;
     for (var v = 0u; v < MAX_VIEWS; v++) {
         let other = pair * MAX_VIEWS + v;
         if other != view && views[other].exists != MISSING {
@@ -425,10 +449,13 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     }
     a = of_side(a, 0u, view);
     b = of_side(b, 1u, view);
-    let back = at_back(a, (flags & FROM_BEHIND) != 0u);
-    let front = in_front(b, (flags & (FROM_BEHIND << 1u)) != 0u);
+    let behind = (vec2u(flags) & vec2u(FROM_BEHIND, FROM_BEHIND << 1u)) != vec2u();
     let at = views[view].rect_origin + vec2i(pixel);
-    contact_pixels(&look, front, back, false, view, at);
+    if look.is_beyond {
+        contact_pixels(&look, in_front(a, behind.x), at_back(b, behind.y), false, view, at);
+    } else {
+        contact_pixels(&look, in_front(b, behind.y), at_back(a, behind.x), false, view, at);
+    }
     let facts = &pairs[pair].sides;
     if ((*facts)[0].flags & (*facts)[1].flags & ORIENTED) != 0u {
         contact_pixels(&look, in_front(a, false), at_back(b, false), true, view, at);

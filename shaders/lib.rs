@@ -68,6 +68,7 @@ const MARK: &str = shader!(
 const ALLOC: &str = shader!("shared/pixels.wgsl", "alloc.wgsl");
 const SPLAT: &str = shader!("shared/pixels.wgsl", "splat.wgsl");
 const SWEEP: &str = shader!("shared/pixels.wgsl", "shared/view_of.wgsl", "sweep.wgsl");
+const WAYS_OUT: &str = shader!("shared/pixels.wgsl", "shared/view_of.wgsl", "ways_out.wgsl");
 const COMPARE: &str = shader!("shared/pixels.wgsl", "shared/view_of.wgsl", "compare.wgsl");
 
 const fn stage(name: &'static str, source: &'static str, bindings: &'static [u32]) -> Stage {
@@ -112,6 +113,7 @@ pub const STAGES: &[Stage] = &[
     stage("alloc", ALLOC, &[0, 8, 16]),
     stage("splat", SPLAT, &[0, 7, 8, 11, 12]),
     stage("sweep", SWEEP, &[0, 1, 7, 8, 11, 12, 13, 14]),
+    stage("ways_out", WAYS_OUT, &[0, 7, 8, 13, 14]),
     stage("compare", COMPARE, &[0, 1, 7, 8, 13, 14]),
 ];
 

@@ -76,7 +76,7 @@ numbers! {
     VIEW_WORDS = 18;
 
     /// Words of a pair in what is read back.
-    PAIR_WORDS = 16;
+    PAIR_WORDS = 28;
     /// Word of a pair: signs of a crossing.
     CROSSINGS = 0;
     /// Word of a pair: the least gap, negated, as an ordered number; 0 where there is none.
@@ -87,6 +87,16 @@ numbers! {
     VIEWS = 3;
     /// Word of a pair: the first view's axis, and those of the others behind it.
     AXES = 4;
+    /// Word of a pair: whether `b` is on the other side than the first view's axis says, and those of the others behind it.
+    BEYOND = 13;
+    /// Word of a pair: the first view's ways out, and those of the others behind them.
+    WAYS = 16;
+    /// Ways out of a view, as ordered numbers; 0 where no pixel shows both surfaces.
+    VIEW_WAYS = 4;
+    /// Of the ways out of a view: against and along the axis, by all layers.
+    ALL_WAYS = 0;
+    /// The same by the layers that face the view.
+    FACE_WAYS = 2;
     /// Words of a contact pixel in what is read back. The first one is the number of its view among those of all pairs.
     CONTACT_WORDS = 12;
     /// Words of a contact pixel: column and row.

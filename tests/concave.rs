@@ -223,16 +223,18 @@ fn a_ring_meets_the_pole_in_it() {
     }
 }
 
-/// A link that hangs in another lies with its middle on the other side of it than where it touches.
+/// A link that hangs in another, with and without normals, lies with its middle on the other side of it than where it touches.
 #[test]
 fn links_of_a_chain_hang_in_each_other() {
     let mut rng = fastrand::Rng::with_seed(34);
-    let link = sampled_torus(0.2, TUBE, R).cloud(R);
-    for k in 0..40 {
+    let link = sampled_torus(0.2, TUBE, R);
+    let links = [link.cloud(R), link.bare_cloud(R)];
+    for k in 0..80 {
+        let link = &links[k % 2];
         let gap = R * (-0.5 + 1.2 * rng.f32());
         let below = -(2.0 * (0.2 - TUBE) - gap) * Vec3::Z;
         let pose = Pose3::from_parts(below, Quat::from_rotation_z(0.5 * PI));
-        let result = compared(&link, &link, pose, &mut rng, &[-Vec3::Z]);
+        let result = compared(link, link, pose, &mut rng, &[-Vec3::Z]);
         let (normal, found) = tldi_tests::deepest_contact(&result).expect("they are near");
         // The tubes bend by 10° in each splat, so that parts of the contact have normals of their own.
         assert!(normal.z > 0.9, "case {k}: {normal}");
@@ -292,11 +294,17 @@ fn a_tray_holds_what_is_poured_into_it() {
     }
 }
 
-/// The links of a chain hang in each other. The first one is fixed.
+/// The links of a chain hang in each other, with and without normals. The first one is fixed.
 #[test]
 fn a_chain_hangs() {
+    let link = sampled_torus(0.2, TUBE, R);
+    for link in [link.cloud(R), link.bare_cloud(R)] {
+        hangs(&link);
+    }
+}
+
+fn hangs(link: &PointCloud<'static>) {
     let (mut world, mut tldi) = world(Vec3::NEG_Z);
-    let link = sampled_torus(0.2, TUBE, R).cloud(R);
     let apart = 2.0 * (0.2 - TUBE);
     let mut bodies = Vec::new();
     for k in 0..5 {

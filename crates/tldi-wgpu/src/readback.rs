@@ -20,6 +20,9 @@ const GAP: usize = numbers::GAP as usize;
 const CROWDED: usize = numbers::CROWDED as usize;
 const VIEWS: usize = numbers::VIEWS as usize;
 const AXES: usize = numbers::AXES as usize;
+const BEYOND: usize = numbers::BEYOND as usize;
+const WAYS: usize = numbers::WAYS as usize;
+const VIEW_WAYS: usize = numbers::VIEW_WAYS as usize;
 const CONTACT_PIXEL: usize = numbers::CONTACT_PIXEL as usize;
 const CONTACT_DEPTHS: usize = numbers::CONTACT_DEPTHS as usize;
 const CONTACT_GAP: usize = numbers::CONTACT_GAP as usize;
@@ -108,9 +111,14 @@ impl<'a> Readback<'a> {
             View::Aim { .. } => Vec3::from_array(axis.map(f32::from_bits)),
         }));
         result.contacts.clear();
-        let numbers = (result.axes.iter().flat_map(|axis| axis.to_array())).chain(result.gap);
-        all_finite(numbers)
-            .ok_or_else(|| format!("pair {k} has a gap or an axis that is no number"))
+        let way_out = |view: usize| {
+            let way = words[WAYS + view * VIEW_WAYS + words[BEYOND + view].min(1) as usize];
+            (way != 0).then(|| unordered(way))
+        };
+        result.way_out = (0..result.axes.len()).filter_map(way_out).reduce(f32::min);
+        let axes = result.axes.iter().flat_map(|axis| axis.to_array());
+        all_finite(axes.chain(result.gap).chain(result.way_out))
+            .ok_or_else(|| format!("pair {k} has a gap, an axis or a way out that is no number"))
     }
 
     /// Adds the contacts of all pairs but crowded ones to their results.
@@ -163,6 +171,13 @@ impl<'a> Readback<'a> {
                 normal_b: frame_from_view * vector(CONTACT_NORMALS + 3),
                 gap: number(CONTACT_GAP),
             });
+        }
+        for (k, &pair) in pairs_of.iter().enumerate() {
+            let result = &mut results[pair];
+            let is_beyond = |view: &usize| self.pairs[k][BEYOND + view] != 0;
+            let views = 0..result.axes.len();
+            (views.filter(|view| !self.is_crowded(k) && is_beyond(view)))
+                .for_each(|view| result.turn_view(view));
         }
         Ok(())
     }
@@ -230,8 +245,9 @@ mod tests {
             (PAIR + VIEWS, 4, "pair 0 has 4 views"),
             (PAIR + VIEWS, u32::MAX, "views"),
             (PAIR + VIEWS, 0, "contact 0 is in view 0 of 0"),
-            (PAIR + AXES, nan, "an axis that is no number"),
+            (PAIR + AXES, nan, "an axis or a way out that is no number"),
             (PAIR + GAP, u32::MAX, "no number"),
+            (PAIR + WAYS, u32::MAX, "no number"),
             (CONTACT, 1, "contact 0 is in view 1 of 1"),
             (CONTACT, 3, "contact 0 is of pair 1 of 1"),
             (CONTACT, u32::MAX, "contact 0 is of pair"),

@@ -92,7 +92,7 @@ impl WgpuBackend {
             let (groups, words) = match stage.name {
                 "columns_touch" => (&buffers.groups, TILE_GROUPS),
                 "alloc" | "sweep" => (&buffers.groups, PIXEL_GROUPS),
-                "compare" => (&buffers.groups, IMAGE_GROUPS),
+                "ways_out" | "compare" => (&buffers.groups, IMAGE_GROUPS),
                 "splat" => (&buffers.splat_groups, 0),
                 name => {
                     let [x, y, z] = match name {

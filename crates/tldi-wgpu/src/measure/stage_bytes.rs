@@ -42,6 +42,7 @@ pub(crate) fn stage_bytes(upload: &Upload, counted: &Counters) -> Vec<(&'static 
         ("alloc", 2 * pixels),
         ("splat", splats + fragments),
         ("sweep", fragments + splats + layers + pixels),
+        ("ways_out", layers + pixels),
         (
             "compare",
             layers + pixels + times(counted.contacts, 4 * u64::from(CONTACT_WORDS)),

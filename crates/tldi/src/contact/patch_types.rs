@@ -4,7 +4,7 @@ use glamx::Vec3;
 
 /// A pixel in which both surfaces are close or penetrate. Vectors are in the frame of the first
 /// surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactPixel {
     /// Column and row in the view's pixel grid.
     pub pixel: [i32; 2],

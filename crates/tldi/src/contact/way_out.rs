@@ -1,7 +1,8 @@
 //! The least way out decides how deep surfaces are in each other.
 //!
 //! A view from the side of a shallow overlap sees its width: true, but not how deep it is. Along the way that such a
-//! contact pixel would push the bodies apart, another view sees them overlap by much less.
+//! contact pixel would push the bodies apart, another view sees them overlap by much less. And no overlap is deeper than the
+//! way on which all that a view shows comes apart.
 
 use crate::contact::links::Links;
 use crate::contact::retain_by_index;
@@ -29,8 +30,9 @@ pub(crate) struct WayOut {
 }
 
 impl WayOut {
-    /// Drops the contact pixels deeper than a layer that lead through a place where another view sees the surfaces apart or
-    /// in each other by less than half of that. If at least half of linked deep pixels go so, all of them do: they are one
+    /// Drops the contact pixels deeper than the [least way out](PairResult::way_out), by more than a pixel: so much the images
+    /// of a place differ. Then drops those deeper than a layer that lead through a place where another view sees the surfaces
+    /// apart or in each other by less than half of that. If at least half of linked deep pixels go so, all of them do: they are one
     /// overlap, and no view sees every place. Then drops the pixels that are apart by more than contacts are asked for.
     /// Contact pixels are ordered by view, row and column; `links` are overwritten.
     ///
@@ -41,7 +43,11 @@ impl WayOut {
         params: &Params,
         links: &mut Links,
     ) {
+        let deepest = result.way_out.map(|way| way.max(0.0) + params.pixel_size);
         let PairResult { axes, contacts, .. } = result;
+        if let Some(deepest) = deepest {
+            contacts.retain(|contact| -contact.gap <= deepest);
+        }
         let pixel = params.pixel_size;
         let cameras: ArrayVec<_, MAX_VIEWS> = (axes.iter())
             .map(|axis| VirtualCamera::along(*axis, pixel))

@@ -7,6 +7,7 @@ use super::crossings::{Crossings, best_seen};
 use super::fold::ViewFold;
 use super::pixel_column::{PixelColumn, Span, shows_edge};
 use super::sweep::{is_edge_on, share_of};
+use super::ways_out::WaysOut;
 use crate::stage::stage;
 use crate::view::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, Facing, Layer, PairResult, Params, Tldi, VirtualCamera};
@@ -27,6 +28,9 @@ pub(crate) struct Seen<'a> {
     /// Whether normals tell the outsides of both. Then contacts on the other side of `a` are looked for, too: the layers
     /// say which of them can touch.
     pub(crate) tells_facing: bool,
+    /// How far `b` moved in this step, metres, if along the axis, and else 0; if nothing but a guess tells on which side of `a`
+    /// it is.
+    pub(crate) moved: Option<f32>,
     /// Of the columns and rows of both images, if they are folded.
     pub(crate) fold: Option<&'a ViewFold>,
 }
@@ -43,7 +47,8 @@ impl Seen<'_> {
 }
 
 /// Adds what a view sees of crossings to `crossings`, if these are asked for, and of contacts, if it is one of the
-/// result's views, to `result`. Both images have the same camera and rectangle.
+/// result's views, to `result`. Both images have the same camera and rectangle. The axis of a view in which `b` is on the
+/// other side of `a` turns round: see [`WaysOut::is_beyond`].
 pub(crate) fn compare(
     a: &Tldi,
     b: &Tldi,
@@ -58,6 +63,12 @@ pub(crate) fn compare(
     let frame_from_view = a.camera.view_from_frame.inverse();
     let others = seen.others(&a.camera);
     let [a_shows_edge, b_shows_edge] = [a, b].map(shows_edge);
+    let shows_contacts = seen.view < result.axes.len();
+    let ways = shows_contacts.then(|| WaysOut::of_all(a, b)).flatten();
+    let is_beyond = shows_contacts
+        && seen.moved.is_some_and(|moved| {
+            WaysOut::of_faces(a, b).is_some_and(|ways| ways.is_beyond(moved, params))
+        });
     for j in 0..height {
         for i in 0..width {
             let k = (j * width + i) as usize;
@@ -68,7 +79,7 @@ pub(crate) fn compare(
             if let Some(crossings) = &mut crossings {
                 crossings.count([a, b], [i, j], &others, params);
             }
-            if seen.view >= result.axes.len() {
+            if !shows_contacts {
                 continue;
             }
             let at = PixelView {
@@ -80,27 +91,36 @@ pub(crate) fn compare(
                 frame_from_view: &frame_from_view,
                 view: seen.view,
                 others: &others,
+                is_beyond,
             };
             let [behind_a, behind_b] = seen.from_behind;
             let of_a = PixelColumn::new(la, seen.bodies[0], a_shows_edge);
             let of_b = PixelColumn::new(lb, seen.bodies[1], b_shows_edge);
-            let (back, front) = (of_a.at_back(behind_a), of_b.in_front(behind_b));
-            contact_pixels([front, back], Order::BThenA, &at, params, result);
+            let (back, front) = match is_beyond {
+                false => (of_a.at_back(behind_a), of_b.in_front(behind_b)),
+                true => (of_b.at_back(behind_b), of_a.in_front(behind_a)),
+            };
+            contact_pixels([front, back], Order::OfAxis, &at, params, result);
             if seen.tells_facing {
                 let (front, back) = (of_a.in_front(false), of_b.at_back(false));
-                contact_pixels([front, back], Order::AThenB, &at, params, result);
+                contact_pixels([front, back], Order::Reversed, &at, params, result);
             }
         }
     }
+    if is_beyond {
+        result.turn_view(seen.view);
+    }
+    let way_out = ways.map(|ways| if is_beyond { ways.on } else { ways.back });
+    result.way_out = result.way_out.into_iter().chain(way_out).reduce(f32::min);
 }
 
 /// In which order rays pass two surfaces that touch.
 #[derive(Clone, Copy, PartialEq)]
 enum Order {
-    /// Rays leave `b` and enter `a`: `b` is where the axis says.
-    BThenA,
-    /// Rays leave `a` and enter `b`: `b` is on the other side of `a`, as in a slot.
-    AThenB,
+    /// As the axis says.
+    OfAxis,
+    /// The other way round, as in a slot.
+    Reversed,
 }
 
 /// Where a pixel is.
@@ -111,6 +131,8 @@ struct PixelView<'a> {
     view: usize,
     /// Axes of the other views, in the frame of this one.
     others: &'a [Vec3],
+    /// Whether `a` is in front of `b`.
+    is_beyond: bool,
 }
 
 /// Contacts in a pixel, where the ray leaves the body in `front` and enters the one in `back`. If there are other views,
@@ -139,7 +161,7 @@ fn contact_pixels(
                 let depth = exit.depth - layer.depth;
                 let other_way = left - entered;
                 match order {
-                    Order::BThenA => {
+                    Order::OfAxis => {
                         let is_sure = front.facing(exit) == Facing::Exit
                             && back.facing(layer) == Facing::Entry;
                         let is_met = depth <= params.thickness
@@ -153,7 +175,7 @@ fn contact_pixels(
                         is_met && !is_within
                     }
                     // The least way out counts.
-                    Order::AThenB => {
+                    Order::Reversed => {
                         depth <= params.thickness
                             && (depth <= 0.0 || is_far_longer(other_way, depth, params))
                     }
@@ -174,7 +196,7 @@ fn contact_pixels(
         if gap > params.prediction {
             result.gap = Some(result.gap.map_or(gap, |g| g.min(gap)));
             // It is no contact, but tells other views how deep theirs can be.
-            if order == Order::AThenB || at.others.is_empty() {
+            if order == Order::Reversed || at.others.is_empty() {
                 continue;
             }
         }
@@ -183,10 +205,11 @@ fn contact_pixels(
         let point = |layer: &Layer| *at.frame_from_view * at.camera.view_at(u, v, layer.depth);
         let of_back = (point(entry), share_of(entry, -1.0) * in_frame(normal_back));
         let of_front = (point(exit), share_of(exit, 1.0) * in_frame(normal_front));
-        let ((point_a, normal_a), (point_b, normal_b)) = match order {
-            Order::BThenA => (of_back, of_front),
-            Order::AThenB => (of_front, of_back),
-        };
+        let ((point_a, normal_a), (point_b, normal_b)) =
+            match at.is_beyond || order == Order::Reversed {
+                false => (of_back, of_front),
+                true => (of_front, of_back),
+            };
         result.contacts.push(ContactPixel {
             pixel: at.pixel,
             view: at.view as u32,
@@ -210,7 +233,7 @@ const FACING: f32 = 0.5;
 /// that was pushed most of the way through a wall, or the rim of one that came through a plate, goes out where it came from.
 /// But where a ray passes both bodies at their rims, the other side is a layer away, and the axis has the wrong sign there.
 /// Half: the rim of a cone is pushed further through a plate in half of 300 poses; twice: links of a chain that touch are deep.
-const FARTHEST: f32 = 4.0;
+pub(super) const FARTHEST: f32 = 4.0;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
 pub(crate) const CONSTANTS: [(&str, f64); 2] =

@@ -210,12 +210,17 @@ impl Scratch {
                 far: body.max.z,
             })
         };
+        let is_told = matches!(query.view, View::Fixed(_))
+            || plan.approach.last_axis.is_some()
+            || query.a.is_oriented()
+            || query.b.is_oriented();
         Seen {
             axes,
             view,
             bodies: [span(&plan.sides[0]), span(&plan.sides[1])],
             from_behind: seen_from_behind(camera.axis(), &self.zone_normals(query)),
             tells_facing: query.a.is_oriented() && query.b.is_oriented(),
+            moved: (!is_told).then(|| plan.approach.moved_in(axes[view])),
             fold: None,
         }
     }

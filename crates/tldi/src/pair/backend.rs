@@ -63,6 +63,9 @@ pub struct PairResult {
     /// Unit axes of the views in which contacts were looked for, from `b` towards `a`. Empty after an
     /// early rejection.
     pub axes: Vec<Vec3>,
+    /// The least distance in metres by which `b` has to be moved against one of `axes` until the images show both surfaces apart;
+    /// negative where they are, and `None` if no pixel shows both. No contact is deeper.
+    pub way_out: Option<f32>,
     /// Pixels where the surfaces are within [`Params::prediction`] or penetrate.
     pub contacts: Vec<ContactPixel>,
     /// The factor by which the pixels of the contacts, and their grid of columns and rows, are
@@ -77,12 +80,31 @@ pub struct PairResult {
 }
 
 impl PairResult {
+    /// Turns the axis of a view round: `b` is on the other side of `a`. The rows of the pixel grid along the opposite axis
+    /// ([`VirtualCamera::along`](crate::VirtualCamera::along)) run the other way.
+    ///
+    /// ```
+    /// use tldi::{ContactPixel, PairResult, glamx::Vec3};
+    /// let contact = ContactPixel { pixel: [3, 4], ..Default::default() };
+    /// let mut result = PairResult { axes: vec![Vec3::Z], contacts: vec![contact], ..Default::default() };
+    /// result.turn_view(0);
+    /// assert_eq!((result.axes[0], result.contacts[0].pixel), (-Vec3::Z, [3, -5]));
+    /// ```
+    pub fn turn_view(&mut self, view: usize) {
+        self.axes[view] *= -1.0;
+        let of_view = |contact: &&mut ContactPixel| contact.view as usize == view;
+        for contact in self.contacts.iter_mut().filter(of_view) {
+            contact.pixel[1] = -1 - contact.pixel[1];
+        }
+    }
+
     /// Empties the result, keeping its memory.
     pub fn clear(&mut self) {
         self.collides = false;
         self.gap = None;
         self.coarser = None;
         self.axes.clear();
+        self.way_out = None;
         self.contacts.clear();
         self.patches.clear();
         self.work = Work::default();

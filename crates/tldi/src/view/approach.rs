@@ -131,6 +131,14 @@ impl Approach {
         self.lies - self.motion
     }
 
+    /// How far `b` moved over the step, metres, if it moved along `axis`; else 0.
+    pub(crate) fn moved_in(&self, axis: Vec3) -> f32 {
+        match self.motion.dot(axis) > 0.0 {
+            true => self.motion.length(),
+            false => 0.0,
+        }
+    }
+
     /// From `a` towards `b`, unit length or zero.
     pub(crate) fn direction(&self) -> Vec3 {
         self.toward_b().normalize_or_zero()
