@@ -66,6 +66,41 @@ fn a_flat_box_rests_within_its_corners() {
     assert!(beyond.abs() < 0.25, "{beyond} radii beyond the corners");
 }
 
+/// 25 contact pixels of two level faces that overlap by ten radii, or by half a radius. A view that shows a way out of one
+/// radius leaves only the latter.
+#[test]
+fn no_contact_is_deeper_than_the_way_out() {
+    let params = Params::for_radius(R);
+    let is_kept = |gap: f32, way_out: Option<f32>| {
+        let pixels = (0..25).map(|k| {
+            let pixel = [k % 5, k / 5];
+            let [x, z] = pixel.map(|c| params.pixel_size * (c as f32 + 0.5));
+            ContactPixel {
+                pixel,
+                view: 0,
+                point_a: Vec3::new(x, 0.0, z),
+                point_b: Vec3::new(x, gap, z),
+                normal_a: Vec3::Y,
+                normal_b: -Vec3::Y,
+                gap,
+            }
+        });
+        let mut result = PairResult {
+            axes: vec![-Vec3::Y],
+            contacts: pixels.collect(),
+            way_out,
+            ..PairResult::default()
+        };
+        PatchScratch::default().reduce(&mut result, &params);
+        !result.contacts.is_empty()
+    };
+    assert!(is_kept(-10.0 * R, None));
+    assert!(!is_kept(-10.0 * R, Some(R)));
+    assert!(is_kept(-0.5 * R, Some(R)));
+    // Surfaces that a view shows apart still touch, within a pixel.
+    assert!(is_kept(-0.5 * R, Some(-3.0 * R)));
+}
+
 /// A ball in a trough that is hardly wider, deep in one of its sides: wherever it is in it, a patch pushes
 /// along the normal there.
 #[test]
