@@ -34,6 +34,8 @@ var<workgroup> is_forced: bool;
 // The last axis is asked about in place of the proposed one.
 var<workgroup> is_again: bool;
 var<workgroup> view_count: u32;
+// Only one surface faces this view, or an earlier one.
+var<workgroup> is_spare: bool;
 var<workgroup> seen: array<vec3f, 3>;
 
 fn sample_count(side: u32) -> u32 {
@@ -192,15 +194,14 @@ fn keep_last(pair: u32, turn: u32) {
     }
 }
 
-// Whether both sides have enough that an earlier view does not see and this one does.
+// Whether a side has enough that no earlier view sees. Where one of both has too little that faces the axis, it is spare.
 fn is_worthwhile(pair: u32) -> bool {
     let a = f32(max(sample_count(2u * pair), 1u));
     let b = f32(max(sample_count(2u * pair + 1u), 1u));
     let left_a = f32(atomicLoad(&unseen_count[0])) / a;
     let left_b = f32(atomicLoad(&unseen_count[1])) / b;
-    return max(left_a, left_b) >= LEAST_SHARE
-        && facing_count(0u) / a >= LEAST_SHARE
-        && facing_count(1u) / b >= LEAST_SHARE;
+    is_spare = is_spare || min(facing_count(0u) / a, facing_count(1u) / b) < LEAST_SHARE;
+    return max(left_a, left_b) >= LEAST_SHARE;
 }
 
 // Takes the proposed view, if it tells something.
@@ -262,9 +263,14 @@ fn push_view(pair: u32, sign: f32) {
         }
     }
     let index = pair * MAX_VIEWS + view_count;
-    views[index] = view;
     let at = pair * PAIR_WORDS;
-    atomicStore(&found[at + VIEWS], view_count + 1u);
+    if is_spare {
+        view.exists = MISSING;
+        atomicAdd(&found[at + SPARE], 1u);
+    } else {
+        atomicStore(&found[at + VIEWS], view_count + 1u);
+    }
+    views[index] = view;
     for (var k = 0u; k < 3u; k++) {
         atomicStore(&found[at + AXES + 3u * view_count + k], bitcast<u32>(axis[k]));
     }
@@ -289,6 +295,7 @@ fn aim(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lan
         is_forced = false;
         is_again = false;
         is_turning = false;
+        is_spare = false;
         view_count = 0u;
     }
     for (var turn = 0u; turn < MAX_VIEWS; turn++) {

@@ -349,8 +349,7 @@ fn is_beyond(pair: u32, view: u32) -> bool {
         return false;
     }
     let way_on = unordered(atomicLoad(&found[at + 1u]));
-    let motion = pairs[pair].motion;
-    let moved = select(0.0, length(motion), dot(motion, views[view].axis) > 0.0);
+    let moved = moved_along(pairs[pair].motion, views[view].axis);
     return unordered(back) > FARTHEST * max(way_on, moved) + pairs[pair].params.thickness;
 }
 

@@ -76,7 +76,7 @@ numbers! {
     VIEW_WORDS = 18;
 
     /// Words of a pair in what is read back.
-    PAIR_WORDS = 28;
+    PAIR_WORDS = 29;
     /// Word of a pair: signs of a crossing.
     CROSSINGS = 0;
     /// Word of a pair: the least gap, negated, as an ordered number; 0 where there is none.
@@ -93,6 +93,8 @@ numbers! {
     WAYS = 16;
     /// Ways out of a view, as ordered numbers; 0 where no pixel shows both surfaces.
     VIEW_WAYS = 4;
+    /// Word of a pair: number of its spare views, whose axes and ways out stand behind those of the others.
+    SPARE = 28;
     /// Of the ways out of a view: against and along the axis, by all layers.
     ALL_WAYS = 0;
     /// The same by the layers that face the view.

@@ -179,7 +179,7 @@ fn only_what_was_found_is_read_back() {
     let again = compare_on(&mut backend, &[deep]);
     assert_eq!(backend.traffic().submissions, 1);
     assert_eq!(first, again);
-    let most = 64 + 112 + 48 * (found + found / 8);
+    let most = 64 + 116 + 48 * (found + found / 8);
     assert!(
         backend.traffic().read_back <= most,
         "{:?}",

@@ -70,3 +70,8 @@ fn splat_radius(radius: f32, pixel_size: f32) -> f32 {
 fn is_edge_on(normal: vec3f) -> bool {
     return abs(normal.z) < EDGE_ON;
 }
+
+// Length of a motion, metres, if it is along the axis; else 0.
+fn moved_along(motion: vec3f, axis: vec3f) -> f32 {
+    return select(0.0, length(motion), dot(motion, axis) > 0.0);
+}

@@ -2,6 +2,7 @@
 
 use crate::counters::Counters;
 use crate::layout::{CONTACT_WORDS, COUNTERS, FRAGMENTS_WRAPPED, MAX_VIEWS, PAIR_WORDS};
+use std::ops::Range;
 use tldi::glamx::Vec3;
 use tldi::{CameraPolicy, ContactPixel, PairQuery, PairResult, View, VirtualCamera, plan};
 use tldi_shaders::numbers;
@@ -23,6 +24,7 @@ const AXES: usize = numbers::AXES as usize;
 const BEYOND: usize = numbers::BEYOND as usize;
 const WAYS: usize = numbers::WAYS as usize;
 const VIEW_WAYS: usize = numbers::VIEW_WAYS as usize;
+const SPARE: usize = numbers::SPARE as usize;
 const CONTACT_PIXEL: usize = numbers::CONTACT_PIXEL as usize;
 const CONTACT_DEPTHS: usize = numbers::CONTACT_DEPTHS as usize;
 const CONTACT_GAP: usize = numbers::CONTACT_GAP as usize;
@@ -67,24 +69,55 @@ impl<'a> Readback<'a> {
         self.pairs[k][CROWDED] != 0
     }
 
-    /// Whether the `k`-th pair on the device is to be looked at from all directions and shows no crossing yet. As `further`
-    /// in WGSL sees it.
+    /// Whether the `k`-th pair on the device is to be looked at from all directions and shows no crossing yet, or asks for
+    /// its spare views. As `further` in WGSL sees it.
     pub(crate) fn wants_further(&self, k: usize, query: &PairQuery) -> bool {
         let words = &self.pairs[k];
-        let is_asked = matches!(
-            query.view,
-            View::Aim {
-                policy: CameraPolicy::AllDirections,
-                ..
-            }
-        );
-        is_asked
-            && !self.is_crowded(k)
+        let View::Aim { policy, .. } = query.view else {
+            return false;
+        };
+        let is_asked = policy == CameraPolicy::AllDirections && words[CROSSINGS] < plan::CROSSED;
+        !self.is_crowded(k)
             && (1..MAX_VIEWS).contains(&words[VIEWS])
-            && words[CROSSINGS] < plan::CROSSED
+            && (is_asked || self.spare_views(k, query) > 0)
     }
 
-    /// Fills all but the contacts of the `k`-th pair on the device.
+    /// How many spare views of the `k`-th pair are asked for.
+    fn spare_views(&self, k: usize, query: &PairQuery) -> usize {
+        let words = &self.pairs[k];
+        let way_out = self.way_out(k, 0..words[VIEWS] as usize);
+        match plan::asks_for_spare(way_out, self.moved(k, query), &query.params) {
+            true => words[SPARE] as usize,
+            false => 0,
+        }
+    }
+
+    /// How far `b` of the `k`-th pair moved, metres, if along the axis of the first view; else 0.
+    fn moved(&self, k: usize, query: &PairQuery) -> f32 {
+        match query.view {
+            View::Aim { motion, .. } => plan::moved_along(motion, self.axis(k, 0)),
+            View::Fixed(_) => 0.0,
+        }
+    }
+
+    /// As the device chose it.
+    fn axis(&self, k: usize, view: usize) -> Vec3 {
+        let at = AXES + 3 * view;
+        Vec3::from_array([0, 1, 2].map(|axis| f32::from_bits(self.pairs[k][at + axis])))
+    }
+
+    /// The least way out of these views of the `k`-th pair, metres.
+    fn way_out(&self, k: usize, views: Range<usize>) -> Option<f32> {
+        let words = &self.pairs[k];
+        let way_out = |view: usize| {
+            let way = words[WAYS + view * VIEW_WAYS + words[BEYOND + view].min(1) as usize];
+            (way != 0).then(|| unordered(way))
+        };
+        views.filter_map(way_out).reduce(f32::min)
+    }
+
+    /// Fills all but the contacts of the `k`-th pair on the device; the way out is that of the spare views, until
+    /// [`fill_contacts`](Self::fill_contacts).
     ///
     /// # Errors
     /// What makes no sense.
@@ -95,8 +128,8 @@ impl<'a> Readback<'a> {
         result: &mut PairResult,
     ) -> Result<(), String> {
         let words = &self.pairs[k];
-        if words[VIEWS] > MAX_VIEWS {
-            let count = words[VIEWS];
+        let count = words[VIEWS].saturating_add(words[SPARE]);
+        if count > MAX_VIEWS {
             return Err(format!(
                 "pair {k} has {count} views, at most {MAX_VIEWS} exist"
             ));
@@ -104,20 +137,22 @@ impl<'a> Readback<'a> {
         result.collides = words[CROSSINGS] >= plan::CROSSED;
         result.gap = (words[GAP] != 0).then(|| -unordered(words[GAP]));
         result.axes.clear();
-        let axes = words[AXES..].as_chunks::<3>().0;
-        let views = axes.iter().take(words[VIEWS] as usize);
-        result.axes.extend(views.map(|axis| match query.view {
-            View::Fixed(camera) => camera.axis(),
-            View::Aim { .. } => Vec3::from_array(axis.map(f32::from_bits)),
-        }));
+        let first_spare = words[VIEWS] as usize;
+        let views = 0..first_spare + self.spare_views(k, query);
+        result
+            .axes
+            .extend(views.clone().map(|view| match query.view {
+                View::Fixed(camera) => camera.axis(),
+                View::Aim { .. } => self.axis(k, view),
+            }));
         result.contacts.clear();
-        let way_out = |view: usize| {
-            let way = words[WAYS + view * VIEW_WAYS + words[BEYOND + view].min(1) as usize];
-            (way != 0).then(|| unordered(way))
-        };
-        result.way_out = (0..result.axes.len()).filter_map(way_out).reduce(f32::min);
+        result.way_out = self.way_out(k, first_spare..views.end);
         let axes = result.axes.iter().flat_map(|axis| axis.to_array());
-        all_finite(axes.chain(result.gap).chain(result.way_out))
+        let ways = self
+            .way_out(k, 0..first_spare)
+            .into_iter()
+            .chain(result.way_out);
+        all_finite(axes.chain(result.gap).chain(ways))
             .ok_or_else(|| format!("pair {k} has a gap, an axis or a way out that is no number"))
     }
 
@@ -148,7 +183,11 @@ impl<'a> Readback<'a> {
             let query = &batch[pair];
             let result = &mut results[pair];
             let Some(axis) = result.axes.get(view as usize) else {
-                let views = result.axes.len();
+                let views = self.pairs[k][VIEWS] + self.pairs[k][SPARE];
+                if view < views {
+                    // A spare view that was asked for by no more than rounding.
+                    continue;
+                }
                 return Err(format!("contact {at} is in view {view} of {views}"));
             };
             let camera = match query.view {
@@ -173,11 +212,18 @@ impl<'a> Readback<'a> {
             });
         }
         for (k, &pair) in pairs_of.iter().enumerate() {
-            let result = &mut results[pair];
+            if self.is_crowded(k) {
+                continue;
+            }
+            let (query, result) = (&batch[pair], &mut results[pair]);
             let is_beyond = |view: &usize| self.pairs[k][BEYOND + view] != 0;
-            let views = 0..result.axes.len();
-            (views.filter(|view| !self.is_crowded(k) && is_beyond(view)))
+            (0..result.axes.len())
+                .filter(is_beyond)
                 .for_each(|view| result.turn_view(view));
+            let first_spare = self.pairs[k][VIEWS] as usize;
+            let way_out = self.way_out(k, 0..first_spare);
+            let moved = self.moved(k, query);
+            plan::settle_spare(result, first_spare, way_out, moved, &query.params);
         }
         Ok(())
     }

@@ -123,3 +123,23 @@ fn side_turns_with_the_larger_collider() -> TestResult {
     }
     Ok(())
 }
+
+/// A bare body that comes from behind a scan with normals touches its back. It does not count as deep in what lies behind.
+#[test]
+fn a_scan_is_met_from_behind() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    world.gravity = Vector::ZERO;
+    let points = square(1.0);
+    let normals = vec![Vector::Y; points.len()];
+    let scan = PointCloud::builder(points).radius(SPACING);
+    let scan = scan.normals(normals).build()?;
+    world.insert(RigidBodyBuilder::fixed(), tldi.collider(scan));
+    let below = dynamic_at(-0.3).linvel(Vector::Y);
+    let (body, _) = world.insert(below, tldi.collider(cloud(&cube(HALF))));
+    for step in 0..60 {
+        let told = tldi.step(&mut world)?.max_penetration;
+        assert!(told < HALF / 4.0, "step {step}: {told} m");
+    }
+    assert!(world.bodies[body].translation().y < -0.5 * HALF);
+    Ok(())
+}

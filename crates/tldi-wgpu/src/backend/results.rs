@@ -46,7 +46,12 @@ impl WgpuBackend {
         let missing = asked.contacts..needed.contacts;
         if wants_further {
             run.first_views = Some(needed);
-            self.submit_further(missing)?;
+            // Spare views find contacts, too, behind those of the first ones.
+            let [from, to] = [
+                asked.contacts.min(needed.contacts),
+                asked.contacts.max(needed.contacts),
+            ];
+            self.submit_further(from..to)?;
             return Ok(Returned::More);
         }
         if !is_complete {

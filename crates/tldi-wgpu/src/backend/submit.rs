@@ -43,13 +43,13 @@ impl WgpuBackend {
         self.ask(encoder, 0..contacts, true)
     }
 
-    /// Submits the views that the first ones proved wanting. They find no contacts: `missing` did not come back before.
-    pub(super) fn submit_further(&mut self, missing: Range<u32>) -> Result<(), GpuError> {
+    /// Submits the views that the first ones proved wanting. Those before `contacts` have come back.
+    pub(super) fn submit_further(&mut self, contacts: Range<u32>) -> Result<(), GpuError> {
         let data = self.upload.batch_data(&self.capacities)?;
         let mut encoder = (self.gpu.device).create_command_encoder(&Default::default());
         self.clear(&mut encoder, data.views_at, &data);
         self.dispatch(&mut encoder, Round::Further, &data);
-        self.ask(encoder, missing, true)
+        self.ask(encoder, contacts, true)
     }
 
     /// Submits the copy of the contacts that did not come back.

@@ -26,7 +26,7 @@ mod side;
 pub(crate) mod splat;
 mod splat_radius;
 pub(crate) mod sweep;
-mod ways_out;
+pub(crate) mod ways_out;
 pub(crate) mod zone;
 
 use crate::{

@@ -8,6 +8,8 @@ use super::side::{Scope, Side};
 use crate::contact::lone_points::SAME_POINT;
 use crate::pair::plan::{PairPlan, column_reach};
 use crate::pair::sampling::stride;
+use crate::pair::spare_views::{asks_for_spare, settle_spare};
+use crate::view::approach::moved_along;
 use crate::view::camera_policy::{MAX_VIEWS, further_axes};
 use crate::{
     CameraPolicy, Looked, PairQuery, PairResult, Surface, Variant, View, VirtualCamera, paper,
@@ -90,7 +92,7 @@ impl Scratch {
                 self.look(query, plan, &camera, &[camera.axis()], 0, result);
             }
             View::Aim { policy, .. } => {
-                self.aim(query, plan, policy, &mut result.axes);
+                let spare = self.aim(query, plan, policy, &mut result.axes);
                 if query.params.variant() == Variant::Paper {
                     let camera = VirtualCamera::along(result.axes[0], query.params.pixel_size);
                     self.compare_paper(query, &camera, result);
@@ -98,10 +100,18 @@ impl Scratch {
                 }
                 let mut axes: ArrayVec<Vec3, MAX_VIEWS> = result.axes.iter().copied().collect();
                 self.look_along(query, plan, &axes, 0, result);
-                if policy == CameraPolicy::AllDirections && !self.crossings.are_enough() {
-                    axes.extend(further_axes(&result.axes));
-                    self.look_along(query, plan, &axes, result.axes.len(), result);
+                let first = axes.len();
+                let way_out = result.way_out.take();
+                let moved = moved_along(plan.approach.motion, axes[0]);
+                if asks_for_spare(way_out, moved, &query.params) {
+                    axes.extend(spare);
+                    result.axes.extend_from_slice(&axes[first..]);
                 }
+                if policy == CameraPolicy::AllDirections && !self.crossings.are_enough() {
+                    axes.extend(further_axes(&axes));
+                }
+                self.look_along(query, plan, &axes, first, result);
+                settle_spare(result, first, way_out, moved, &query.params);
             }
         }
         if let Some(coarser) = self.shared.room.take_wanted() {

@@ -18,12 +18,14 @@ use crate::cloud::reach::LocalScale;
 use crate::contact::patches::PatchScratch;
 use crate::pair::plan::{PairPlan, SidePlan};
 use crate::stage::stage;
-use crate::view::camera_policy::{self, seen_from_behind};
+use crate::view::approach::moved_along;
+use crate::view::camera_policy::{self, MAX_VIEWS, seen_from_behind};
 use crate::view::zone_normals::ZoneNormals;
 use crate::{
     CameraPolicy, Looked, PairQuery, Params, PointCloud, RayHit, Surface, View, VirtualCamera,
     Work, paper,
 };
+use arrayvec::ArrayVec;
 use glamx::{Pose3, Vec3};
 
 /// Where two clouds meet in a view.
@@ -180,16 +182,16 @@ impl Scratch {
         }
     }
 
-    /// Fills `axes` with the view axes of the near points and their normals.
+    /// Fills `axes` with the view axes of the near points and their normals; returns the spare ones.
     pub(super) fn aim(
         &self,
         query: &PairQuery,
         plan: &PairPlan,
         policy: CameraPolicy,
         axes: &mut Vec<Vec3>,
-    ) {
+    ) -> ArrayVec<Vec3, MAX_VIEWS> {
         let _stage = stage!("aim");
-        camera_policy::aim(policy, self.zone_normals(query), &plan.approach, axes);
+        camera_policy::aim(policy, self.zone_normals(query), &plan.approach, axes)
     }
 
     /// What is known about a view besides its images and their folding.
@@ -220,7 +222,7 @@ impl Scratch {
             bodies: [span(&plan.sides[0]), span(&plan.sides[1])],
             from_behind: seen_from_behind(camera.axis(), &self.zone_normals(query)),
             tells_facing: query.a.is_oriented() && query.b.is_oriented(),
-            moved: (!is_told).then(|| plan.approach.moved_in(axes[view])),
+            moved: (!is_told).then(|| moved_along(plan.approach.motion, axes[view])),
             fold: None,
         }
     }

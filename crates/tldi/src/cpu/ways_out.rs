@@ -7,11 +7,11 @@ use crate::{Layer, Params, Tldi};
 /// How far `b` has to be moved along a view's axis until no pixel shows it and `a` in each other, metres; negative where they
 /// are apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct WaysOut {
+pub(crate) struct WaysOut {
     /// Against the axis, to the side of `a` where `b` is, as the axis says.
-    pub(super) back: f32,
+    pub(crate) back: f32,
     /// Along the axis, to the other side.
-    pub(super) on: f32,
+    pub(crate) on: f32,
 }
 
 impl WaysOut {
@@ -48,7 +48,7 @@ impl WaysOut {
     /// Whether `b` is on the other side of `a` than the axis says, if nothing but a guess told that: the way back is by far the
     /// longer one, and by far longer than `b` moved in this step. `moved` is the length of that motion, metres, if it was along
     /// the axis, and else 0. With half of `FARTHEST` here, or twice, no test fails.
-    pub(super) fn is_beyond(self, moved: f32, params: &Params) -> bool {
+    pub(crate) fn is_beyond(self, moved: f32, params: &Params) -> bool {
         self.back > FARTHEST * self.on.max(moved) + params.thickness
     }
 }

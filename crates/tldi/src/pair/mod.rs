@@ -6,6 +6,7 @@ pub(crate) mod params;
 pub(crate) mod pixels;
 pub mod plan;
 pub(crate) mod sampling;
+pub(crate) mod spare_views;
 pub(crate) mod stage_constants;
 pub(crate) mod supported;
 pub(crate) mod surface;

@@ -12,9 +12,10 @@ pub use crate::cpu::splat::DepthScale;
 pub use crate::cpu::zone::ZoneGrid;
 pub use crate::pair::pixels::{largest_pixel, least_pixel};
 pub use crate::pair::sampling::{AIM_SAMPLES, first_taken, is_aim_sample, stride};
+pub use crate::pair::spare_views::{asks_for_spare, settle_spare};
 pub use crate::pair::stage_constants::stage_constants;
 pub use crate::pair::surface::first_is_smaller;
-pub use crate::view::approach::{Approach, Body};
+pub use crate::view::approach::{Approach, Body, moved_along};
 pub use crate::view::camera_policy::MAX_VIEWS;
 
 /// Tangent of the largest angle (60°) between a normal and the view at which a contact at the prediction distance is

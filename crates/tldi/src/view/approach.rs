@@ -78,6 +78,14 @@ fn unit(axis: Vec3) -> Option<Vec3> {
     }
 }
 
+/// Length of a motion, metres, if it is along `axis`; else 0.
+pub fn moved_along(motion: Vec3, axis: Vec3) -> f32 {
+    match motion.dot(axis) > 0.0 {
+        true => motion.length(),
+        false => 0.0,
+    }
+}
+
 impl Approach {
     /// `motion` is that of `b` relative to `a` over the step, in the frame of `a`, metres.
     pub(crate) fn new(
@@ -129,14 +137,6 @@ impl Approach {
     /// From where the bounds meet to where `b` lies or comes from, metres.
     pub fn toward_b(&self) -> Vec3 {
         self.lies - self.motion
-    }
-
-    /// How far `b` moved over the step, metres, if it moved along `axis`; else 0.
-    pub(crate) fn moved_in(&self, axis: Vec3) -> f32 {
-        match self.motion.dot(axis) > 0.0 {
-            true => self.motion.length(),
-            false => 0.0,
-        }
     }
 
     /// From `a` towards `b`, unit length or zero.

@@ -4,7 +4,8 @@
 //! distances. So the first axis is the main eigenvector of Σ n nᵀ over the near points of both
 //! surfaces. An axis along the motion suits an impact, but looks along the surface when bodies
 //! slide, spin or rest. Up to two more axes follow if the surfaces also meet on faces that the
-//! first axis sees edge-on, as in a corner or a groove.
+//! first axis sees edge-on, as in a corner or a groove. Axes that only one surface faces are spare: they are looked along
+//! where the others show a contact that is too deep to be true, as of a sheet's rim in the side of a box.
 //!
 //! The sign of the axis says on which side of `a` the body `b` lies. The last axis, the near points, the
 //! motion, the bounds and the outsides of the surfaces decide it.
@@ -73,14 +74,15 @@ pub(crate) const CONSTANTS: [(&str, f64); 6] = [
 ];
 
 /// Fills `axes`, unit vectors from `b` towards `a`; at least one. Empty normals on either side give
-/// the axis of the approach.
+/// the axis of the approach. Returns the spare axes.
 pub(crate) fn aim(
     policy: CameraPolicy,
     sides: [ZoneNormals; 2],
     approach: &Approach,
     axes: &mut Vec<Vec3>,
-) {
+) -> ArrayVec<Vec3, MAX_VIEWS> {
     axes.clear();
+    let mut spare = ArrayVec::new();
     let single = match policy {
         CameraPolicy::ContactZone | CameraPolicy::AllDirections => None,
         CameraPolicy::Motion => Some(-approach.toward_b()),
@@ -96,12 +98,13 @@ pub(crate) fn aim(
             let axis = axis.try_normalize().unwrap_or(Vec3::Z);
             axes.push(oriented(axis, &sides, approach).0);
         }
-        None => aim_at_zone(&sides, approach, policy, axes),
+        None => spare = aim_at_zone(&sides, approach, policy, axes),
     }
     if axes.is_empty() {
         let fallback = approach.last_axis.unwrap_or(-approach.toward_b());
         axes.push(fallback.try_normalize().unwrap_or(Vec3::Z));
     }
+    spare
 }
 
 /// Unit vectors across `axes` and each other, which are themselves (nearly) so: together with them three.
@@ -120,11 +123,13 @@ fn aim_at_zone(
     approach: &Approach,
     policy: CameraPolicy,
     axes: &mut Vec<Vec3>,
-) {
+) -> ArrayVec<Vec3, MAX_VIEWS> {
+    let mut spare = ArrayVec::new();
     // Between faces an axis sees no contact well, but more of where surfaces cross.
     let turns = policy != CameraPolicy::AllDirections;
     let mut seen: [Vec3; MAX_VIEWS] = [Vec3::ZERO; MAX_VIEWS];
     let mut views = 0;
+    let mut is_spare = false;
     while views < MAX_VIEWS {
         let unseen = |n: &Vec3| seen[..views].iter().all(|v| v.dot(*n).abs() < WELL_SEEN);
         // What the earlier views see of a normal is not counted again.
@@ -144,11 +149,10 @@ fn aim_at_zone(
         }
         if views > 0 {
             let supports = |n: &Vec3| axis.dot(*n).abs() >= SUPPORTED;
-            let worthwhile = sides.iter().any(|side| side.share(unseen) >= LEAST_SHARE)
-                && sides.iter().all(|side| side.share(supports) >= LEAST_SHARE);
-            if !worthwhile {
+            if sides.iter().all(|side| side.share(unseen) < LEAST_SHARE) {
                 break;
             }
+            is_spare |= sides.iter().any(|side| side.share(supports) < LEAST_SHARE);
         } else if let Some(last) = approach.last_axis
             && axis.dot(last).abs() >= AXIS_HYSTERESIS.cos()
         {
@@ -164,9 +168,13 @@ fn aim_at_zone(
             break;
         }
         seen[views] = axis;
-        axes.push(axis);
+        match is_spare {
+            true => spare.push(axis),
+            false => axes.push(axis),
+        }
         views += 1;
     }
+    spare
 }
 
 /// The axis or its opposite, such that it points from `b` towards `a`; and whether anything told.
@@ -275,7 +283,12 @@ mod tests {
             [-Vec3::Y, -Vec3::X]
         );
         let floor = vec![Vec3::Y; 50];
-        assert_eq!(zone_axes([zone(&floor, true), edges], &above), [-Vec3::Y]);
+        let mut axes = vec![];
+        let policy = CameraPolicy::ContactZone;
+        let spare = aim(policy, [zone(&floor, true), edges], &above, &mut axes);
+        assert_eq!(axes, [-Vec3::Y]);
+        // Only the box has sides.
+        assert!(spare.len() == 1 && spare[0].x.abs() > 0.99, "{spare:?}");
     }
 
     #[test]

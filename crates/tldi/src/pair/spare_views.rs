@@ -1,0 +1,69 @@
+//! Views that only one of the surfaces faces: looked at where the others show a contact that is too deep to be true.
+//!
+//! Where the rim of a sheet is in the side of a box, a view along the sheet's normal sees the box's width and takes it for the
+//! depth. The view along the normal of the side tells better. It would tell nothing of a box that stands on a floor.
+
+use crate::cpu::ways_out::WaysOut;
+use crate::{PairResult, Params};
+
+/// Whether spare views are asked for: the least way out of the others, in metres, may be [far
+/// longer](WaysOut::is_beyond) than theirs. `moved` is the length of `b`'s motion, metres, if it was along the axis of the
+/// first view, and else 0: a body that came deep in this step is where its motion says.
+pub fn asks_for_spare(way_out: Option<f32>, moved: f32, params: &Params) -> bool {
+    way_out.is_some_and(|back| WaysOut { back, on: 0.0 }.is_beyond(moved, params))
+}
+
+/// Leaves the contacts and axes of the views from `first` on, which are spare, in `result`, if their least way out is that much
+/// shorter than `way_out`, that of the others. `result` has the way out of the spare ones, and afterwards that of all that are
+/// left.
+pub fn settle_spare(
+    result: &mut PairResult,
+    first: usize,
+    way_out: Option<f32>,
+    moved: f32,
+    params: &Params,
+) {
+    let is_less = |(back, on)| WaysOut { back, on }.is_beyond(moved, params);
+    if !way_out.zip(result.way_out).is_some_and(is_less) {
+        result.axes.truncate(first);
+        result.contacts.retain(|c| (c.view as usize) < first);
+        result.way_out = way_out;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ContactPixel;
+    use glamx::Vec3;
+
+    /// Of two views, the second one spare: which ones are left, and the way out. A layer is 2 m, what is far longer 4 times.
+    #[test]
+    fn spare_views_count_where_their_way_out_is_far_shorter() {
+        let params = Params::for_radius(1.0);
+        let settled = |way_out: Option<f32>, of_spare: Option<f32>, moved: f32| {
+            let of_view = |view| ContactPixel {
+                view,
+                ..Default::default()
+            };
+            let mut result = PairResult {
+                axes: vec![Vec3::X, Vec3::Y],
+                contacts: [1, 0, 1].map(of_view).to_vec(),
+                way_out: of_spare,
+                ..Default::default()
+            };
+            settle_spare(&mut result, 1, way_out, moved, &params);
+            let left = (result.axes.len(), result.contacts.len());
+            assert!(left == (2, 3) || left == (1, 1), "{left:?}");
+            (left.0, result.way_out)
+        };
+        assert_eq!(settled(Some(9.0), Some(1.0), 0.0), (2, Some(1.0)));
+        assert_eq!(settled(Some(9.0), Some(2.0), 0.0), (1, Some(9.0)));
+        assert_eq!(settled(Some(9.0), Some(1.0), 2.0), (1, Some(9.0)));
+        assert_eq!(settled(Some(9.0), None, 0.0), (1, Some(9.0)));
+        assert_eq!(settled(None, Some(1.0), 0.0), (1, None));
+        let asks = |way_out, moved| asks_for_spare(way_out, moved, &params);
+        assert!(asks(Some(2.1), 0.0) && !asks(Some(1.9), 0.0));
+        assert!(!asks(Some(5.0), 1.0) && asks(Some(6.1), 1.0) && !asks(None, 0.0));
+    }
+}
