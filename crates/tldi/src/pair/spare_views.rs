@@ -1,21 +1,39 @@
 //! Views that only one of the surfaces faces: looked at where the others show a contact that is too deep to be true.
 //!
-//! Where the rim of a sheet is in the side of a box, a view along the sheet's normal sees the box's width and takes it for the
+//! Where the rim of a sheet is in the side of a box, a view along the sheet's normal sees the box's height and takes it for the
 //! depth. The view along the normal of the side tells better. It would tell nothing of a box that stands on a floor.
 
 use crate::cpu::ways_out::WaysOut;
 use crate::{PairResult, Params};
 
-/// Whether spare views are asked for: the least way out of the others, in metres, may be [far
-/// longer](WaysOut::is_beyond) than theirs. `moved` is the length of `b`'s motion, metres, if it was along the axis of the
-/// first view, and else 0: a body that came deep in this step is where its motion says.
+/// Whether spare views are asked for: the least way out of the others, metres, exceeds a layer and four times `moved`. That is
+/// the length of `b`'s motion, metres, if it was along the axis of the first view, and else 0: a body that came deep in this
+/// step is where its motion says.
+///
+/// ```
+/// use tldi::{Params, plan::asks_for_spare};
+/// let params = Params::for_radius(0.01);
+/// assert!(asks_for_spare(Some(0.1), 0.0, &params));
+/// assert!(!asks_for_spare(Some(0.1), 0.05, &params));
+/// ```
 pub fn asks_for_spare(way_out: Option<f32>, moved: f32, params: &Params) -> bool {
     way_out.is_some_and(|back| WaysOut { back, on: 0.0 }.is_beyond(moved, params))
 }
 
-/// Leaves the contacts and axes of the views from `first` on, which are spare, in `result`, if their least way out is that much
-/// shorter than `way_out`, that of the others. `result` has the way out of the spare ones, and afterwards that of all that are
-/// left.
+/// Takes the contacts and axes of the views from `first` on, which are spare, out of `result`, unless `way_out`, that of the
+/// others, exceeds a layer and four times their least way out and `moved`. `result` has the way out of the spare ones, and
+/// afterwards that of all that are left.
+///
+/// ```
+/// use tldi::{PairResult, Params, glamx::Vec3, plan::settle_spare};
+/// let spare = PairResult { axes: vec![Vec3::X, Vec3::Y], way_out: Some(0.01), ..Default::default() };
+/// let axes_left = |way_out| {
+///     let mut result = spare.clone();
+///     settle_spare(&mut result, 1, Some(way_out), 0.0, &Params::for_radius(0.01));
+///     result.axes.len()
+/// };
+/// assert_eq!([0.1, 0.02].map(axes_left), [2, 1]);
+/// ```
 pub fn settle_spare(
     result: &mut PairResult,
     first: usize,

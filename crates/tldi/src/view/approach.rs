@@ -79,6 +79,12 @@ fn unit(axis: Vec3) -> Option<Vec3> {
 }
 
 /// Length of a motion, metres, if it is along `axis`; else 0.
+///
+/// ```
+/// use tldi::{glamx::Vec3, plan::moved_along};
+/// assert_eq!(moved_along(3.0 * Vec3::X, Vec3::X), 3.0);
+/// assert_eq!(moved_along(3.0 * Vec3::X, -Vec3::X), 0.0);
+/// ```
 pub fn moved_along(motion: Vec3, axis: Vec3) -> f32 {
     match motion.dot(axis) > 0.0 {
         true => motion.length(),
