@@ -101,6 +101,40 @@ fn no_contact_is_deeper_than_the_way_out() {
     assert!(is_kept(-0.5 * R, Some(-3.0 * R)));
 }
 
+/// Of 20 contact pixels of level faces and some of a floor's edge and the wall behind it, which another view sees better, the
+/// latter go. Where there is nothing else they stay.
+#[test]
+fn faces_that_do_not_face_each_other_touch_only_where_nothing_else_does() {
+    let params = Params::for_radius(R);
+    let left = |of_faces: i32, of_edge: i32, axes: &[Vec3]| {
+        let pixels = (0..of_faces + of_edge).map(|k| {
+            let pixel = [k % 5, k / 5];
+            let [x, z] = pixel.map(|c| params.pixel_size * (c as f32 + 0.5));
+            let place = Vec3::new(x, 0.0, z);
+            ContactPixel {
+                pixel,
+                view: 0,
+                point_a: place,
+                point_b: place,
+                normal_a: if k < of_faces { Vec3::Y } else { Vec3::X },
+                normal_b: -Vec3::Y,
+                gap: 0.0,
+            }
+        });
+        let mut result = PairResult {
+            axes: axes.to_vec(),
+            contacts: pixels.collect(),
+            ..PairResult::default()
+        };
+        PatchScratch::default().reduce(&mut result, &params);
+        result.contacts.len()
+    };
+    let both = [-Vec3::Y, -Vec3::X];
+    assert_eq!(left(20, 15, &both), 20);
+    assert_eq!(left(20, 15, &both[..1]), 35);
+    assert_eq!(left(15, 20, &both), 35);
+}
+
 /// A ball in a trough that is hardly wider, deep in one of its sides: wherever it is in it, a patch pushes
 /// along the normal there.
 #[test]
