@@ -6,11 +6,11 @@ use super::first_look::settle::FirstLook;
 use super::scratch::{Look, Scratch};
 use super::side::{Scope, Side};
 use crate::contact::lone_points::SAME_POINT;
+use crate::pair::further_views::{asks_for_spare, further_axes, settle_spare};
 use crate::pair::plan::{PairPlan, column_reach};
 use crate::pair::sampling::stride;
-use crate::pair::spare_views::{asks_for_spare, settle_spare};
 use crate::view::approach::moved_along;
-use crate::view::camera_policy::{MAX_VIEWS, further_axes};
+use crate::view::camera_policy::MAX_VIEWS;
 use crate::{
     CameraPolicy, Looked, PairQuery, PairResult, Surface, Variant, View, VirtualCamera, paper,
 };

@@ -107,17 +107,6 @@ pub(crate) fn aim(
     spare
 }
 
-/// Unit vectors across `axes` and each other, which are themselves (nearly) so: together with them three.
-pub(crate) fn further_axes(axes: &[Vec3]) -> ArrayVec<Vec3, MAX_VIEWS> {
-    let mut further = ArrayVec::new();
-    match axes {
-        [axis] => further.extend(<[Vec3; 2]>::from(axis.any_orthonormal_pair())),
-        [first, second] => further.extend(first.cross(*second).try_normalize()),
-        _ => (),
-    }
-    further
-}
-
 fn aim_at_zone(
     sides: &[ZoneNormals; 2],
     approach: &Approach,
@@ -289,22 +278,6 @@ mod tests {
         assert_eq!(axes, [-Vec3::Y]);
         // Only the box has sides.
         assert!(spare.len() == 1 && spare[0].x.abs() > 0.99, "{spare:?}");
-    }
-
-    #[test]
-    fn further_axes_span_what_is_left() {
-        let first = Vec3::new(0.6, 0.0, 0.8);
-        let second = first.any_orthonormal_vector();
-        for axes in [
-            vec![first],
-            vec![first, second],
-            vec![first, second, first.cross(second)],
-        ] {
-            let all: Vec<Vec3> = axes.iter().copied().chain(further_axes(&axes)).collect();
-            assert_eq!(all.len(), 3);
-            let volume = all[0].dot(all[1].cross(all[2]));
-            assert!((volume.abs() - 1.0).abs() < 1e-5, "{all:?}");
-        }
     }
 
     /// A ball's normals around a flat contact are no second face.

@@ -1,10 +1,15 @@
-//! Views that only one of the surfaces faces: looked at where the others show a contact that is too deep to be true.
+//! Views beyond the first ones of a pair: spare ones, which only one surface faces, and those across all others. Stage
+//! `further` of the GPU.
 //!
-//! Where the rim of a sheet is in the side of a box, a view along the sheet's normal sees the box's height and takes it for the
-//! depth. The view along the normal of the side tells better. It would tell nothing of a box that stands on a floor.
+//! Spare views are looked at where the others show a contact that seems too deep. Where the rim of a sheet is in the side of a
+//! box, a view along the sheet's normal sees the box's height and takes it for the depth. The view along the normal of the side
+//! tells better. It would tell nothing of a box that stands on a floor.
 
 use crate::cpu::ways_out::WaysOut;
+use crate::view::camera_policy::MAX_VIEWS;
 use crate::{PairResult, Params};
+use arrayvec::ArrayVec;
+use glamx::Vec3;
 
 /// Whether spare views are asked for: the least way out of the others, metres, exceeds a layer and four times `moved`. That is
 /// the length of `b`'s motion, metres, if it was along the axis of the first view, and else 0: a body that came deep in this
@@ -49,11 +54,21 @@ pub fn settle_spare(
     }
 }
 
+/// Unit vectors across `axes` and each other, which are themselves (nearly) so: together with them three.
+pub(crate) fn further_axes(axes: &[Vec3]) -> ArrayVec<Vec3, MAX_VIEWS> {
+    let mut further = ArrayVec::new();
+    match axes {
+        [axis] => further.extend(<[Vec3; 2]>::from(axis.any_orthonormal_pair())),
+        [first, second] => further.extend(first.cross(*second).try_normalize()),
+        _ => (),
+    }
+    further
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::ContactPixel;
-    use glamx::Vec3;
 
     /// Of two views, the second one spare: which ones are left, and the way out. A layer is 2 m, what is far longer 4 times.
     #[test]
@@ -83,5 +98,21 @@ mod tests {
         let asks = |way_out, moved| asks_for_spare(way_out, moved, &params);
         assert!(asks(Some(2.1), 0.0) && !asks(Some(1.9), 0.0));
         assert!(!asks(Some(5.0), 1.0) && asks(Some(6.1), 1.0) && !asks(None, 0.0));
+    }
+
+    #[test]
+    fn further_axes_span_what_is_left() {
+        let first = Vec3::new(0.6, 0.0, 0.8);
+        let second = first.any_orthonormal_vector();
+        for axes in [
+            vec![first],
+            vec![first, second],
+            vec![first, second, first.cross(second)],
+        ] {
+            let all: Vec<Vec3> = axes.iter().copied().chain(further_axes(&axes)).collect();
+            assert_eq!(all.len(), 3);
+            let volume = all[0].dot(all[1].cross(all[2]));
+            assert!((volume.abs() - 1.0).abs() < 1e-5, "{all:?}");
+        }
     }
 }
