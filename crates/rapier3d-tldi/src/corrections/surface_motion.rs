@@ -349,7 +349,12 @@ pub struct TldiHooks<'a> {
 
 impl PhysicsHooks for TldiHooks<'_> {
     fn filter_contact_pair(&self, context: &PairFilterContext<'_>) -> Option<SolverFlags> {
-        self.inner.filter_contact_pair(context)
+        let flags = self.inner.filter_contact_pair(context);
+        if flags.is_some_and(|flags| !flags.contains(SolverFlags::COMPUTE_RIGID_IMPULSES)) {
+            let colliders = [context.collider1, context.collider2];
+            self.shared.batch().let_through(colliders);
+        }
+        flags
     }
 
     fn filter_intersection_pair(&self, context: &PairFilterContext<'_>) -> bool {

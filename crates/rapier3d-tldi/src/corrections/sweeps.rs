@@ -8,8 +8,9 @@
 //! as it is, until the trough has closed over it. So the body loses the part of its velocity that points into the slope,
 //! as in an impact without friction and rebound.
 //!
-//! **Let through.** A user's hook may take the contacts of a pair away, as a one-way platform does. Rapier does not sweep its own
-//! shapes while they touch, and a sweep must not hold such a pair either.
+//! **Let through.** A user's hook may take the contacts of a pair away, as a one-way platform does, or their impulses; a joint or the types of the
+//! bodies may keep it apart. Rapier's sweeps ask nevertheless. They do not hold its own shapes while they touch, and a
+//! sweep must not hold such a pair either.
 //!
 //! Rapier does not name the colliders of a sweep. They are found by their shapes, by the pose of the moving one at the
 //! beginning of the step, and by the place of its target.
@@ -31,24 +32,32 @@ pub(crate) struct SweptPair<'a> {
 }
 
 impl Batch {
-    /// The pair that is swept, and which of its colliders the first and the second shape belong to. If several targets
-    /// share a shape (tiles), it is the one nearest to the target's place. Sensors hold nothing.
+    /// The pair that is swept, if it was prepared, and which of its colliders the first and the second shape belong to.
     fn swept(&self, swept: &SweptPair<'_>) -> Option<(&PreparedPair, [usize; 2])> {
-        let shapes = swept.shapes.map(address);
+        let (pair, order) = self.found(swept)?;
+        Some((pair?, order))
+    }
+
+    /// The same, without a prepared pair if the two are kept apart. If several targets share a shape (tiles), it is the one
+    /// nearest to the target's place. Sensors hold nothing.
+    fn found(&self, swept: &SweptPair<'_>) -> Option<(Option<&PreparedPair>, [usize; 2])> {
+        let addresses = swept.shapes.map(address);
         let solid = (self.pairs.iter()).filter(|pair| pair.question != Question::Crossing);
-        let alike = solid.filter_map(|pair| {
+        let solid = solid.map(|pair| (Some(pair), &pair.shapes, &pair.poses));
+        let apart = self.apart.iter();
+        let apart = apart.map(|pair| (None, &pair.shapes, &pair.poses));
+        let alike = solid.chain(apart).filter_map(|(pair, shapes, poses)| {
             let is_it = |[k, l]: &[usize; 2]| {
-                let of_pair = [&pair.shapes[*k], &pair.shapes[*l]];
-                of_pair.map(|shape| address(&*shape.0)) == shapes
-                    && pair.poses[*k] == swept.poses[0]
+                let of_pair = [&shapes[*k], &shapes[*l]];
+                of_pair.map(|shape| address(&*shape.0)) == addresses && poses[*k] == swept.poses[0]
             };
-            Some((pair, [[0, 1], [1, 0]].into_iter().find(is_it)?))
-        });
-        let off = |(pair, [_, l]): &(&PreparedPair, [usize; 2])| {
+            let order = [[0, 1], [1, 0]].into_iter().find(is_it)?;
             let target = swept.poses[1].translation;
-            pair.poses[*l].translation.distance_squared(target)
-        };
-        alike.min_by(|m, n| off(m).total_cmp(&off(n)))
+            let off = poses[order[1]].translation.distance_squared(target);
+            Some((off, (pair, order)))
+        });
+        let nearest = alike.min_by(|(off, _), (other, _)| off.total_cmp(other))?;
+        Some(nearest.1)
     }
 
     /// How two parts of a swept pair are in each other, by the contacts that push them to the side that is
@@ -79,17 +88,19 @@ impl Batch {
         })
     }
 
-    /// Records that the user's hooks took the contacts of the colliders away.
+    /// Records that the user's hooks took the contacts of the colliders away. The order of these does not matter.
     pub(crate) fn let_through(&self, colliders: [ColliderHandle; 2]) {
-        if let Some(pair) = (self.pairs.iter()).find(|pair| pair.colliders == colliders) {
+        let is_it = |pair: &&PreparedPair| colliders.iter().all(|c| pair.colliders.contains(c));
+        if let Some(pair) = self.pairs.iter().find(is_it) {
             pair.is_let_through.store(true, Ordering::Relaxed);
         }
     }
 
-    /// Whether they did so for a swept pair.
+    /// Whether they did so for a swept pair, or it is kept apart.
     pub(crate) fn lets_through(&self, swept: &SweptPair<'_>) -> bool {
-        let pair = self.swept(swept);
-        pair.is_some_and(|(pair, _)| pair.is_let_through.load(Ordering::Relaxed))
+        let found = self.found(swept);
+        let is_let_through = |pair: &PreparedPair| pair.is_let_through.load(Ordering::Relaxed);
+        found.is_some_and(|(pair, _)| pair.is_none_or(is_let_through))
     }
 
     /// Records that a swept pair is held where it is; the normal is from the first shape towards the second.

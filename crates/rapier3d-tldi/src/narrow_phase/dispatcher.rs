@@ -192,8 +192,7 @@ impl QueryDispatcher for TldiDispatcher {
         };
         let batch = self.shared.batch();
         let key = PairKey::new(Question::Crossing, [shape1, shape2], pos12);
-        let prepared = batch.get(&key, None).filter(|prepared| !prepared.is_kept);
-        let crossing = if let Some(prepared) = prepared {
+        let crossing = if let Some(prepared) = batch.get(&key, None) {
             prepared.used.store(true, Ordering::Relaxed);
             first_crossing(&batch.parts[prepared.parts.clone()], &batch.results)
         } else {

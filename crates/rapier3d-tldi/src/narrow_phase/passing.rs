@@ -37,7 +37,8 @@ impl Told {
                 reason,
             })
         };
-        self.next = candidates.iter().find_map(|candidate| {
+        let mut meeting = candidates.iter().filter(|candidate| !candidate.is_apart);
+        self.next = meeting.find_map(|candidate| {
             let Candidate {
                 collider1: c1,
                 collider2: c2,

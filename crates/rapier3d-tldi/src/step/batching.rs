@@ -6,7 +6,7 @@ use crate::shape::exact::ExactShape;
 use crate::step::candidates::{Candidate, contact_reach, effective_prediction, parent_of, pose_of};
 use crate::step::measured::Measured;
 use crate::step::pair_memory::PairMemory;
-use crate::step::prepared::{Batch, PreparedPair, Question};
+use crate::step::prepared::{Apart, Batch, PreparedPair, Question};
 use rapier3d::dynamics::{IntegrationParameters, RigidBody, RigidBodySet};
 use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet};
 use rapier3d::math::{Pose, Vector};
@@ -26,7 +26,7 @@ pub(crate) struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// Appends a candidate to the batch if its colliders are within reach of each other.
+    /// Appends a candidate to the batch if its colliders are within reach of each other, or are kept apart.
     pub(crate) fn push_pair(
         &self,
         candidate: &Candidate,
@@ -37,6 +37,14 @@ impl<'a> Frame<'a> {
         let [collider1, collider2] = colliders.map(|handle| &self.colliders[handle]);
         let pose1 = pose_of(collider1, self.bodies);
         let pose2 = pose_of(collider2, self.bodies);
+        let shapes = || [collider1, collider2].map(|c| c.shared_shape().clone());
+        if candidate.is_apart {
+            batch.apart.push(Apart {
+                shapes: shapes(),
+                poses: [pose1, pose2],
+            });
+            return;
+        }
         let pos12 = pose1.inv_mul(&pose2);
         let prediction = effective_prediction(collider1, collider2, self.bodies, self.integration);
         let pair = ShapePair::new(collider1.shape(), collider2.shape(), pos12, prediction);
@@ -79,7 +87,7 @@ impl<'a> Frame<'a> {
                     Question::Contacts(_) => Measured::new(&pair, self.config),
                     Question::Crossing => None,
                 }),
-                shapes: [collider1, collider2].map(|c| c.shared_shape().clone()),
+                shapes: shapes(),
             },
             &pos12,
         );

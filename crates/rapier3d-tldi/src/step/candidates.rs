@@ -31,6 +31,8 @@ pub(crate) struct Candidate {
     pub(crate) collider2: ColliderHandle,
     /// Rapier is not going to update the pair: no side is awake or was changed.
     pub(crate) asleep: bool,
+    /// Rapier asks for no contacts of the pair: its joint or its body types keep it apart. Its sweeps ask nevertheless.
+    pub(crate) is_apart: bool,
     /// Whether one of the bodies is a link of a multibody.
     pub(crate) has_link: bool,
 }
@@ -179,12 +181,14 @@ impl CandidateSearch {
                     (other.handle, proxy.handle)
                 };
                 let (c1, c2) = (&colliders[collider1], &colliders[collider2]);
-                if may_collide(c1, c2, bodies, joints) {
+                let is_apart = are_apart(c1, c2, bodies, joints);
+                if may_meet(c1, c2) && !(is_apart && !may_be_swept(c1, c2, bodies)) {
                     let is_updated = |c, handle| is_awake(c, bodies) || changed.contains(handle);
                     self.candidates.push(Candidate {
                         collider1,
                         collider2,
                         asleep: !is_updated(c1, &collider1) && !is_updated(c2, &collider2),
+                        is_apart,
                         has_link: [c1, c2].into_iter().any(|c| joints.has_link(c)),
                     });
                 }
@@ -291,27 +295,44 @@ pub(crate) fn contact_reach(
     effective_prediction(collider1, collider2, bodies, integration).max(way.min(AHEAD * coarsest))
 }
 
-/// Whether rapier lets the two collide, user hooks left aside. Joints keep contacts apart, and let sensors see.
-fn may_collide(
+/// Whether rapier's narrow phase or its sweeps look at the two: other bodies, groups that meet.
+fn may_meet(collider1: &Collider, collider2: &Collider) -> bool {
+    let bodies = (collider1.parent(), collider2.parent());
+    let is_same_body = matches!(bodies, (Some(body1), Some(body2)) if body1 == body2);
+    !is_same_body
+        && collider1
+            .collision_groups()
+            .test(collider2.collision_groups())
+}
+
+/// Whether a joint or the types of their bodies keep the two apart. Joints let sensors see.
+fn are_apart(
     collider1: &Collider,
     collider2: &Collider,
     bodies: &RigidBodySet,
     joints: &Joints<'_>,
 ) -> bool {
-    if let (Some(body1), Some(body2)) = (collider1.parent(), collider2.parent()) {
-        let is_sensor = collider1.is_sensor() || collider2.is_sensor();
-        if body1 == body2 || (!is_sensor && joints.keep_apart(body1, body2)) {
-            return false;
-        }
+    if let (Some(body1), Some(body2)) = (collider1.parent(), collider2.parent())
+        && !is_any_sensor(collider1, collider2)
+        && joints.keep_apart(body1, body2)
+    {
+        return true;
     }
     let body_type =
         |collider| parent_of(collider, bodies).map_or(RigidBodyType::Fixed, RigidBody::body_type);
     let (type1, type2) = (body_type(collider1), body_type(collider2));
     let types_meet = |collider: &Collider| collider.active_collision_types().test(type1, type2);
-    (types_meet(collider1) || types_meet(collider2))
-        && collider1
-            .collision_groups()
-            .test(collider2.collision_groups())
+    !types_meet(collider1) && !types_meet(collider2)
+}
+
+/// Whether a sweep of rapier's may hold one of the two at the other: it tests neither joints nor the types of bodies.
+fn may_be_swept(collider1: &Collider, collider2: &Collider, bodies: &RigidBodySet) -> bool {
+    let is_dynamic = |c| parent_of(c, bodies).is_some_and(RigidBody::is_dynamic);
+    !is_any_sensor(collider1, collider2) && (is_dynamic(collider1) || is_dynamic(collider2))
+}
+
+fn is_any_sensor(collider1: &Collider, collider2: &Collider) -> bool {
+    collider1.is_sensor() || collider2.is_sensor()
 }
 
 fn is_awake(collider: &Collider, bodies: &RigidBodySet) -> bool {

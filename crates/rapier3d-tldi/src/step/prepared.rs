@@ -124,6 +124,13 @@ impl PreparedPair {
     }
 }
 
+/// A pair that rapier asks no contacts of: a joint or the types of the bodies keep it apart.
+pub(crate) struct Apart {
+    pub(crate) shapes: [SharedShape; 2],
+    /// Of the colliders in world space.
+    pub(crate) poses: [Pose; 2],
+}
+
 /// The pairs of a step and their results.
 #[derive(Default)]
 pub(crate) struct Batch {
@@ -132,6 +139,7 @@ pub(crate) struct Batch {
     /// Of each pair the one before it with the same key.
     alike: Vec<Option<usize>>,
     pub(crate) pairs: Vec<PreparedPair>,
+    pub(crate) apart: Vec<Apart>,
     pub(crate) parts: Vec<PartPair>,
     /// The result of query `k` is `results[k]`; there may be left-over ones behind.
     pub(crate) results: Vec<PairResult>,
@@ -143,6 +151,7 @@ impl Batch {
         self.index.clear();
         self.alike.clear();
         self.pairs.clear();
+        self.apart.clear();
         self.parts.clear();
     }
 

@@ -345,3 +345,42 @@ fn what_tips_over_is_not_held() -> TestResult {
     }
     Ok(())
 }
+
+/// What a joint or the types of bodies keep apart moves as if the two could not meet at all: a door through its frame.
+#[test]
+fn what_is_kept_apart_is_not_swept() -> TestResult {
+    let half = Vector::new(0.5, 0.03, 0.2);
+    let door: Vec<Vector> = cube(0.5).into_iter().map(|p| p * half / 0.5).collect();
+    let apart = InteractionGroups::new(Group::GROUP_1, Group::NONE, InteractionTestMode::And);
+    let swung = |joint_keeps: bool, types: ActiveCollisionTypes, groups| {
+        let (mut world, mut tldi) = attached();
+        world.gravity = Vector::ZERO;
+        let frame = cloud_collider(shape(&square(0.8))).active_collision_types(types);
+        let (frame, _) = world.insert(RigidBodyBuilder::fixed(), frame);
+        let (turn, spin) = (Rotation::from_rotation_z(1.0), -9.0 * Vector::Z);
+        let from_hinge = turn * (0.5 * Vector::X);
+        let door = cloud_collider(shape(&door)).active_collision_types(types);
+        let (door, _) = world.insert(
+            RigidBodyBuilder::dynamic()
+                .pose(Pose::from_parts(from_hinge, turn))
+                .linvel(spin.cross(from_hinge))
+                .angvel(spin),
+            door.collision_groups(groups),
+        );
+        let hinge = RevoluteJointBuilder::new(Vector::Z)
+            .local_anchor2(-0.5 * Vector::X)
+            .contacts_enabled(!joint_keeps);
+        world.insert_impulse_joint(frame, door, hinge);
+        for _ in 0..20 {
+            let report = tldi.step(&mut world)?;
+            assert_eq!((report.pairs_batched, report.pairs_missed), (0, 0));
+        }
+        Ok::<Pose, TldiError>(*world.bodies[door].position())
+    };
+    let (default, all) = (ActiveCollisionTypes::default(), InteractionGroups::all());
+    let free = swung(false, default, apart)?;
+    assert_eq!(swung(true, default, all)?, free, "by a joint");
+    let between_dynamic = ActiveCollisionTypes::DYNAMIC_DYNAMIC;
+    assert_eq!(swung(false, between_dynamic, all)?, free, "by types");
+    Ok(())
+}

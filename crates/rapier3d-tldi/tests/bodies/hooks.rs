@@ -305,6 +305,47 @@ fn fast_bodies_pass_one_way_platforms() -> TestResult {
     Ok(())
 }
 
+/// A plate whose contacts are told, but push nothing.
+struct Ghost;
+
+impl PhysicsHooks for Ghost {
+    fn filter_contact_pair(&self, _: &PairFilterContext<'_>) -> Option<SolverFlags> {
+        Some(SolverFlags::empty())
+    }
+}
+
+/// A fast ball passes such a plate, up and down, as if it were not there. Its contacts are told.
+#[test]
+fn fast_bodies_pass_what_must_not_push() -> TestResult {
+    let flown = |plate: Option<PointCloud<'static>>| {
+        let ball = sample_shape(&Ball::new(0.1), SPACING).expect("a ball has a surface");
+        let (mut world, mut tldi) = attached();
+        if let Some(plate) = plate {
+            let plate = cloud_collider(PointCloudShape::new(plate));
+            let plate = plate.active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS);
+            world.insert(RigidBodyBuilder::fixed(), plate);
+        }
+        let (ball, _) = world.insert(
+            dynamic_at(-0.5).linvel(6.0 * Vector::Y),
+            tldi.collider(ball),
+        );
+        let mut touching = 0;
+        for _ in 0..90 {
+            let report = tldi.step_with_events(&mut world, &Ghost, &())?;
+            touching += report.pairs_in_contact;
+        }
+        Ok::<_, TldiError>((world.bodies[ball].translation(), touching))
+    };
+    let (free, _) = flown(None)?;
+    let plate = sample_shape(&Cuboid::new(Vector::new(0.6, 0.05, 0.6)), SPACING)?;
+    let (passed, touching) = flown(Some(plate))?;
+    assert!(
+        touching > 2 && passed == free,
+        "{passed} instead of {free}, {touching} steps"
+    );
+    Ok(())
+}
+
 /// A contact begins once, its force is the weight, and it ends once: when the body is lifted, and when its collider goes.
 #[test]
 fn contacts_begin_push_and_end() -> TestResult {
