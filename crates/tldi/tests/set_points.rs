@@ -268,6 +268,68 @@ fn what_was_asked_for_holds_for_new_points() {
     assert_eq!(cloud.radii(), &Radii::Global(0.3));
 }
 
+/// What `consists_of` calls the same, `set_points` leaves as it is, and the other way round.
+#[test]
+fn the_same_points_are_known() {
+    let mut points = grid(9, 1.0);
+    points.insert(4, Vec3::NAN);
+    let mut normals = vec![Vec3::Y; points.len()];
+    let mut cloud = PointCloud::builder(&points[..])
+        .knn_radii(4, 0.8)
+        .unoriented_normals(&normals[..])
+        .build()
+        .expect("valid")
+        .into_owned();
+    // As an argument normals are outward.
+    assert!(!cloud.consists_of(&points, Some(&normals)));
+    cloud.set_points(&points, Some(&normals)).expect("valid");
+    assert!(cloud.consists_of(&points, Some(&normals)));
+    // Normals count as unit vectors, those of dropped points not at all.
+    normals[2] *= 3.0;
+    normals[4] = Vec3::X;
+    assert!(cloud.consists_of(&points, Some(&normals)));
+    normals[2] = Vec3::X;
+    assert!(!cloud.consists_of(&points, Some(&normals)));
+    cloud.set_points(&points, None).expect("valid");
+    assert!(cloud.consists_of(&points, None));
+    // The dropped one is back, or another one is not finite.
+    for (changed, value) in [(4, Vec3::ZERO), (5, Vec3::INFINITY)] {
+        let mut others = points.clone();
+        others[changed] = value;
+        assert!(!cloud.consists_of(&others, None));
+    }
+    // Points that move keep their radii.
+    let radius = cloud.mean_radius();
+    let moved: Vec<Vec3> = points.iter().map(|p| 2.0 * p).collect();
+    cloud.move_points(&moved, None).expect("valid");
+    assert!(cloud.lies_at(&moved, None) && !cloud.consists_of(&moved, None));
+    cloud.set_points(&moved, None).expect("valid");
+    assert!(cloud.consists_of(&moved, None));
+    assert!((cloud.mean_radius() - 2.0 * radius).abs() < 1e-5);
+}
+
+/// Equal clouds hold the same and go on alike.
+#[test]
+fn clouds_are_compared() {
+    let points = grid(9, 1.0);
+    let build = |points: &[Vec3]| {
+        let builder = PointCloud::builder(points).radius(0.5);
+        builder.build().expect("valid").into_owned()
+    };
+    let cloud = build(&points);
+    assert!(cloud == build(&points) && cloud == cloud.clone());
+    let mut other = build(&points);
+    other.set_radii(Radii::Global(0.6)).expect("valid");
+    assert!(cloud != other);
+    let normals = vec![Vec3::Y; points.len()];
+    other = build(&points);
+    other.set_points(&points, Some(&normals)).expect("valid");
+    assert!(cloud != other);
+    let mut moved = points.clone();
+    moved[80] += Vec3::Y;
+    assert!(cloud != build(&moved) && cloud != build(&points[1..]));
+}
+
 /// Points that move keep their radii; without all of them they are new points.
 #[test]
 fn points_that_move_keep_radii_from_neighbours() {

@@ -281,6 +281,7 @@ impl<'a> CloudBuilder<'a> {
             points,
             radii,
             radii_given,
+            radii_kept: false,
             normals_oriented: normals.is_some() && (outward || recipe.viewpoint.is_some()),
             normals_given,
             normals,

@@ -4,7 +4,7 @@ use crate::cloud::checks::{check_count, check_dropped, check_length};
 use crate::cloud::gather::{Gathered, extend_without, index_before_drop, merged};
 use crate::cloud::morton::permuted;
 use crate::cloud::neighborhoods::Neighborhoods;
-use crate::cloud::point_normals::{fill_from_nearest, normalize};
+use crate::cloud::point_normals::{fill_from_nearest, normalize, unit_or_zero};
 use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
 use crate::stage::stage;
 use crate::{Aabb, CloudError, CloudRecipe, Radii, RadiusRule};
@@ -33,6 +33,8 @@ pub struct PointCloud<'a> {
     pub(crate) radii: Radii<'a>,
     /// Whether the caller gave a radius for each point.
     pub(crate) radii_given: bool,
+    /// Whether radii from neighbours are those that the points had before they moved.
+    pub(crate) radii_kept: bool,
     pub(crate) normals: Option<Cow<'a, [Vec3]>>,
     pub(crate) normals_oriented: bool,
     /// Whether they are the caller's.
@@ -198,29 +200,45 @@ impl<'a> PointCloud<'a> {
     }
 
     /// Whether [`set_points`](Self::set_points) with these points and normals would leave the cloud
-    /// as it is. `false` also if that is not sure, since points were dropped or normals made unit
-    /// vectors. Cost: one pass, up to the first difference.
+    /// as it is. `false` also for normals of which one tells no direction. Cost: one pass, up to the first difference.
     ///
     /// ```
     /// use tldi::{PointCloud, glamx::Vec3};
-    /// let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::X]).radius(0.5).build()?;
-    /// assert!(cloud.consists_of(&[Vec3::ZERO, Vec3::X], None));
-    /// assert!(!cloud.consists_of(&[Vec3::X, Vec3::ZERO], None));
+    /// let cloud = PointCloud::builder(vec![Vec3::ZERO, Vec3::NAN, Vec3::X]).radius(0.5).build()?;
+    /// assert!(cloud.consists_of(&[Vec3::ZERO, Vec3::NAN, Vec3::X], None));
+    /// assert!(!cloud.consists_of(&[Vec3::X, Vec3::NAN, Vec3::ZERO], None));
     /// # Ok::<(), tldi::CloudError>(())
     /// ```
     pub fn consists_of(&self, points: &[Vec3], normals: Option<&[Vec3]>) -> bool {
-        let given = |i: usize| self.order.as_ref().map_or(i, |order| order[i] as usize);
+        !self.radii_kept && self.lies_at(points, normals)
+    }
+
+    /// [`consists_of`](Self::consists_of) for [`move_points`](Self::move_points).
+    ///
+    /// ```
+    /// use tldi::{PointCloud, glamx::Vec3};
+    /// let (points, moved) = ([Vec3::ZERO, Vec3::X], [Vec3::ZERO, Vec3::Y]);
+    /// let mut cloud = PointCloud::builder(&points[..]).knn_radii(1, 0.5).build()?.into_owned();
+    /// cloud.move_points(&moved, None)?;
+    /// assert!(cloud.lies_at(&moved, None));
+    /// assert!(!cloud.consists_of(&moved, None), "as new points they get other radii");
+    /// # Ok::<(), tldi::CloudError>(())
+    /// ```
+    pub fn lies_at(&self, points: &[Vec3], normals: Option<&[Vec3]>) -> bool {
+        if points.len() != self.len() + self.dropped.len() {
+            return false;
+        }
         let same_normals = match (self.normals(), normals) {
             (_, None) => !self.normals_given,
             (Some(own), Some(new)) => {
-                new.len() == own.len() && (0..own.len()).all(|i| own[i] == new[given(i)])
+                let is_same = |i| own[i] == unit_or_zero(new[self.given_index(i)]);
+                self.normals_oriented && new.len() == points.len() && (0..own.len()).all(is_same)
             }
             _ => false,
         };
-        points.len() == self.len()
-            && self.dropped.is_empty()
-            && (0..self.len()).all(|i| self.point(i) == points[given(i)])
-            && same_normals
+        same_normals
+            && (0..self.len()).all(|i| self.point(i) == points[self.given_index(i)])
+            && (self.dropped.iter()).all(|&i| !points[i as usize].is_finite())
     }
 
     /// Replaces all points, as a streaming cloud does in every frame: with what the builder was told to
@@ -372,6 +390,8 @@ impl<'a> PointCloud<'a> {
         self.normals_given = normals.is_some();
         self.normals_oriented =
             self.normals_given || (estimated && self.recipe.viewpoint.is_some());
+        let keeps = |radii: &Radii<'_>| matches!(radii, Radii::PerPoint(_)) && !self.radii_given;
+        self.radii_kept = new_radii.is_none() && keeps(&self.radii);
         if let Some(radii) = new_radii {
             (self.mean_radius, self.max_radius) = mean_and_max(&radii);
             self.radii = radii;
@@ -399,6 +419,7 @@ impl<'a> PointCloud<'a> {
         check_coordinates(&self.points, self.bounds, &radii, given_index)?;
         (self.mean_radius, self.max_radius) = mean_and_max(&radii);
         self.radii_given = matches!(radii, Radii::PerPoint(_));
+        self.radii_kept = false;
         if let Radii::Global(radius) = radii {
             self.recipe.radii = RadiusRule::Global(radius);
         }
@@ -416,6 +437,7 @@ impl<'a> PointCloud<'a> {
                 Radii::PerPoint(r) => Radii::PerPoint(Cow::Owned(r.into_owned())),
             },
             radii_given: self.radii_given,
+            radii_kept: self.radii_kept,
             normals: self.normals.map(|n| Cow::Owned(n.into_owned())),
             normals_oriented: self.normals_oriented,
             normals_given: self.normals_given,
@@ -430,6 +452,32 @@ impl<'a> PointCloud<'a> {
             content: self.content,
             spare: self.spare,
         }
+    }
+}
+
+/// Clouds are equal if they hold the same points, radii, normals and colours in the same order, and make the same of new
+/// points. Cost: one pass, up to the first difference.
+impl PartialEq<PointCloud<'_>> for PointCloud<'_> {
+    fn eq(&self, other: &PointCloud<'_>) -> bool {
+        let told = |cloud: &PointCloud<'_>| {
+            let PointCloud {
+                radii_given,
+                radii_kept,
+                normals_oriented,
+                normals_given,
+                ..
+            } = *cloud;
+            [radii_given, radii_kept, normals_oriented, normals_given]
+        };
+        self.content == other.content
+            || self.points == other.points
+                && told(self) == told(other)
+                && self.radii == other.radii
+                && self.normals == other.normals
+                && self.colors == other.colors
+                && self.dropped == other.dropped
+                && self.recipe == other.recipe
+                && self.order == other.order
     }
 }
 

@@ -65,17 +65,20 @@ pub(crate) fn least_variance_axis(covariance: DMat3) -> DVec3 {
 pub(crate) fn normalize(normals: &mut [Vec3]) -> bool {
     let mut usable = true;
     for normal in normals {
-        if normal.is_normalized() {
-            continue;
-        }
-        // In f64 neither the squares of the smallest nor of the largest f32 leave the range.
-        *normal = normal
-            .as_dvec3()
-            .try_normalize()
-            .map_or(Vec3::ZERO, |n| n.as_vec3());
+        *normal = unit_or_zero(*normal);
         usable &= *normal != Vec3::ZERO;
     }
     usable
+}
+
+/// A given normal as a unit vector; zero if it tells no direction.
+pub(crate) fn unit_or_zero(normal: Vec3) -> Vec3 {
+    if normal.is_normalized() {
+        return normal;
+    }
+    // In f64 neither the squares of the smallest nor of the largest f32 leave the range.
+    let unit = normal.as_dvec3().try_normalize();
+    unit.map_or(Vec3::ZERO, |n| n.as_vec3())
 }
 
 /// Turns the normals of `points` to the side of `viewpoint`.

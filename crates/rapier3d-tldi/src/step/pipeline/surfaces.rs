@@ -122,6 +122,10 @@ impl TldiPipeline {
         cloud: PointCloud<'static>,
     ) -> Result<(), TldiError> {
         let shape = cloud_of(colliders, collider)?;
+        if *shape.cloud() == cloud {
+            self.motions.forget_velocities(collider);
+            return Ok(());
+        }
         let before = self.motions.snapshot(shape.cloud());
         self.change_shape(colliders, collider, |shape| {
             shape.set_cloud(cloud);
@@ -235,7 +239,7 @@ impl TldiPipeline {
                 found: points.len(),
             });
         }
-        if cloud.consists_of(points, normals) {
+        if cloud.lies_at(points, normals) {
             return Ok(());
         }
         let before = self.motions.before(cloud);
