@@ -17,6 +17,7 @@ use rapier3d::geometry::{Collider, ColliderHandle, ColliderSet, SolverFlags};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::pipeline::{ContactModificationContext, PairFilterContext, PhysicsHooks};
 use std::collections::HashMap;
+use std::ops::AddAssign;
 use tldi::PointCloud;
 
 /// The known motion of clouds that got other points since the last step.
@@ -24,10 +25,10 @@ use tldi::PointCloud;
 pub(crate) struct SurfaceMotions {
     motions: Vec<SurfaceMotion>,
     sampled: Vec<SampledMotion>,
-    /// Steps that ended.
-    steps: u64,
-    /// How many steps had ended when a collider got the points that it has.
-    changed_at: HashMap<ColliderHandle, u64>,
+    /// All steps that ended.
+    ended: Span,
+    /// Those that had ended when a collider got the points that it has.
+    changed_at: HashMap<ColliderHandle, Span>,
     /// Time constant of rapier's correction of penetrations, seconds: of two dynamic bodies, and of one.
     undoing: [f32; 2],
     dt: f32,
@@ -64,13 +65,38 @@ struct SampledMotion {
     pace: Pace,
 }
 
+/// Steps, and the time that they took. Steps without time, as in a paused game, do not count.
+#[derive(Clone, Copy, Default)]
+struct Span {
+    steps: u64,
+    seconds: f64,
+}
+
+impl Span {
+    /// One step of `dt` seconds.
+    fn step(dt: f32) -> Self {
+        let has_time = dt > 0.0;
+        Self {
+            steps: u64::from(has_time),
+            seconds: if has_time { f64::from(dt) } else { 0.0 },
+        }
+    }
+}
+
+impl AddAssign for Span {
+    fn add_assign(&mut self, more: Self) {
+        self.steps += more.steps;
+        self.seconds += more.seconds;
+    }
+}
+
 /// When a surface changed.
 #[derive(Clone, Copy)]
 struct Pace {
-    /// Steps that ended since the last change.
-    age: u64,
-    /// Steps from the change before to the last one; at least 1.
-    interval: u64,
+    /// Since the last change.
+    age: Span,
+    /// From the change before to the last one; at least a step, unless it has no time.
+    interval: Span,
 }
 
 /// Most steps from one sampling to the next that say how fast a surface moves: a camera's 15 frames a
@@ -80,7 +106,7 @@ const LONGEST_INTERVAL: u64 = 8;
 impl Pace {
     /// Whether the next change is not due yet: the surface goes on as it came.
     fn is_moving(&self) -> bool {
-        self.age < self.interval.min(LONGEST_INTERVAL)
+        self.age.steps < self.interval.steps.min(LONGEST_INTERVAL)
     }
 }
 
@@ -118,15 +144,21 @@ impl SurfaceMotions {
         shape: &PointCloudShape,
         dt: f32,
     ) {
-        let mut interval = self.steps_since_change(collider);
+        let mut interval = self.since_change(collider, dt);
         let earlier = (self.motions.iter_mut()).find(|m| m.collider == collider);
-        let is_again = |m: &&mut SurfaceMotion| m.pace.age == 0 && m.before.len() == before.len();
+        let is_again =
+            |m: &&mut SurfaceMotion| m.pace.age.steps == 0 && m.before.len() == before.len();
         if let Some(motion) = earlier.filter(is_again) {
             interval = motion.pace.interval;
             std::mem::swap(&mut motion.before, &mut before);
         }
         self.forget(collider);
-        let seconds = interval as f32 * dt;
+        self.changed_at.insert(collider, self.ended);
+        let seconds = interval.seconds as f32;
+        if seconds <= 0.0 {
+            self.spare.push(before);
+            return;
+        }
         let cloud = shape.cloud();
         let mut velocities = self.spare.pop().unwrap_or_default();
         velocities.clear();
@@ -137,30 +169,39 @@ impl SurfaceMotions {
             revision: shape.revision(),
             before,
             velocities,
-            pace: Pace { age: 0, interval },
+            pace: Pace {
+                age: Span::default(),
+                interval,
+            },
         });
-        self.changed_at.insert(collider, self.steps);
     }
 
-    /// Steps since the points of this collider changed, at least 1. Points that never did are as old as the pipeline.
-    fn steps_since_change(&self, collider: ColliderHandle) -> u64 {
-        let changed_at = self.changed_at.get(&collider).copied();
-        (self.steps - changed_at.unwrap_or(0)).max(1)
+    /// Since the points of this collider changed; at least a step, of `dt` seconds. Points that never did are as old as the
+    /// pipeline.
+    fn since_change(&self, collider: ColliderHandle, dt: f32) -> Span {
+        let changed_at = (self.changed_at.get(&collider).copied()).unwrap_or_default();
+        if changed_at.steps == self.ended.steps {
+            return Span::step(dt);
+        }
+        Span {
+            steps: self.ended.steps - changed_at.steps,
+            seconds: self.ended.seconds - changed_at.seconds,
+        }
     }
 
     /// Records that this collider's surface, sampled by `before`, is sampled anew.
     pub(crate) fn record_sampled(&mut self, collider: ColliderHandle, mut before: Snapshot) {
         self.forget_velocities(collider);
-        self.changed_at.insert(collider, self.steps);
+        self.changed_at.insert(collider, self.ended);
         match self.sampled.iter_mut().find(|m| m.collider == collider) {
             // Twice since the last step: what lay before the first time counts.
-            Some(motion) if motion.pace.age == 0 => self.spare_snapshots.push(before),
+            Some(motion) if motion.pace.age.steps == 0 => self.spare_snapshots.push(before),
             Some(motion) => {
                 before.base_from_points = motion.base_from_points;
                 let earlier = std::mem::replace(&mut motion.before, before);
                 self.spare_snapshots.extend(motion.earlier.replace(earlier));
                 motion.pace = Pace {
-                    age: 0,
+                    age: Span::default(),
                     interval: motion.pace.age,
                 };
             }
@@ -169,9 +210,10 @@ impl SurfaceMotions {
                 before,
                 earlier: None,
                 base_from_points: Pose::IDENTITY,
+                // Without an earlier sample it says nothing.
                 pace: Pace {
-                    age: 0,
-                    interval: 1,
+                    age: Span::default(),
+                    interval: Span::default(),
                 },
             }),
         }
@@ -202,7 +244,7 @@ impl SurfaceMotions {
         bodies: &RigidBodySet,
         colliders: &ColliderSet,
     ) {
-        for motion in self.sampled.iter_mut().filter(|m| m.pace.age == 0) {
+        for motion in self.sampled.iter_mut().filter(|m| m.pace.age.steps == 0) {
             if let Some(collider) = colliders.get(motion.collider) {
                 motion.base_from_points = base_from_collider(collider, bodies);
             }
@@ -226,14 +268,16 @@ impl SurfaceMotions {
 
     /// After a step. Surfaces that change every few steps go on until the next change is due, and stand still from then on.
     pub(crate) fn step_ended(&mut self, colliders: &ColliderSet) {
-        self.steps += 1;
+        let step = Span::step(self.dt);
+        self.ended += step;
         (self.changed_at).retain(|collider, _| colliders.contains(*collider));
         let deformed = self.motions.iter_mut().map(|motion| &mut motion.pace);
         let sampled = self.sampled.iter_mut().map(|motion| &mut motion.pace);
-        deformed.chain(sampled).for_each(|pace| pace.age += 1);
+        deformed.chain(sampled).for_each(|pace| pace.age += step);
         let stopped = (self.motions).extract_if(.., |motion| !motion.pace.is_moving());
         (self.spare).extend(stopped.flat_map(|motion| [motion.before, motion.velocities]));
-        let stopped = (self.sampled).extract_if(.., |motion| motion.pace.age > LONGEST_INTERVAL);
+        let stopped =
+            (self.sampled).extract_if(.., |motion| motion.pace.age.steps > LONGEST_INTERVAL);
         for motion in stopped {
             self.spare_snapshots.push(motion.before);
             self.spare_snapshots.extend(motion.earlier);
@@ -274,11 +318,11 @@ impl SurfaceMotions {
         }
         let sampled = (self.sampled.iter()).find(|m| m.collider == collider && m.pace.is_moving());
         match sampled.and_then(|m| Some((m, m.earlier.as_ref()?))) {
-            Some((motion, earlier)) if self.dt > 0.0 => {
+            Some((motion, earlier)) => {
                 let normal_in_cloud = pose.rotation.inverse() * normal;
                 let now = (shape.cloud(), &motion.base_from_points);
                 let way = way_along(now, [earlier, &motion.before], local, normal_in_cloud);
-                way / (motion.pace.interval as f32 * self.dt) * normal
+                way / motion.pace.interval.seconds as f32 * normal
             }
             _ => Vector::ZERO,
         }

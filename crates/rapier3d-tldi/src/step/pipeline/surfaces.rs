@@ -246,13 +246,8 @@ impl TldiPipeline {
         self.change_shape(colliders, collider, |shape| {
             shape.move_points(points, normals)
         })?;
-        // Without a time there is no velocity.
-        if dt > 0.0 {
-            let after = cloud_of(colliders, collider)?;
-            self.motions.record(collider, before, after, dt);
-        } else {
-            self.motions.forget(collider);
-        }
+        let after = cloud_of(colliders, collider)?;
+        self.motions.record(collider, before, after, dt);
         Ok(())
     }
 }
