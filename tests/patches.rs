@@ -66,6 +66,24 @@ fn a_flat_box_rests_within_its_corners() {
     assert!(beyond.abs() < 0.25, "{beyond} radii beyond the corners");
 }
 
+/// Contact pixels whose normals tell nothing, as a device could return them, are no plane, but not lost either.
+#[test]
+fn contacts_without_normals_make_one_patch() {
+    let mut result = PairResult {
+        axes: vec![Vec3::Z],
+        contacts: vec![ContactPixel::default()],
+        ..PairResult::default()
+    };
+    PatchScratch::default().reduce(&mut result, &Params::for_radius(R));
+    assert_eq!(result.patches.len(), 1);
+    assert!(
+        result.patches[0]
+            .points
+            .iter()
+            .all(|point| point.gap == 0.0)
+    );
+}
+
 /// 25 contact pixels of two level faces that overlap by ten radii, or by half a radius. A view that shows a way out of one
 /// radius leaves only the latter.
 #[test]

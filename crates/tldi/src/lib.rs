@@ -26,7 +26,7 @@ pub use cloud::knn::{KdTree, Neighbor};
 pub use cloud::point_cloud::PointCloud;
 pub use cloud::radii::Radii;
 pub use cloud::recipe::{CloudRecipe, NonFinite, RadiusRule};
-pub use contact::bowl::Lowest;
+pub use contact::bowl::{Floor, Lowest};
 pub use contact::patch_types::{ContactPatch, ContactPixel, ContactPoint, PATCH_POINTS};
 pub use contact::patches::{MAX_PATCHES, PatchScratch, SAME_PLANE};
 pub use contact::supports::{Supports, supports};

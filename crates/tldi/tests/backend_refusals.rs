@@ -53,6 +53,43 @@ fn paper_images_of_more_than_2_to_the_28_pixels() {
     assert_eq!(refusal(aim(), Params::paper(0.01)), None);
 }
 
+/// Of an image of few pixels many large splats do not fit.
+#[test]
+fn paper_images_of_more_than_2_to_the_28_fragments() {
+    let points: Vec<Vec3> = (0..400).map(|k| 0.01 * k as f32 * Vec3::X).collect();
+    let cloud = PointCloud::builder(points).radius(0.5).build();
+    let cloud = cloud.expect("valid");
+    let params = |pixels: f32| Params::paper(0.5).with_pixel_size(1.0 / pixels);
+    let query = |pixels: f32| PairQuery {
+        a: Surface::Cloud(&cloud),
+        b: Surface::Cloud(&cloud),
+        a_from_b: Pose3::IDENTITY,
+        view: aim(),
+        params: params(pixels),
+    };
+    // 400 splats of 1,000² pixels, in an image of 5,000².
+    assert!(
+        query(1_000.0)
+            .check()
+            .is_err_and(|reason| reason.contains("2^28"))
+    );
+    assert_eq!(query(500.0).check(), Ok(()));
+}
+
+/// A splat just in front of a perspective camera reaches over more pixels than there are numbers for; its image is drawn.
+#[test]
+fn splats_larger_than_any_image() {
+    let near = 1e-4;
+    let camera =
+        VirtualCamera::perspective(Vec3::ZERO, Vec3::X, Vec3::Y, 1.0, [1024, 1024], near, 9e3);
+    let cloud = PointCloud::builder(vec![4e-4 * Vec3::X, 5e3 * Vec3::X])
+        .radius(1e3)
+        .build();
+    let cloud = cloud.expect("valid");
+    let image = build(&cloud, &Pose3::IDENTITY, &camera, &Params::for_radius(1e3));
+    assert!(image.max_layers() > 0);
+}
+
 /// Only what is seen in parallel has a size of its own.
 #[test]
 fn perspective_images_without_a_size() {

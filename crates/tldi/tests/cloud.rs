@@ -237,7 +237,7 @@ fn parameters_are_checked() {
         let error = error_of(&points, |b| b.knn_radii(7, scale));
         assert_eq!(name(error), "knn_radii: scale");
     }
-    for sigma in [-1.0, f32::NAN, f32::INFINITY] {
+    for sigma in [-1.0, f32::NAN, f32::INFINITY, 2e12] {
         assert_eq!(name(error_of(&points, |b| b.noise(sigma))), "noise");
     }
     for k in [0, 1] {

@@ -16,7 +16,7 @@ pub enum Radii<'a> {
 
 /// Radii in metres that a cloud accepts: with [`COORDINATE_PER_RADIUS`], squares and cubes of all
 /// lengths stay within the range of `f32`.
-const RADIUS_RANGE: RangeInclusive<f32> = 1e-12..=1e12;
+pub(crate) const RADIUS_RANGE: RangeInclusive<f32> = 1e-12..=1e12;
 
 /// Largest coordinate in units of the point's radius: 2¹⁹, where a step of `f32` (2⁻²³ of the
 /// coordinate, at most) is a sixteenth of the radius.

@@ -1,6 +1,7 @@
 //! What is made of the points of a cloud: now, and of new ones later.
 
 use crate::CloudError;
+use crate::cloud::radii::RADIUS_RANGE;
 use glamx::Vec3;
 
 /// The paper's spherical cover: 0.65 × the distance to the 7th nearest neighbour.
@@ -121,8 +122,9 @@ impl CloudRecipe {
                 );
             }
         }
-        if !(self.noise.is_finite() && self.noise >= 0.0) {
-            let expected = "it is a standard deviation in metres: finite and not negative";
+        if !(0.0..=*RADIUS_RANGE.end()).contains(&self.noise) {
+            let expected =
+                "it is a standard deviation in metres: not negative, and at most 1e12, as radii";
             return bad("noise", self.noise, expected);
         }
         if let Some(k) = self.pca_neighbors.filter(|k| *k < 2) {

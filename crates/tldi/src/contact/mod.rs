@@ -6,6 +6,7 @@ pub(crate) mod gap_fit;
 pub(crate) mod links;
 pub(crate) mod lone_points;
 pub(crate) mod main_plane;
+pub(crate) mod neighbors;
 pub(crate) mod noise;
 pub(crate) mod part_shape;
 pub(crate) mod patch_types;

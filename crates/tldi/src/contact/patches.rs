@@ -5,8 +5,9 @@
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
 use crate::contact::links::{Groups, Links, find_roots};
-use crate::contact::lone_points::{Culled, LonePoints};
+use crate::contact::lone_points::LonePoints;
 use crate::contact::main_plane::LEAST_PLANE;
+use crate::contact::neighbors::Culled;
 use crate::contact::noise::allow_for_noise;
 use crate::contact::part_shape::{Pixels, Shape, ShapeScratch};
 use crate::contact::smooth::{Smooth, smooth};
@@ -188,10 +189,12 @@ impl PatchScratch {
         while let Some(deepest) = self.parts.first()
             && out.len() < MAX_PATCHES
         {
-            let plane = deepest.normal;
+            let (plane, first) = (deepest.normal, deepest.members.start);
             self.patch.clear();
             self.parts.retain(|part| {
-                let in_plane = part.normal.dot(plane) >= SAME_PLANE;
+                // The deepest part's own normal may tell nothing.
+                let is_deepest = part.members.start == first;
+                let in_plane = is_deepest || part.normal.dot(plane) >= SAME_PLANE;
                 if in_plane {
                     let members = &self.groups.members[part.members.clone()];
                     self.patch.extend_from_slice(members);

@@ -252,7 +252,8 @@ impl Tiles {
     /// `reach` is that of the largest splat in pixels, more than 0. Tiles are as small as it allows: with twice the edge,
     /// shallow frames draw up to twice the points.
     pub(crate) fn new(rect: &Rect, reach: f32) -> Self {
-        let edge = reach.ceil() as i32;
+        // No image is wider.
+        let edge = reach.ceil().min(FARTHEST_PIXEL) as i32;
         Self {
             origin: rect.origin.map(|o| o.saturating_sub(edge)),
             edge,

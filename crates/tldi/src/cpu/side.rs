@@ -15,7 +15,7 @@ use super::room::Cost;
 use super::scratch::Shared;
 use super::splat::{DepthScale, Fragments, Imaging, SplatPoints};
 use super::sweep;
-use crate::contact::lone_points::Culled;
+use crate::contact::neighbors::Culled;
 use crate::pair::plan::SidePlan;
 use crate::pair::sampling::{AIM_SAMPLES, is_aim_sample};
 use crate::stage::stage;

@@ -63,9 +63,11 @@ impl PairQuery<'_> {
         {
             return Err("a perspective camera needs an image of fixed size");
         }
-        if self.params.variant() == Variant::Paper && most_pixels(self) > MAX_PIXELS as f64 {
+        if self.params.variant() == Variant::Paper
+            && (most_pixels_and_fragments(self).into_iter()).any(|most| most > MAX_PIXELS as f64)
+        {
             return Err(
-                "the paper's image may have more than 2^28 pixels: use a larger pixel_size, \
+                "the paper's image may have more than 2^28 pixels or fragments: use a larger pixel_size, \
              a smaller image or smaller clouds",
             );
         }
@@ -221,20 +223,25 @@ impl Params {
     }
 }
 
-/// At least the number of pixels that the paper's image of either cloud has, where it follows the clouds.
-fn most_pixels(query: &PairQuery) -> f64 {
-    let pixel_size = match query.view {
-        View::Fixed(camera) if camera.size.is_some() => return 0.0, // checked with the camera
+/// At least the number of pixels and the number of fragments that the paper's image of either cloud has, where it follows
+/// the clouds. Images of fixed size are checked with their camera.
+fn most_pixels_and_fragments(query: &PairQuery) -> [f64; 2] {
+    let pixel_size = f64::from(match query.view {
+        View::Fixed(camera) if camera.size.is_some() => return [0.0; 2],
         View::Fixed(camera) => camera.pixel_size_at(0.0),
         View::Aim { .. } => query.params.pixel_size,
-    };
-    let pixels = |surface: &Surface| match surface {
-        // As seen from any side, and two pixels for rounding outward.
-        Surface::Cloud(cloud) => {
-            let size = cloud.bounds().extents().length() + 2.0 * cloud.max_radius();
-            (f64::from(size) / f64::from(pixel_size) + 2.0).powi(2)
-        }
-        Surface::Exact(_) | Surface::Device(_) => 0.0,
-    };
-    pixels(&query.a).max(pixels(&query.b))
+    });
+    // Two pixels for rounding outward.
+    let square = |size: f32| (f64::from(size) / pixel_size + 2.0).powi(2);
+    let [a, b] = [query.a, query.b].map(|surface| match surface {
+        Surface::Cloud(cloud) => [
+            // As seen from any side.
+            square(cloud.bounds().extents().length() + 2.0 * cloud.max_radius()),
+            (0..cloud.len())
+                .map(|i| square(2.0 * cloud.radius(i)))
+                .sum(),
+        ],
+        Surface::Exact(_) | Surface::Device(_) => [0.0; 2],
+    });
+    [a[0].max(b[0]), a[1].max(b[1])]
 }

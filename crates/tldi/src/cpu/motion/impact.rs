@@ -274,14 +274,14 @@ impl Motion<'_> {
     /// what lies behind.
     fn pass_lone_points(&self, meetings: &mut Vec<Meeting>, lone_points: &mut LonePoints) {
         let b_from_a = self.query.a_from_b.inverse();
+        lone_points.begin();
         let mut is_lone = |meeting: &Meeting| {
             let before = self.point(meeting.pixel, meeting.depth - meeting.distance);
-            let mut of = |surface: &Surface, place: Vec3| match surface {
-                Surface::Cloud(cloud) => lone_points.is_alone(cloud, place),
+            let mut of = |side: usize, place: Vec3| match [self.query.a, self.query.b][side] {
+                Surface::Cloud(cloud) => lone_points.is_alone(side, cloud, place),
                 Surface::Exact(_) | Surface::Device(_) => false,
             };
-            of(&self.query.a, self.point(meeting.pixel, meeting.depth))
-                || of(&self.query.b, b_from_a * before)
+            of(0, self.point(meeting.pixel, meeting.depth)) || of(1, b_from_a * before)
         };
         let mut lone = 0;
         while let Some(meeting) = meetings.get(lone).filter(|meeting| is_lone(meeting)) {

@@ -70,6 +70,16 @@ impl Grid {
         }
     }
 
+    /// Edge of a cell, metres.
+    pub(crate) fn cell(&self) -> f32 {
+        1.0 / self.inv_cell
+    }
+
+    /// Most cells in a row.
+    pub(crate) fn longest(&self) -> usize {
+        self.dims.into_iter().fold(0, usize::max)
+    }
+
     fn cells(&self) -> usize {
         self.dims.iter().product()
     }
@@ -159,6 +169,40 @@ impl Sorted {
             let first = cell + k / 3 * slice + k % 3 * row - slice - row - 1;
             self.offsets[first] as usize..self.offsets[first + 3] as usize
         })
+    }
+}
+
+impl Sorted {
+    /// Hands the points of the cells that are `ring` cells from one of `grid` to `take`, in rows.
+    pub(crate) fn shell(
+        &self,
+        grid: &Grid,
+        cell: usize,
+        ring: usize,
+        mut take: impl FnMut(Range<usize>),
+    ) {
+        let [width, height, depth] = grid.dims;
+        let [x, y, z] = [cell % width, cell / width % height, cell / (width * height)];
+        let span = |c: usize, cells: usize| c.saturating_sub(ring)..(c + ring + 1).min(cells);
+        for k in span(z, depth) {
+            for j in span(y, height) {
+                let row = (k * height + j) * width;
+                let mut take_cells = |cells: Range<usize>| {
+                    let [first, end] = [cells.start, cells.end].map(|c| self.offsets[row + c]);
+                    take(first as usize..end as usize);
+                };
+                let cells = span(x, width);
+                if z.abs_diff(k) == ring || y.abs_diff(j) == ring {
+                    take_cells(cells);
+                    continue;
+                }
+                for end in [x.checked_sub(ring), Some(x + ring)] {
+                    if let Some(end) = end.filter(|end| cells.contains(end)) {
+                        take_cells(end..end + 1);
+                    }
+                }
+            }
+        }
     }
 }
 
