@@ -91,7 +91,10 @@ pub(crate) fn create(
         mapped_at_creation: false,
     });
     match scope.and_then(|scope| pollster::block_on(scope.pop())) {
-        Some(error) => Err(gpu.failed(format!("no memory for {size} bytes of `{name}`: {error}"))),
+        Some(_) => Err(GpuError::OutOfMemory {
+            buffer: name,
+            needed: size,
+        }),
         None => Ok(buffer),
     }
 }
@@ -116,6 +119,6 @@ mod tests {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(&from, 0, &to, 0, from.size());
         gpu.queue.submit([encoder.finish()]);
-        gpu.wait().expect("it is copied");
+        gpu.wait(None).expect("it is copied");
     }
 }

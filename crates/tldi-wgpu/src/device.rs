@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 use tldi::plan::stage_constants;
+use wgpu::SubmissionIndex;
 
 /// How long the device may take for what it was given. Batches take milliseconds; a driver that
 /// imitates a GPU takes seconds for large ones.
@@ -222,17 +223,17 @@ impl Gpu {
         self.check()
     }
 
-    /// Waits until all is done that was submitted.
+    /// Waits until a submission is done, or without one all that was submitted, by whoever shares the device.
     ///
     /// # Errors
     /// [`GpuError::TimedOut`] where that takes too long; the device is not used any more.
     /// [`GpuError::CannotWait`] in a browser.
-    pub(crate) fn wait(&self) -> Result<(), GpuError> {
+    pub(crate) fn wait(&self, submission: Option<SubmissionIndex>) -> Result<(), GpuError> {
         if cfg!(target_arch = "wasm32") {
             return Err(GpuError::CannotWait);
         }
         let outcome = self.device.poll(wgpu::PollType::Wait {
-            submission_index: None,
+            submission_index: submission,
             timeout: Some(self.patience),
         });
         match outcome {
@@ -274,7 +275,7 @@ mod tests {
         let Some(mut gpu) = crate::testing::open() else {
             return;
         };
-        gpu.wait().expect("it is idle");
+        gpu.wait(None).expect("it is idle");
         gpu.patience = Duration::ZERO;
         let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         // Copies of 16 GB take longer than no time.
@@ -284,7 +285,7 @@ mod tests {
             encoder.copy_buffer_to_buffer(&from, 0, &to, 0, 1 << 26);
         }
         gpu.queue.submit([encoder.finish()]);
-        let error = gpu.wait().expect_err("it is not done");
+        let error = gpu.wait(None).expect_err("it is not done");
         assert!(matches!(error, GpuError::TimedOut { .. }), "{error}");
         assert!(error.to_string().contains("TLDI_BACKEND=cpu"), "{error}");
         // From now on.

@@ -96,6 +96,16 @@ pub enum GpuError {
         /// Bytes.
         allowed: u64,
     },
+    /// The device has no memory for a buffer that it allows.
+    #[error(
+        "the GPU has no memory for {needed} bytes of its buffer `{buffer}`: use larger pixels, smaller clouds or fewer pairs a step"
+    )]
+    OutOfMemory {
+        /// What it holds.
+        buffer: &'static str,
+        /// Bytes.
+        needed: u64,
+    },
 }
 
 impl From<GpuError> for BackendError {

@@ -21,9 +21,9 @@ pub(super) struct Run<'q> {
     pub(super) left_to_cpu: Vec<usize>,
     /// Pairs of each part that is not begun yet, the next one last.
     parts: Vec<Vec<usize>>,
-    /// Of the present part: sizes for which there was room, how often it was redone, and what its first
+    /// Sizes for which there was room; how often the present part was redone, and what its first
     /// views needed, where further ones are drawn.
-    fitting: Option<Counters>,
+    fitting: Counters,
     tries: usize,
     pub(super) first_views: Option<Counters>,
 }
@@ -75,7 +75,7 @@ impl WgpuBackend {
             results,
             left_to_cpu,
             parts: vec![self.upload.pairs_of.clone()],
-            fitting: None,
+            fitting: self.capacities,
             tries: 0,
             first_views: None,
         };
@@ -119,7 +119,7 @@ impl WgpuBackend {
         let Some(asked) = &self.asked else {
             return Ok(());
         };
-        self.gpu.wait()?;
+        self.gpu.wait(Some(asked.submission.clone()))?;
         // Whoever shares the device may have been the one to see the end of the work.
         for answer in [Some(&asked.answer), asked.times.as_ref()]
             .into_iter()
@@ -142,7 +142,7 @@ impl WgpuBackend {
                 self.upload.select(&run.batch, part.iter().copied());
             }
             self.times.clear();
-            (run.fitting, run.tries, run.first_views) = (None, 0, None);
+            (run.fitting, run.tries, run.first_views) = (self.capacities, 0, None);
             let placed = self.place(&run.batch).and_then(|()| self.submit());
             if self.is_submitted(run, placed)? {
                 return Ok(true);
@@ -178,15 +178,13 @@ impl WgpuBackend {
     ) -> Result<bool, BackendError> {
         match outcome {
             Ok(()) => {
-                run.fitting = Some(self.capacities);
+                run.fitting = self.capacities;
                 return Ok(true);
             }
-            Err(GpuError::TooLarge { .. }) => {}
+            Err(GpuError::TooLarge { .. } | GpuError::OutOfMemory { .. }) => {}
             Err(error) => return Err(error.into()),
         }
-        if let Some(former) = run.fitting {
-            self.capacities = former;
-        }
+        self.capacities = run.fitting;
         let part = self.upload.pairs_of.clone();
         if part.len() > 1 {
             let (first, second) = part.split_at(part.len() / 2);

@@ -9,10 +9,12 @@ use crate::pipelines::{Pipeline, direct, is_needed};
 use std::ops::Range;
 use tldi_shaders::FURTHER_FROM;
 use tldi_shaders::numbers::{IMAGE_GROUPS, PIXEL_GROUPS, TILE_GROUPS};
+use wgpu::SubmissionIndex;
 
 /// What was submitted and has not come back.
 #[derive(Debug)]
 pub(super) struct Asked {
+    pub(super) submission: SubmissionIndex,
     pub(super) answer: Answer,
     /// Of the timestamps.
     pub(super) times: Option<Answer>,
@@ -158,11 +160,12 @@ impl WgpuBackend {
                 encoder.copy_buffer_to_buffer(found, at - counters, readback, at, bytes);
             }
         }
-        self.gpu.queue.submit([encoder.finish()]);
+        let submission = self.gpu.queue.submit([encoder.finish()]);
         self.traffic.submissions += 1;
         self.traffic.read_back += pairs + to.saturating_sub(from);
         self.gpu.check()?;
         self.asked = Some(Asked {
+            submission,
             answer: Answer::to_reading(readback.slice(..to.max(from))),
             times: (self.timer.as_ref().filter(|_| has_stages)).map(Timer::ask),
             contacts: contacts.end.max(contacts.start),

@@ -28,7 +28,7 @@ pub fn copy_bandwidth(gpu: &Gpu) -> Result<f64, GpuError> {
         }
         let start = Instant::now();
         gpu.queue.submit([encoder.finish()]);
-        gpu.wait()?;
+        gpu.wait(None)?;
         least = least.min(start.elapsed().as_secs_f64());
     }
     Ok(2.0 * BYTES as f64 * f64::from(COPIES) / least)
