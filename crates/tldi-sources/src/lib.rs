@@ -14,8 +14,8 @@
 //! Columns of text: one point a line, columns separated by semicolons (then a comma may be the
 //! decimal mark), else commas, else blanks, as the first line of data shows. Lines that start with
 //! `#` or `//` are comments. Columns are named by a header line, which may be a comment: `x y z`,
-//! and any of `nx ny nz`, `r g b a` (or `red` …), `radius`; others are skipped. Each column has a name: a
-//! comment with another number of words is a sentence, and any other line of names is refused. A first line with
+//! and any of `nx ny nz`, `r g b a` (or `red` …), `radius`; others are skipped. A header names every
+//! column: a comment with another number of words is ignored, and any other such line is refused. A first line with
 //! nothing but the count is passed over, before the header or behind it. Without a header, `xyzrgb`
 //! files have the columns x y z r g b, and `xyzn` files x y z nx ny nz, as Open3D writes them. In
 //! all others, number and values decide:

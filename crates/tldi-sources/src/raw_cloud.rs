@@ -33,11 +33,10 @@ pub struct RawCloud {
     /// What was subtracted from the file's coordinates, in `f64`, before they were narrowed to
     /// `f32`: position in the file = `origin` + point.
     ///
-    /// Unless [`ReadOptions::origin`](crate::ReadOptions::origin) fixes it, it is zero on each axis
-    /// but where the file's type of number is wider than `f32` (always so in text and LAS) and the
-    /// median of its first 1,024 coordinates is farther than 4,096 units from zero: there, `f32`
-    /// steps would reach half a millimetre in metres. It is then that median, rounded to a whole
-    /// number. Put it into the pose of the body.
+    /// Unless [`ReadOptions::origin`](crate::ReadOptions::origin) fixes it, it is zero on each axis,
+    /// with one exception: the file's type of number is wider than `f32` (always so in text and LAS), and the
+    /// median of the first 1,024 coordinates is farther than 4,096 units from zero, where steps of `f32`
+    /// reach half a millimetre in metres. There it is that median, rounded to a whole number. Put it into the pose of the body.
     pub origin: DVec3,
     /// Where the sensor was, relative to `origin`, if the file tells it for all points together: `VIEWPOINT` of a PCD
     /// file, or the pose of an E57 file's only scan. Where these do not turn, they count only for points that
