@@ -3,6 +3,8 @@
 mod common;
 
 use common::{folder, lines, ply, stderr};
+use rapier3d::prelude::ColliderSet;
+use rapier3d_urdf::{UrdfLoaderOptions, UrdfRobot};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -134,6 +136,60 @@ fn what_a_urdf_leaves_out_does_not_end_it() {
         "{warnings}"
     );
     assert_eq!(robot.warnings.len(), 2, "{warnings}");
+}
+
+/// A thick rod whose inertia is told about axes of its own: in the world's engine it lies where these say. The mass of a
+/// box has no inertia, and gets that about the axes of its link.
+#[test]
+fn inertias_are_about_the_axes_that_their_origin_tells() {
+    let [roll, pitch, yaw] = [0.7_f32, -0.4, 1.9];
+    let origin = format!(r#"<origin xyz="0.1 0 0" rpy="{roll} {pitch} {yaw}"/>"#);
+    let link = |name: &str, inertial: &str| {
+        let joint = format!(
+            r#"<joint name="to_{name}" type="fixed"><parent link="base"/><child link="{name}"/></joint>"#
+        );
+        format!(
+            r#"<link name="{name}"><inertial>{origin}<mass value="12"/>{inertial}</inertial>
+               <visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual></link>{joint}"#
+        )
+    };
+    // Along z.
+    let rod = r#"<inertia ixx="0.3" ixy="0" ixz="0" iyy="0.3" iyz="0" izz="0.1"/>"#;
+    let [rod, cuboid] = [link("rod", rod), link("cuboid", "")];
+    let robot = read(
+        &format!(r#"<robot name="r">{BASE}{rod}{cuboid}</robot>"#),
+        Path::new(""),
+    );
+    let urdf = &robot.unwrap().urdf;
+    let engine = UrdfRobot::from_robot(urdf, UrdfLoaderOptions::default(), Path::new(""));
+    // The z axis after a turn by `roll` about x, then by `pitch` about y, then by `yaw` about z.
+    let [(sr, cr), (sp, cp), (sy, cy)] = [roll, pitch, yaw].map(f32::sin_cos);
+    let along = Vec3::new(cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr);
+    let of_rod = |a: Vec3| a.length_squared() * 0.3 - 0.2 * a.dot(along).powi(2);
+    // m / 12 (a² + b²).
+    let of_box = |a: Vec3| (a * a).dot(Vec3::new(0.13, 0.1, 0.05));
+    let along_it: [(usize, &dyn Fn(Vec3) -> f32); 2] = [(1, &of_rod), (2, &of_box)];
+    for (link, expected) in along_it {
+        let mut body = engine.links[link].body.clone();
+        body.recompute_mass_properties_from_colliders(&ColliderSet::new());
+        let found = body.mass_properties().local_mprops;
+        assert!(found.local_com.distance(0.1 * Vec3::X) < 1e-6);
+        let found = found.reconstruct_inertia_matrix();
+        for axis in [
+            Vec3::X,
+            Vec3::Y,
+            Vec3::Z,
+            Vec3::ONE,
+            Vec3::new(1.0, -2.0, 0.5),
+        ] {
+            let moment = axis.dot(found * axis);
+            // The engine keeps the square roots of inverses, and a turn, as `f32`.
+            assert!(
+                (moment - expected(axis)).abs() < 1e-4,
+                "{link} {axis}: {moment}"
+            );
+        }
+    }
 }
 
 /// A joint that turns or slides needs limits; without them it stands still, which is said.

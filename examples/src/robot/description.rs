@@ -2,6 +2,7 @@
 
 use super::completed::completed;
 use super::geometry::{Problem, mesh_of};
+use super::inertia::{align_inertia, fill_inertia};
 use super::kinematics::{JointKind, JointModel, Kinematics};
 use super::packages::MeshFolders;
 use crate::mesh::Mesh;
@@ -18,7 +19,7 @@ pub const BUILT_IN: &str = include_str!("built_in.urdf");
 
 /// A robot that was read.
 pub struct Description {
-    /// As in the file.
+    /// As in the file, but for limits that were swapped, and inertias, which are about the axes of their links.
     pub urdf: urdf_rs::Robot,
     /// Its joints.
     pub kinematics: Kinematics,
@@ -100,6 +101,7 @@ impl Description {
             .map(|link| link_mesh(link, folders, &mut missing, &mut warnings))
             .collect();
         warnings.extend(folders.missing(&missing));
+        align_inertia(&mut urdf);
         fill_inertia(&mut urdf, &meshes, &mut warnings);
         if meshes.iter().all(|mesh| mesh.faces.is_empty()) {
             return Err(DescriptionError::NoGeometry(warnings));
@@ -139,25 +141,6 @@ fn check_limits(urdf: &mut urdf_rs::Robot, warnings: &mut Vec<String>) {
                 "joint {} cannot move: its <limit> is missing, or `lower` and `upper` are equal",
                 joint.name
             ));
-        }
-    }
-}
-
-/// A mass without inertia would turn like nothing, or not at all: it gets that of a solid box around its link.
-fn fill_inertia(urdf: &mut urdf_rs::Robot, meshes: &[Mesh], warnings: &mut Vec<String>) {
-    for (link, mesh) in urdf.links.iter_mut().zip(meshes) {
-        let (mass, inertia) = (link.inertial.mass.value, &mut link.inertial.inertia);
-        let is_zero = [inertia.ixx, inertia.iyy, inertia.izz] == [0.0; 3];
-        if mass > 0.0 && is_zero && !mesh.faces.is_empty() {
-            warnings.push(format!(
-                "link {}: its mass has no inertia: that of a box around it is used",
-                link.name
-            ));
-            let [x, y, z] = mesh.bounds().extents().to_array().map(f64::from);
-            let moment = |a: f64, b: f64| mass / 12.0 * (a * a + b * b);
-            inertia.ixx = moment(y, z);
-            inertia.iyy = moment(x, z);
-            inertia.izz = moment(x, y);
         }
     }
 }

@@ -4,6 +4,7 @@ mod assembly;
 mod completed;
 mod description;
 mod geometry;
+mod inertia;
 mod kinematics;
 mod links;
 mod loose_bodies;
