@@ -192,6 +192,58 @@ fn inertias_are_about_the_axes_that_their_origin_tells() {
     }
 }
 
+/// The first joint follows the second, which follows the third; two more follow each other. A follower's numbers are
+/// finite, alone and along its chain.
+#[test]
+fn mimics_of_mimics_follow_the_joint_at_the_end() {
+    let joint = |k: usize, mimic: &str| {
+        format!(
+            r#"<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="base"/><child link="l{k}"/>
+              <axis xyz="0 0 1"/><limit lower="-9" upper="9" effort="5" velocity="1"/>{mimic}</joint>"#
+        )
+    };
+    let read_with = |mimics: [&str; 5]| {
+        let joints: String = (mimics.iter().enumerate())
+            .map(|(k, mimic)| joint(k, mimic))
+            .collect();
+        read(
+            &format!(r#"<robot name="r">{BASE}{joints}</robot>"#),
+            Path::new(""),
+        )
+    };
+    let second = r#"<mimic joint="j2" multiplier="-0.5" offset="1"/>"#;
+    let robot = read_with([
+        r#"<mimic joint="j1" multiplier="2" offset="0.25"/>"#,
+        second,
+        "",
+        r#"<mimic joint="j4"/>"#,
+        r#"<mimic joint="j3" multiplier="3"/>"#,
+    ])
+    .unwrap();
+    let mut positions = [7.0, 7.0, 0.8, 0.1, 0.2];
+    robot.kinematics.follow(&mut positions);
+    // -0.5 · 0.8 + 1, and twice that and a quarter.
+    for (found, expected) in positions.iter().zip([1.45, 0.6, 0.8, 0.1, 0.2]) {
+        assert!((found - expected).abs() < 1e-5, "{positions:?}");
+    }
+    assert_eq!(robot.warnings.len(), 2, "{:?}", robot.warnings);
+    let expected = "joint j3 cannot mimic j4, which follows it: it is driven by itself";
+    assert_eq!(robot.warnings[0], expected);
+    for bad in [
+        r#"<mimic joint="j1" multiplier="NaN"/>"#,
+        r#"<mimic joint="j1" offset="inf"/>"#,
+        r#"<mimic joint="none" offset="NaN"/>"#,
+        r#"<mimic joint="j1" multiplier="1e300"/>"#,
+    ] {
+        let error = read_with([bad, second, "", "", ""]).err().unwrap();
+        assert_eq!(error, "joint j0 has a number that is not finite", "{bad}");
+    }
+    let [far, farther] = ["j1", "j2"]
+        .map(|leader| format!(r#"<mimic joint="{leader}" multiplier="1e30" offset="0"/>"#));
+    let error = read_with([&far, &farther, "", "", ""]).err().unwrap();
+    assert_eq!(error, "joint j0 has a number that is not finite");
+}
+
 /// A joint that turns or slides needs limits; without them it stands still, which is said.
 #[test]
 fn joints_without_room_are_told() {

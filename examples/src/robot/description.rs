@@ -4,6 +4,7 @@ use super::completed::completed;
 use super::geometry::{Problem, mesh_of};
 use super::inertia::{align_inertia, fill_inertia};
 use super::kinematics::{JointKind, JointModel, Kinematics};
+use super::mimic::{Mimic, follows_itself, resolved};
 use super::packages::MeshFolders;
 use crate::mesh::Mesh;
 use rapier3d_urdf::urdf_rs;
@@ -190,20 +191,7 @@ fn kinematics_of(
         let (parent, child) = (link(&joint.parent.link)?, link(&joint.child.link)?);
         joints.push(joint_model(joint, parent, child, warnings)?);
     }
-    for (k, joint) in urdf.joints.iter().enumerate() {
-        let Some(mimic) = &joint.mimic else { continue };
-        let leader = joint_of.get(&mimic.joint).copied();
-        match leader.filter(|&leader| leader != k && joints[leader].kind.is_driven()) {
-            Some(leader) if joints[k].kind.is_driven() => {
-                let multiplier = mimic.multiplier.unwrap_or(1.0) as f32;
-                joints[k].mimic = Some((leader, multiplier, mimic.offset.unwrap_or(0.0) as f32));
-            }
-            _ => warnings.push(format!(
-                "joint {} cannot mimic {}: it is driven by itself",
-                joint.name, mimic.joint
-            )),
-        }
-    }
+    set_mimics(urdf, &joint_of, &mut joints, warnings)?;
     check_root(urdf, &joints)?;
     let kinematics = Kinematics::new(urdf.links.len(), joints);
     if !kinematics.is_connected() {
@@ -211,6 +199,45 @@ fn kinematics_of(
         return Err(DescriptionError::NotATree(loops));
     }
     Ok(kinematics)
+}
+
+/// Tells joints which one they follow, all through chains of mimics. Those that cannot are named.
+fn set_mimics(
+    urdf: &urdf_rs::Robot,
+    joint_of: &HashMap<&String, usize>,
+    joints: &mut [JointModel],
+    warnings: &mut Vec<String>,
+) -> Result<(), DescriptionError> {
+    let told = |(k, joint): (usize, &urdf_rs::Joint)| {
+        let mimic = joint.mimic.as_ref()?;
+        let leader = *joint_of.get(&mimic.joint)?;
+        let is_driven = [k, leader].iter().all(|&k| joints[k].kind.is_driven());
+        let numbers = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
+        is_driven.then_some((leader, numbers.0, numbers.1))
+    };
+    let told: Vec<Option<Mimic>> = urdf.joints.iter().enumerate().map(told).collect();
+    let mimics = resolved(&told);
+    for (k, joint) in urdf.joints.iter().enumerate() {
+        let Some(mimic) = &joint.mimic else { continue };
+        joints[k].mimic = mimics[k].map(|(root, by, offset)| (root, by as f32, offset as f32));
+        let own = [mimic.multiplier, mimic.offset].into_iter().flatten();
+        let composed = (joints[k].mimic.iter()).flat_map(|(_, by, offset)| [*by, *offset]);
+        let mut numbers = own.map(|number| number as f32).chain(composed);
+        if !numbers.all(f32::is_finite) {
+            return Err(DescriptionError::NotFinite(format!("joint {}", joint.name)));
+        }
+        if mimics[k].is_none() {
+            let reason = match follows_itself(&told, k) {
+                true => ", which follows it",
+                false => "",
+            };
+            warnings.push(format!(
+                "joint {} cannot mimic {}{reason}: it is driven by itself",
+                joint.name, mimic.joint
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// The index of each name.

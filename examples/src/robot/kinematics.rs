@@ -47,7 +47,7 @@ pub struct JointModel {
     pub max_effort: Option<f32>,
     /// Largest speed, per second, if the URDF says.
     pub max_speed: Option<f32>,
-    /// The joint that it follows, with multiplier and offset.
+    /// The joint that it follows, which follows none, with multiplier and offset.
     pub mimic: Option<(usize, f32, f32)>,
 }
 

@@ -8,6 +8,7 @@ mod inertia;
 mod kinematics;
 mod links;
 mod loose_bodies;
+mod mimic;
 mod model;
 mod motion;
 mod own_camera;
