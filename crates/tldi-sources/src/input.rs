@@ -9,8 +9,15 @@ use std::rc::Rc;
 /// Bytes fetched at once, and the most that [`Input::bytes`] can give.
 pub(crate) const BUFFER_SIZE: usize = 1 << 17;
 
-/// How a stream that is packed with gzip begins.
-pub(crate) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+/// Bytes of a stream that tell whether it is packed.
+pub(crate) const GZIP_START: usize = 4;
+
+/// Whether a stream that starts so is packed with gzip (RFC 1952): its mark, the only method there is, and flags whose
+/// reserved bits are zero. As an `f32`, which files without a header start with, this is less than 10⁻¹⁹.
+pub(crate) fn is_gzip(start: &[u8]) -> bool {
+    const RESERVED: u8 = 0b1110_0000;
+    matches!(start, [0x1f, 0x8b, 8, flags, ..] if flags & RESERVED == 0)
+}
 
 /// Longest line in bytes: a face with some ten thousand corners fits.
 pub(crate) const MAX_LINE: usize = BUFFER_SIZE;

@@ -1,6 +1,6 @@
 //! Points that move: a deforming mesh as a NumPy array or as a folder of clouds.
 
-use crate::input::GZIP_MAGIC;
+use crate::input::is_gzip;
 use crate::scalar::{Endian, Scalar, unsigned};
 use crate::{ReadOptions, SourceError, numbered_order, origin};
 use flate2::read::MultiGzDecoder;
@@ -205,7 +205,7 @@ fn read_npy(path: &Path) -> Result<MovingPoints, MovingError> {
         source,
     };
     let mut raw = BufReader::new(File::open(path).map_err(io)?);
-    let is_packed = raw.fill_buf().map_err(io)?.starts_with(&GZIP_MAGIC);
+    let is_packed = is_gzip(raw.fill_buf().map_err(io)?);
     let frames = if is_packed {
         npy_frames(MultiGzDecoder::new(raw))
     } else {

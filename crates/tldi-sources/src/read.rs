@@ -1,12 +1,12 @@
 //! The entry points: opens, unpacks, tells the format, and calls its parser.
 
 use crate::error::Result;
-use crate::input::{Counted, GZIP_MAGIC, Input};
+use crate::input::{Counted, GZIP_START, Input, is_gzip};
 use crate::options::extension;
 use crate::{Format, Position, Progress, RawCloud, ReadOptions, SourceError, SourceErrorKind};
 use flate2::bufread::MultiGzDecoder;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 
 /// Bytes looked at to tell the format: comments may precede the first entry of a PCD file.
@@ -88,10 +88,13 @@ fn open<'a>(
     let counted = Counted::new(reader);
     let counter = counted.counter();
     let mut buffered = BufReader::new(counted);
-    let start = buffered
-        .fill_buf()
+    // A pipe may give less at first.
+    let mut start = Vec::new();
+    (buffered.by_ref().take(GZIP_START as u64))
+        .read_to_end(&mut start)
         .map_err(|e| SourceErrorKind::Io(e).at(Position::Byte(0)))?;
-    let gzip = start.starts_with(&GZIP_MAGIC);
+    let gzip = is_gzip(&start);
+    let buffered = Cursor::new(start).chain(buffered);
     let source: Box<dyn Read + 'a> = if gzip {
         Box::new(MultiGzDecoder::new(buffered))
     } else {

@@ -4,6 +4,7 @@ mod common;
 
 use common::{Bytes, Order, gzip, parse};
 use fastrand::Rng;
+use std::io::{self, Read};
 use tldi::glamx::{Mat3, Vec3};
 use tldi_sources::{Format, RawCloud, ReadOptions, SourceErrorKind, read_from};
 
@@ -57,6 +58,47 @@ fn sweeps_are_records_of_four_numbers() {
         Format::from_extension("sweeps/000000.bin.gz"),
         Some(Format::Kitti)
     );
+}
+
+/// The first coordinate has bytes of gzip's mark.
+#[test]
+fn a_sweep_may_start_as_gzip_does() {
+    for [method, flags] in [
+        [0x08, 0x3f],
+        [0x08, 0xbf],
+        [0x42, 0x40],
+        [0x2c, 0x00],
+        [0x08, 0x20],
+    ] {
+        let x = f32::from_le_bytes([0x1f, 0x8b, method, flags]);
+        let mut file = Bytes::after("", Order::Little);
+        file.f32(x).f32(2.0).f32(3.0).f32(0.5);
+        for bytes in [file.bytes.clone(), gzip(&file.bytes)] {
+            let cloud = parse(&bytes, Format::Kitti).expect("sound");
+            assert_eq!(cloud.points, [Vec3::new(x, 2.0, 3.0)]);
+        }
+    }
+}
+
+/// A pipe that gives a byte at a time.
+struct Trickle<'a>(&'a [u8]);
+
+impl Read for Trickle<'_> {
+    fn read(&mut self, target: &mut [u8]) -> io::Result<usize> {
+        let one = target.len().min(1);
+        self.0.read(&mut target[..one])
+    }
+}
+
+#[test]
+fn a_packed_stream_may_come_byte_by_byte() {
+    let mut file = Bytes::after("", Order::Little);
+    file.f32(1.0).f32(2.0).f32(3.0).f32(0.5);
+    let packed = gzip(&file.bytes);
+    let stream = Trickle(&packed);
+    let options = ReadOptions::default();
+    let cloud = read_from(stream, Format::Kitti, &options, &mut |_| {}).expect("sound");
+    assert_eq!(cloud.points, [Vec3::new(1.0, 2.0, 3.0)]);
 }
 
 /// nuScenes: five numbers a point, the last of which is the ring.
