@@ -1,6 +1,6 @@
 //! Depth frames become a collider that is new in every frame; bodies rest on it and are pushed.
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -8,8 +8,8 @@ use tldi::glamx::{Pose3, Vec3};
 use tldi::{PointCloud, VirtualCamera};
 use tldi_examples::cli::{Common, RangeArgument, UpChoice, ended, positive, within};
 use tldi_examples::depth::{
-    DepthScene, DepthSimulation, DepthSnapshot, FRAME_SECONDS, FrameSource, GeneratedCamera,
-    WantedBodies, camera_up,
+    DepthScene, DepthSimulation, DepthSnapshot, FRAME_SECONDS, FirstSeen, FrameSource,
+    GeneratedCamera, WantedBodies, camera_up,
 };
 use tldi_examples::output;
 use tldi_examples::pictures::{self, ANIMATION_SIZE, Entity, PICTURE_SIZE};
@@ -35,7 +35,7 @@ struct Args {
     /// Width of the bodies in metres; if left out, what the frames resolve
     #[arg(long, value_name = "M", value_parser = positive, allow_hyphen_values = true)]
     size: Option<f32>,
-    /// Seconds for which the first frame stays, so that the bodies land before things move
+    /// Seconds for which the first frame with points stays, so that the bodies land before things move
     #[arg(long, value_name = "S", default_value_t = 1.5, value_parser = within(0.0, 3600.0), allow_hyphen_values = true)]
     hold: f32,
     /// Remember the points of this many frames where the present one does not see
@@ -47,7 +47,7 @@ struct Args {
     /// Nearest and farthest depth that is believed, metres; 0.3,8 if left out
     #[arg(long, value_name = "NEAR,FAR", allow_hyphen_values = true)]
     range: Option<RangeArgument>,
-    /// Direction against gravity in the world of the poses; auto finds it in the first frame
+    /// Direction against gravity in the world of the poses; auto finds it in the first frame with points
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -80,24 +80,27 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> anyhow::Result<()> {
     args.common.check_outputs()?;
-    let (source, missing) = open(args)?;
+    let (source, mut missing) = open(args)?;
     let model = SensorModel {
         noise: args.sensor_noise,
         range: (args.range).map_or(SensorModel::default().range, |RangeArgument(range)| range),
         ..SensorModel::default()
     };
     let mut camera = DepthCamera::new(source.intrinsics(), model);
-    let first = source.frame(0)?;
-    let seen = camera.points(&first.depths, &first.world_from_camera);
-    if seen.points.is_empty() {
-        bail!(
-            "{} has no measurement between {} and {} m: is the depth unit right? Else give a --range",
-            first.name,
-            model.range[0],
-            model.range[1]
+    let FirstSeen {
+        index: start,
+        frame: first,
+        cloud,
+        empty,
+    } = source.first_seen(&mut camera)?;
+    if start > 0 {
+        eprintln!(
+            "warning: the {start} frames before {} have no points",
+            first.name
         );
+        missing.extend(empty);
     }
-    let cloud = seen.into_builder().build()?.into_owned();
+    let cloud = cloud.into_builder().build()?.into_owned();
     let up = match args.up {
         UpChoice::Given(up) => up,
         UpChoice::Auto => find_up(&cloud, &first.world_from_camera)?,
@@ -118,7 +121,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
     };
     let mut simulation = DepthSimulation::new(scene, &first, args.common.backend.open()?)?;
     let recording = args.recording.start("depth_camera", up)?;
-    let snapshots = simulate(&mut simulation, &source, recording, args)?;
+    let snapshots = simulate(&mut simulation, &source, start, recording, args)?;
     let report = simulation.report(missing);
     output::publish(&report, source.origin(), args.common.json.as_deref())?;
     if !args.common.no_pictures {
@@ -164,18 +167,19 @@ fn find_up(frame: &PointCloud<'_>, world_from_camera: &Pose3) -> anyhow::Result<
     Ok(up.direction)
 }
 
-/// Shows all frames; snapshots before the first, at three fifths and after the last or, for an
+/// Shows all frames from `start` on; snapshots before the first, at three fifths and after the last or, for an
 /// animation, after every [`ANIMATION_FRAMES`].
 fn simulate(
     simulation: &mut DepthSimulation,
     source: &FrameSource,
+    start: usize,
     mut recording: Option<Recording>,
     args: &Args,
 ) -> anyhow::Result<Vec<DepthSnapshot>> {
     let held = (args.hold / FRAME_SECONDS).round() as usize;
-    let all = held + source.count();
+    let all = held + source.count() - start;
     let mut snapshots = vec![simulation.snapshot(1)?];
-    let order = std::iter::repeat_n(0, held).chain(0..source.count());
+    let order = std::iter::repeat_n(start, held).chain(start..source.count());
     for (k, index) in output::with_progress(order.enumerate(), "frames") {
         let frame = source.frame(index)?;
         (simulation.take_frame(&frame)).with_context(|| format!("{} failed", frame.name))?;

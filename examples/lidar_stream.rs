@@ -29,7 +29,7 @@ struct Args {
     /// Most sweeps to take
     #[arg(long, value_name = "N", default_value = "30")]
     count: NonZeroUsize,
-    /// Direction against gravity in the frame of the poses; auto takes the z axis of the first sweep
+    /// Direction against gravity in the frame of the poses; auto takes the z axis of the first sweep with points
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -69,12 +69,18 @@ fn run(args: &Args) -> anyhow::Result<()> {
         None => SweepSource::Generated(Scanner::new(args.count.get(), args.common.seed)),
     };
     let count = source.count().min(args.count.get());
-    let (first, last) = (source.sweep(0)?, source.sweep(count - 1)?);
+    let [(start, first), (_, last)] = source.ends(count)?;
+    if start > 0 {
+        eprintln!(
+            "warning: the {start} sweeps before {} have no points",
+            first.name
+        );
+    }
     let up = (args.up).or_else(|| first.world_from_scanner.rotation * Vec3::Z);
     let (bodies, spots) = place_bodies(args, up, [&first, &last])?;
     let backend = args.common.backend.open()?;
     let mut simulation = LidarSimulation::new(bodies, &spots, up, args.range, backend)?;
-    for index in output::with_progress(0..count, "sweeps") {
+    for index in output::with_progress(start..count, "sweeps") {
         let sweep = source.sweep(index)?;
         (simulation.take(&sweep)).with_context(|| format!("sweep {} failed", sweep.name))?;
     }
@@ -91,7 +97,7 @@ fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Bodies, and places for them that the first and the last sweep see: where the scanner drives, it loses
+/// Bodies, and places for them that the first and the last sweep with points see: where the scanner drives, it loses
 /// sight of the ground.
 fn place_bodies(
     args: &Args,

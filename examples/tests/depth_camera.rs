@@ -77,6 +77,26 @@ fn a_frame_without_points_is_passed_over() {
     assert_height(&report, 0.35);
 }
 
+/// The run starts with the first frame in which something was measured, and those before it are named.
+#[test]
+fn a_run_starts_with_the_first_frame_that_has_points() {
+    let folder = folder("depth_starts_empty");
+    write_frames(&folder.join("frames"), &[true; 10]);
+    for name in ["000.png", "001.png"] {
+        write_image(&folder.join("frames").join(name), |_, _| 0);
+    }
+    let report = report(BINARY, &folder, &format!("{ONE_BODY} frames"));
+    let frames = list(&report["frames"]);
+    assert_eq!(
+        (frames.len(), &frames[0]["name"]),
+        (38, &frames[30]["name"])
+    );
+    assert_eq!(frames[30]["name"], "002.png");
+    let missing = serde_json::json!(["000.png", "001.png"]);
+    assert_eq!(report["missing_frames"], missing);
+    assert_height(&report, 0.35);
+}
+
 /// A body lies on the plate; the plate leaves the view, and the body falls to the floor.
 #[test]
 fn what_is_gone_from_the_frame_does_not_hold() {
@@ -170,7 +190,11 @@ fn the_range_can_be_set() {
     let options = "--frames frames --count 0 --hold 0 --up 0,0,1";
     let ranged = |range| format!("{options} --range {range}");
     let cases = [
-        (options, 1, "between 0.3 and 8 m"),
+        (
+            options,
+            1,
+            "none of the 2 frames has a point between 0.3 and 8 m",
+        ),
         (&ranged("1,14"), 1, "between 1 and 14 m"),
         (&ranged("14,1"), 2, "the nearest and the farthest"),
     ];

@@ -79,6 +79,35 @@ fn a_folder_of_sweeps_is_read_with_its_poses() {
     assert_on_ground(&report, 0.02);
 }
 
+/// Sweeps without points: files of no bytes, and rays that all met nothing. Bodies lie where the last sweep with points
+/// was; the run starts at the first.
+#[test]
+fn sweeps_without_points_are_passed_over() {
+    let folder = folder("lidar_empty");
+    write_sweeps(&folder, 12);
+    for k in [0, 1, 5, 11] {
+        fs::write(folder.join(format!("{k:06}.bin")), []).unwrap();
+    }
+    fs::write(folder.join("000007.bin"), [0; 160]).unwrap();
+    let report = report(BINARY, &folder, "--sweeps . --bodies 2 --size 0.6");
+    let sweeps = list(&report["sweeps"]);
+    assert_eq!(sweeps[0]["name"], "000002");
+    assert_eq!(sweeps.len(), 10);
+    for (k, sweep) in sweeps.iter().enumerate() {
+        let expected = match [3, 5, 9].contains(&k) {
+            true => 0,
+            false => 121 * 121,
+        };
+        assert_eq!(sweep["points"], expected, "{sweep}");
+    }
+    assert_on_ground(&report, 0.02);
+    for k in 0..12 {
+        fs::write(folder.join(format!("{k:06}.bin")), []).unwrap();
+    }
+    let case = ("--sweeps .", 1, "none of the 12 sweeps has a point");
+    assert_refused(BINARY, &folder, &[case]);
+}
+
 /// Asserts that the first point of every sweep, the grid's, is one place in the world.
 fn assert_first_points(source: &SweepSource, place: Vec3) {
     for k in 0..source.count() {

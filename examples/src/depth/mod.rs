@@ -15,4 +15,4 @@ pub use placing::WantedBodies;
 pub use registered::{RegisteredFrames, TruePixel};
 pub use report::{DepthReport, FrameReport};
 pub use simulation::{DepthScene, DepthSimulation, DepthSnapshot, FRAME_SECONDS};
-pub use source::{FrameSource, TimedFrame};
+pub use source::{FirstSeen, FrameSource, NothingSeen, TimedFrame};

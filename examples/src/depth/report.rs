@@ -22,7 +22,7 @@ pub struct DepthReport {
     pub max_penetration: f32,
     /// The deepest contacts after a step, by kind.
     pub deepest: ContactKinds,
-    /// Frames that are listed but not there, or without a pose.
+    /// Frames that are listed but not there, without a pose, or without a point before the first that has some.
     pub missing_frames: Vec<String>,
     /// Median of the frames' `latency_ms`.
     pub median_latency_ms: f64,

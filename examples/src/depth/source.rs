@@ -3,8 +3,9 @@
 use super::generated::GeneratedCamera;
 use anyhow::Context;
 use std::time::Instant;
+use thiserror::Error;
 use tldi::glamx::{DVec3, Pose3};
-use tldi_sources::depth::{DepthSequence, Intrinsics};
+use tldi_sources::depth::{DepthCamera, DepthCloud, DepthSequence, Intrinsics};
 
 /// Frames in order.
 pub enum FrameSource {
@@ -12,6 +13,31 @@ pub enum FrameSource {
     Folder(DepthSequence),
     /// Computed.
     Generated(GeneratedCamera),
+}
+
+/// No frame shows a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[error(
+    "none of the {frames} frames has a point between {} and {} m: is the depth unit right? Else give a --range",
+    .range[0], .range[1]
+)]
+pub struct NothingSeen {
+    /// Number of frames.
+    pub frames: usize,
+    /// Nearest and farthest depth that is believed, metres.
+    pub range: [f32; 2],
+}
+
+/// The first frame that shows a surface.
+pub struct FirstSeen {
+    /// Its index.
+    pub index: usize,
+    /// The frame.
+    pub frame: TimedFrame,
+    /// Its points in the world, metres.
+    pub cloud: DepthCloud,
+    /// Names of the frames before it, which have no points.
+    pub empty: Vec<String>,
 }
 
 /// A frame, and how long it took to get.
@@ -49,6 +75,32 @@ impl FrameSource {
             Self::Folder(sequence) => sequence.intrinsics,
             Self::Generated(camera) => camera.intrinsics(),
         }
+    }
+
+    /// The first frame in which the camera sees points.
+    ///
+    /// # Errors
+    /// [`NothingSeen`] if there is none, and those of reading a file.
+    pub fn first_seen(&self, camera: &mut DepthCamera) -> anyhow::Result<FirstSeen> {
+        let mut empty = Vec::new();
+        for index in 0..self.count() {
+            let frame = self.frame(index)?;
+            let cloud = camera.points(&frame.depths, &frame.world_from_camera);
+            if !cloud.points.is_empty() {
+                return Ok(FirstSeen {
+                    index,
+                    frame,
+                    cloud,
+                    empty,
+                });
+            }
+            empty.push(frame.name);
+        }
+        Err(NothingSeen {
+            frames: self.count(),
+            range: camera.model.range,
+        }
+        .into())
     }
 
     /// Gets a frame.

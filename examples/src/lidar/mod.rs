@@ -8,4 +8,4 @@ mod source;
 pub use generated::Scanner;
 pub use report::{LidarBody, LidarReport, SweepReport};
 pub use simulation::LidarSimulation;
-pub use source::{SeenSweep, Sweep, SweepSource, recipe};
+pub use source::{NothingSeen, SeenSweep, Sweep, SweepSource, recipe};

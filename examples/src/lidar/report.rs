@@ -29,7 +29,7 @@ pub struct LidarReport {
 pub struct SweepReport {
     /// What it is called.
     pub name: String,
-    /// Points of the collider.
+    /// Points that the collider takes of it; with none, it keeps those of the last sweep.
     pub points: usize,
     /// Points that were not finite.
     pub dropped: usize,

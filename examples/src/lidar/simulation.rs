@@ -67,28 +67,34 @@ impl LidarSimulation {
         })
     }
 
-    /// Takes a sweep, and the steps until the next one.
+    /// Takes a sweep, and the steps until the next one. A sweep without points in range is passed over: the last surface
+    /// stays.
     ///
     /// # Errors
     /// Those of the stream and of the steps.
     pub fn take(&mut self, sweep: &Sweep) -> Result<(), TldiError> {
         let start = Instant::now();
         let seen = sweep.within(self.range);
-        let taken = self.stream.frame(
-            &mut self.stage.tldi,
-            &self.stage.world.bodies,
-            &mut self.stage.world.colliders,
-            seen.as_points(),
-            &sweep.world_from_scanner,
-        )?;
+        let points = if seen.points.iter().any(|point| point.is_finite()) {
+            let taken = self.stream.frame(
+                &mut self.stage.tldi,
+                &self.stage.world.bodies,
+                &mut self.stage.world.colliders,
+                seen.as_points(),
+                &sweep.world_from_scanner,
+            )?;
+            taken.points
+        } else {
+            0
+        };
         let update_ms = milliseconds(start);
         let dropped = sweep.points.iter().filter(|p| !p.is_finite()).count();
         let mut report = SweepReport {
             name: sweep.name.clone(),
-            points: taken.points,
+            points,
             dropped,
             flying: seen.flying,
-            beyond: sweep.points.len() - taken.points - dropped - seen.flying,
+            beyond: sweep.points.len() - points - dropped - seen.flying,
             contacts: 0,
             update_ms,
             step_ms: 0.0,

@@ -1,13 +1,14 @@
 //! Where sweeps come from: a folder, or a generated street.
 
 use super::Scanner;
-use anyhow::{Context, ensure};
+use anyhow::{Context, bail, ensure};
 use rapier3d_tldi::{CloudRecipe, RadiusRule, SeenPoints};
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 use tldi::glamx::{DPose3, DVec3, Pose3, Vec3};
 use tldi::{CloudError, PointCloud};
 use tldi_sources::depth::{OrganizedCloud, SensorModel};
-use tldi_sources::{Format, ReadOptions, near_origin, parse_pose, read};
+use tldi_sources::{Format, ReadOptions, SourceErrorKind, near_origin, parse_pose, read};
 
 /// Standard deviation of ranges, metres: what an HDL-64E is said to have at half of its reach. With half as much, noise
 /// counts as an edge here and there; with twice as much, normals are smoothed over twice as many columns.
@@ -25,6 +26,14 @@ pub struct Sweep {
     pub size: Option<[usize; 2]>,
     /// From the frame of the scanner into that of the world, less [the origin](SweepSource::origin).
     pub world_from_scanner: Pose3,
+}
+
+/// No sweep shows a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("none of the {sweeps} sweeps has a point: take more of them with --count, or others")]
+pub struct NothingSeen {
+    /// Number of sweeps.
+    pub sweeps: usize,
 }
 
 /// What is made of the points of a sweep that come in no order.
@@ -169,7 +178,24 @@ impl SweepSource {
         }
     }
 
-    /// Gets a sweep.
+    /// The indices of the first and the last one with points, of so many sweeps, and these sweeps.
+    ///
+    /// # Errors
+    /// [`NothingSeen`] if there is none, and those of reading a file.
+    pub fn ends(&self, count: usize) -> anyhow::Result<[(usize, Sweep); 2]> {
+        let seen = |indices: &mut dyn Iterator<Item = usize>| {
+            for index in indices {
+                let sweep = self.sweep(index)?;
+                if sweep.points.iter().any(|point| point.is_finite()) {
+                    return Ok((index, sweep));
+                }
+            }
+            bail!(NothingSeen { sweeps: count })
+        };
+        Ok([seen(&mut (0..count))?, seen(&mut (0..count).rev())?])
+    }
+
+    /// Gets a sweep; one without points is not an error.
     ///
     /// # Errors
     /// Those of reading its file.
@@ -177,7 +203,10 @@ impl SweepSource {
         match self {
             Self::Folder(sweeps, _) => {
                 let (path, world_from_scanner) = &sweeps[index];
-                let mut points = read(path, &ReadOptions::default())?.points;
+                let mut points = match read(path, &ReadOptions::default()) {
+                    Err(error) if matches!(error.kind, SourceErrorKind::NoPoints) => Vec::new(),
+                    cloud => cloud?.points,
+                };
                 // Some drivers write the scanner's own place where a ray met nothing.
                 for point in points.iter_mut().filter(|point| **point == Vec3::ZERO) {
                     *point = Vec3::NAN;
