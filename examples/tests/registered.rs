@@ -17,7 +17,8 @@ const WITH_BODIES: [u64; 4] = [1, 2, 101, 102];
 
 fn seen(frames: &RegisteredFrames) -> DepthCloud {
     let mut camera = DepthCamera::new(frames.intrinsics(), frames.model);
-    camera.points(&frames.depths(0), &frames.world_from_camera)
+    let seen = camera.points(&frames.depths(0), &frames.world_from_camera);
+    seen.unwrap()
 }
 
 /// A scene and its seed.
@@ -136,7 +137,8 @@ fn rests(frames: &RegisteredFrames, are_clouds: bool) -> Vec<Rest> {
     let mut camera = DepthCamera::new(frames.intrinsics(), frames.model);
     let mut cloud_of = |frame: usize| {
         let seen = camera.points(&frames.depths(frame), &frames.world_from_camera);
-        seen.into_builder().build().unwrap().into_owned()
+        let seen = seen.unwrap().into_builder();
+        seen.build().unwrap().into_owned()
     };
     let mut tldi = TldiPipeline::new(TldiConfig::default()).unwrap();
     let mut world = PhysicsWorld {

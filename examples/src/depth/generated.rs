@@ -124,8 +124,9 @@ mod tests {
         let mut unprojected = DepthCamera::new(camera.intrinsics(), SensorModel::default());
         for frame in [0, 7] {
             let ball = camera.ball(frame);
-            let cloud =
-                unprojected.points(&camera.depths(frame), &GeneratedCamera::world_from_camera());
+            let depths = camera.depths(frame);
+            let cloud = unprojected.points(&depths, &GeneratedCamera::world_from_camera());
+            let cloud = cloud.expect("a depth for each pixel");
             assert!(cloud.points.len() > 280_000, "{}", cloud.points.len());
             let mut on_ball = 0;
             for p in &cloud.points {

@@ -61,7 +61,7 @@ impl WantedBodies {
             }
         }
         let frame = source.frame(source.count() - 1)?;
-        camera.points(&frame.depths, &frame.world_from_camera);
+        camera.points(&frame.depths, &frame.world_from_camera)?;
         let view = LastView {
             camera: &camera,
             camera_from_world: frame.world_from_camera.inverse(),

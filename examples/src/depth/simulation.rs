@@ -96,14 +96,14 @@ impl DepthSimulation {
     /// Bodies over their spots, and a first frame.
     ///
     /// # Errors
-    /// Where the frame holds no points.
+    /// Where the frame holds no points, or another number of depths than the camera has pixels.
     pub fn new(
         scene: DepthScene,
         first: &TimedFrame,
         backend: Box<dyn Backend>,
     ) -> anyhow::Result<Self> {
         let DepthScene { mut camera, up, .. } = scene;
-        let points = camera.points(&first.depths, &first.world_from_camera);
+        let points = camera.points(&first.depths, &first.world_from_camera)?;
         let seen = points.points.clone();
         let cloud = points.into_builder().build()?.into_owned();
         let mut stage = Stage::new(up, backend)?;
@@ -146,10 +146,10 @@ impl DepthSimulation {
     /// the last surface stays.
     ///
     /// # Errors
-    /// Those of the pipeline.
+    /// Those of the pipeline, and a frame of another size than the camera's.
     pub fn take_frame(&mut self, frame: &TimedFrame) -> anyhow::Result<()> {
         let start = Instant::now();
-        let points = self.camera.points(&frame.depths, &frame.world_from_camera);
+        let points = (self.camera).points(&frame.depths, &frame.world_from_camera)?;
         let unprojected = start.elapsed();
         let mut report = FrameReport {
             name: frame.name.clone(),

@@ -85,7 +85,7 @@ impl FrameSource {
         let mut empty = Vec::new();
         for index in 0..self.count() {
             let frame = self.frame(index)?;
-            let cloud = camera.points(&frame.depths, &frame.world_from_camera);
+            let cloud = camera.points(&frame.depths, &frame.world_from_camera)?;
             if !cloud.points.is_empty() {
                 return Ok(FirstSeen {
                     index,

@@ -1,6 +1,7 @@
 //! From a depth image to points with radii and normals.
 
 use super::cloud::DepthCloud;
+use super::frame_size::FrameSizeError;
 use super::sensor::{Intrinsics, SensorModel};
 use super::tile::{DEVIATIONS, Optics, Pixels, REACH, TILE, Window, compute};
 use rayon::prelude::*;
@@ -54,15 +55,23 @@ impl DepthCamera {
     }
 
     /// The points of a frame, row by row in units of [`Intrinsics::depth_unit`], in the frame that
-    /// `world_from_camera` leads into. 0 and 65535 mean no measurement. Of a frame that is too short
-    /// the missing pixels have none either.
+    /// `world_from_camera` leads into. 0 and 65535 mean no measurement.
     ///
     /// Where all depths of a frame are multiples of a larger step than the model knows, it is the model's
     /// ([`SensorModel::step`]) from this frame on: a sensor that tells whole millimetres in units of a tenth.
     ///
     /// Cost: some 30 ns a pixel on one core with AVX-512, 35 with AVX2, 45 with neither, shared by all cores.
     /// Most of it are the normals.
-    pub fn points(&mut self, frame: &[u16], world_from_camera: &Pose3) -> DepthCloud {
+    ///
+    /// # Errors
+    /// [`FrameSizeError`] unless there is one depth for each pixel of [`Intrinsics::size`], without padding between rows.
+    /// The camera then knows the frame before.
+    pub fn points(
+        &mut self,
+        frame: &[u16],
+        world_from_camera: &Pose3,
+    ) -> Result<DepthCloud, FrameSizeError> {
+        FrameSizeError::check(self.intrinsics.size, frame.len())?;
         if let Some(step) = common_step(frame) {
             let step = f32::from(step) * self.intrinsics.depth_unit;
             self.model.step = self.model.step.max(step);
@@ -93,7 +102,7 @@ impl DepthCamera {
         let mut cloud = DepthCloud::gathered(&rows);
         cloud.empty = width * height - cloud.points.len() - cloud.flying;
         self.rows = rows;
-        cloud
+        Ok(cloud)
     }
 
     /// Depths in metres of those pixels that the sensor is believed in, and their inverses.
@@ -270,6 +279,11 @@ mod tests {
             .collect()
     }
 
+    /// The points of a frame of the camera's size.
+    fn points(camera: &mut DepthCamera, frame: &[u16], pose: &Pose3) -> DepthCloud {
+        camera.points(frame, pose).expect("a depth for each pixel")
+    }
+
     #[test]
     fn a_plane_is_a_plane_with_its_normal() {
         let normal = Vec3::new(0.3, -0.5, -0.8).normalize();
@@ -280,7 +294,7 @@ mod tests {
         for (noise, expected, angle) in [(0.0, 1e-3, 2e-3), (1e-3, 1e-3, 0.07), (0.0, 0.05, 2e-3)] {
             let mut camera = camera();
             camera.model.noise = expected;
-            let cloud = camera.points(&plane(normal, -1.5, noise), &pose);
+            let cloud = points(&mut camera, &plane(normal, -1.5, noise), &pose);
             let counts = (cloud.points.len(), cloud.empty, cloud.flying);
             assert_eq!(counts, (64 * 48, 0, 0));
             let world_normal = pose.rotation * normal;
@@ -327,7 +341,8 @@ mod tests {
                 ..camera().intrinsics
             };
             let mut camera = DepthCamera::new(intrinsics, camera().model);
-            let cloud = camera.points(&vec![5000; size[0] * size[1]], &Pose3::IDENTITY);
+            let frame = vec![5000; size[0] * size[1]];
+            let cloud = points(&mut camera, &frame, &Pose3::IDENTITY);
             if size.contains(&1) {
                 assert_eq!((cloud.points.len(), cloud.flying), (0, size[0] * size[1]));
                 continue;
@@ -358,7 +373,7 @@ mod tests {
             }
         }
         let seen = frame.iter().filter(|depth| **depth > 0).count();
-        let cloud = camera().points(&frame, &Pose3::IDENTITY);
+        let cloud = points(&mut camera(), &frame, &Pose3::IDENTITY);
         // Windows hold eight pixels in the mean. One in seven holds less than six, and so does one in fifty
         // together with the next larger, more of them at the rim of the image.
         assert!(cloud.points.len() * 10 > 9 * seen, "{}", cloud.flying);
@@ -379,17 +394,17 @@ mod tests {
             *depth = *depth / 15 * 15 + 4;
         }
         let mut camera = camera();
-        camera.points(&[5000; 64 * 48], &Pose3::IDENTITY);
+        points(&mut camera, &[5000; 64 * 48], &Pose3::IDENTITY);
         let few: Vec<u16> = (0..64 * 48).map(|k| 4000 + 500 * (k % 31)).collect();
-        camera.points(&few, &Pose3::IDENTITY);
+        points(&mut camera, &few, &Pose3::IDENTITY);
         assert_eq!(camera.model.step, 0.0002);
         let mut off = frame.clone();
         off[100] += 1;
-        camera.points(&off, &Pose3::IDENTITY);
+        points(&mut camera, &off, &Pose3::IDENTITY);
         assert_eq!(camera.model.step, 0.0002);
-        camera.points(&frame, &Pose3::IDENTITY);
+        points(&mut camera, &frame, &Pose3::IDENTITY);
         assert!((camera.model.step - 0.003).abs() < 1e-6);
-        camera.points(&off, &Pose3::IDENTITY);
+        points(&mut camera, &off, &Pose3::IDENTITY);
         assert!((camera.model.step - 0.003).abs() < 1e-6);
     }
 
@@ -405,7 +420,7 @@ mod tests {
         frame[0] = 0;
         frame[1] = u16::MAX;
         frame[2] = 100; // 2 cm: nearer than the sensor sees
-        let cloud = camera().points(&frame, &Pose3::IDENTITY);
+        let cloud = points(&mut camera(), &frame, &Pose3::IDENTITY);
         assert_eq!(cloud.empty, 3);
         // The rims on both sides of the jump, and the mixture.
         let inside = 20 * 20 - 18 * 18;
@@ -418,18 +433,32 @@ mod tests {
             assert!((p.z - 1.0).abs() < 1e-3 || (p.z - 0.8).abs() < 1e-3, "{p}");
         }
         assert_eq!(cloud.points.len() + cloud.empty + cloud.flying, 64 * 48);
-        // A frame that ends early.
-        assert_eq!(
-            camera().points(&frame[..640], &Pose3::IDENTITY).empty,
-            3 + 64 * 38
-        );
+    }
+
+    /// Rows with padding would be read as sheared ones.
+    #[test]
+    fn a_frame_of_another_size_is_refused() {
+        let mut camera = camera();
+        let wall = |depths: usize| vec![5000; depths]; // 1 m
+        let seen = |camera: &DepthCamera| camera.sees(Vec3::Z, &Pose3::IDENTITY);
+        for found in [0, 64 * 47, 64 * 48 - 1, 64 * 48 + 1, 80 * 48] {
+            let size = [64, 48];
+            let refused = camera.points(&wall(found), &Pose3::IDENTITY);
+            assert_eq!(refused.err(), Some(FrameSizeError { size, found }));
+            assert!(!seen(&camera));
+        }
+        assert!(camera.points(&wall(64 * 48), &Pose3::IDENTITY).is_ok());
+        assert!(camera.points(&[], &Pose3::IDENTITY).is_err() && seen(&camera));
+        // More pixels than can be counted.
+        camera.intrinsics.size = [usize::MAX, 2];
+        assert!(camera.points(&wall(64 * 48), &Pose3::IDENTITY).is_err());
     }
 
     #[test]
     fn free_space_is_known() {
         let mut camera = camera();
         let pose = Pose3::from_translation(Vec3::X);
-        camera.points(&plane(Vec3::Z, 2.0, 0.0), &pose);
+        points(&mut camera, &plane(Vec3::Z, 2.0, 0.0), &pose);
         let camera_from_world = pose.inverse();
         let at = |z: f32| Vec3::new(1.0, 0.1, z);
         assert!(camera.sees_through(at(1.5), &camera_from_world));

@@ -17,7 +17,7 @@ use tldi::glamx::Pose3;
 /// // A wall at 2 m; then a plate at 1 m hides half of it; then it is gone.
 /// let (wall, half) = (vec![2000; 1024], [[1000; 512], [2000; 512]].concat());
 /// let mut look = |depths: &[u16]| {
-///     let seen = camera.points(depths, &Pose3::IDENTITY);
+///     let seen = camera.points(depths, &Pose3::IDENTITY).expect("a depth for each pixel");
 ///     memory.complete(seen, &camera, &Pose3::IDENTITY).points
 /// };
 /// let far = |points: &[tldi::glamx::Vec3]| points.iter().filter(|p| p.z > 1.5).count();

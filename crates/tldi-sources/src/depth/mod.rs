@@ -2,6 +2,7 @@
 
 mod camera;
 mod cloud;
+mod frame_size;
 mod memory;
 mod organized;
 mod ray_window;
@@ -11,6 +12,7 @@ mod tile;
 
 pub use camera::DepthCamera;
 pub use cloud::DepthCloud;
+pub use frame_size::FrameSizeError;
 pub use memory::DepthMemory;
 pub use organized::OrganizedCloud;
 pub use sensor::{Intrinsics, SensorModel};
