@@ -25,6 +25,8 @@ pub struct DepthCamera {
     depths: Vec<f32>,
     /// Their inverses, 0 where there is none.
     inverses: Vec<f32>,
+    /// Whether a pixel gave a point, in rows of [`Self::stride`], without the fringe above and before them.
+    gave: Vec<bool>,
     /// The points of each row of tiles.
     rows: Vec<DepthCloud>,
 }
@@ -40,6 +42,7 @@ impl DepthCamera {
             },
             depths: Vec::new(),
             inverses: Vec::new(),
+            gave: Vec::new(),
             rows: Vec::new(),
         }
     }
@@ -88,20 +91,26 @@ impl DepthCamera {
             .collect();
         let mut rows = std::mem::take(&mut self.rows);
         rows.resize_with(height.div_ceil(TILE), DepthCloud::default);
+        let stride = self.stride();
+        let mut gave = std::mem::take(&mut self.gave);
+        gave.clear();
+        gave.resize(stride * height, false);
         let camera = &*self;
         let optics = Optics::new(&self.intrinsics, &self.model, world_from_camera);
-        (rows.par_iter_mut().enumerate()).for_each(|(row, cloud)| {
+        let tiles = rows.par_iter_mut().zip(gave.par_chunks_mut(stride * TILE));
+        tiles.enumerate().for_each(|(row, (cloud, gave))| {
             cloud.clear();
             let mut pixels = Pixels::default();
             for left in (0..width).step_by(TILE) {
-                for v in row * TILE..((row + 1) * TILE).min(height) {
-                    camera.tile_line([left, v], &columns, &optics, &mut pixels, cloud);
+                for (v, gave) in (row * TILE..).zip(gave.chunks_mut(stride)) {
+                    let gave = &mut gave[left..left + TILE];
+                    camera.tile_line([left, v], &columns, &optics, &mut pixels, cloud, gave);
                 }
             }
         });
         let mut cloud = DepthCloud::gathered(&rows);
         cloud.empty = width * height - cloud.points.len() - cloud.flying;
-        self.rows = rows;
+        (self.rows, self.gave) = (rows, gave);
         Ok(cloud)
     }
 
@@ -133,7 +142,7 @@ impl DepthCamera {
     }
 
     /// The points of a line of a tile, from pixel `[left, v]` on; `columns` are the coordinates of all columns on the
-    /// image plane at depth 1.
+    /// image plane at depth 1. Tells which of its pixels gave one.
     #[inline]
     fn tile_line(
         &self,
@@ -142,6 +151,7 @@ impl DepthCamera {
         optics: &Optics,
         pixels: &mut Pixels,
         cloud: &mut DepthCloud,
+        gave: &mut [bool],
     ) {
         let window = Window {
             depths: &self.depths,
@@ -155,6 +165,7 @@ impl DepthCamera {
         let depth = window.depth();
         for (k, z) in depth.iter().enumerate() {
             if *z > 0.0 {
+                gave[k] = !pixels.flies[k];
                 if pixels.flies[k] {
                     cloud.flying += 1;
                 } else {
@@ -170,13 +181,15 @@ impl DepthCamera {
     /// is seen there by more than the sensor errs.
     pub fn sees_through(&self, point: Vec3, camera_from_world: &Pose3) -> bool {
         self.seen_behind(point, camera_from_world)
-            .is_some_and(|(z, seen)| seen - z > DEVIATIONS * self.model.deviation(seen))
+            .is_some_and(|(z, seen, _)| seen - z > DEVIATIONS * self.model.deviation(seen))
     }
 
-    /// Whether a point of the world is where the last frame saw a surface at that depth.
+    /// Whether a point of the world is where the last frame saw a surface at that depth. Flying pixels show none.
     pub fn sees(&self, point: Vec3, camera_from_world: &Pose3) -> bool {
         self.seen_behind(point, camera_from_world)
-            .is_some_and(|(z, seen)| (seen - z).abs() <= DEVIATIONS * self.model.deviation(seen))
+            .is_some_and(|(z, seen, gave)| {
+                gave && (seen - z).abs() <= DEVIATIONS * self.model.deviation(seen)
+            })
     }
 
     /// Whether a point of the world is before the camera and in its image, seen or hidden.
@@ -199,11 +212,12 @@ impl DepthCamera {
         inside.then_some((p.z, [u as usize, v as usize]))
     }
 
-    /// The depth of a point, and of what the last frame shows in its pixel.
-    fn seen_behind(&self, point: Vec3, camera_from_world: &Pose3) -> Option<(f32, f32)> {
+    /// The depth of a point, and of what the last frame shows in its pixel, and whether that is a point.
+    fn seen_behind(&self, point: Vec3, camera_from_world: &Pose3) -> Option<(f32, f32, bool)> {
         let (z, [u, v]) = self.pixel_of(point, camera_from_world)?;
         let seen = *self.depths.get(self.index(u, v))?;
-        (seen > 0.0).then_some((z, seen))
+        let gave = *self.gave.get(v * self.stride() + u)?;
+        (seen > 0.0).then_some((z, seen, gave))
     }
 }
 

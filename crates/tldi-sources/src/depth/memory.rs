@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use tldi::glamx::Pose3;
 
 /// Remembers the points of the last frames where the present one does not see: what is hidden by something nearer, or out
-/// of view. What the present frame sees through is gone, and what it sees is taken from it.
+/// of view. What the present frame sees through is gone, and what it sees is taken from it; flying pixels see nothing.
 ///
 /// ```
 /// use tldi::glamx::Pose3;
@@ -23,7 +23,7 @@ use tldi::glamx::Pose3;
 /// let far = |points: &[tldi::glamx::Vec3]| points.iter().filter(|p| p.z > 1.5).count();
 /// let all = far(&look(&wall));
 /// let covered = look(&half);
-/// assert!(far(&covered) > all * 9 / 10 && covered.len() > all * 5 / 4);
+/// assert!(far(&covered) == all && covered.len() > all * 5 / 4);
 /// assert!(look(&wall).iter().all(|p| p.z > 1.5));
 /// ```
 #[derive(Clone, Debug)]
