@@ -47,27 +47,29 @@ impl Counting {
         Self { limit }
     }
 
-    /// Whether so many bytes more may be held; counts them if so.
-    fn takes(&self, bytes: usize) -> bool {
+    /// What `ask` gives if so many bytes more may be held; counts them if it gives any.
+    fn taken(&self, bytes: usize, ask: impl FnOnce() -> *mut u8) -> *mut u8 {
         let held = HELD.fetch_add(bytes, Relaxed).saturating_add(bytes);
-        if held > self.limit {
+        let memory = if held > self.limit {
+            std::ptr::null_mut()
+        } else {
+            ask()
+        };
+        if memory.is_null() {
             HELD.fetch_sub(bytes, Relaxed);
-            return false;
+        } else {
+            ALLOCATIONS.fetch_add(1, Relaxed);
+            MOST.fetch_max(held, Relaxed);
         }
-        ALLOCATIONS.fetch_add(1, Relaxed);
-        MOST.fetch_max(held, Relaxed);
-        true
+        memory
     }
 }
 
 // SAFETY: memory comes from the system's allocator unchanged, or is refused with a null pointer.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        if !self.takes(layout.size()) {
-            return std::ptr::null_mut();
-        }
         // SAFETY: the caller's promise is the one that the system's allocator asks for.
-        unsafe { System.alloc(layout) }
+        self.taken(layout.size(), || unsafe { System.alloc(layout) })
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
@@ -78,12 +80,12 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         // While memory moves, both places are held.
-        if !self.takes(size) {
-            return std::ptr::null_mut();
-        }
-        HELD.fetch_sub(layout.size(), Relaxed);
         // SAFETY: the memory came from the system's allocator with this layout.
-        unsafe { System.realloc(memory, layout, size) }
+        let moved = self.taken(size, || unsafe { System.realloc(memory, layout, size) });
+        if !moved.is_null() {
+            HELD.fetch_sub(layout.size(), Relaxed);
+        }
+        moved
     }
 }
 
