@@ -60,7 +60,8 @@ pub struct CloudStream {
     is_hidden: bool,
 }
 
-/// What a sensor saw in a frame, in its own frame, metres; points alone become one by `into`.
+/// What a sensor saw in a frame, in its own frame, metres; points alone become one by `into`. Where a ray met nothing,
+/// sensors write what is not finite, or their own place, (0, 0, 0): such points are dropped.
 ///
 /// What comes in rows and columns has radii and normals by its neighbours there
 /// (`tldi_sources::depth::OrganizedCloud` and `DepthCamera`), which costs less than a search for them.
@@ -121,7 +122,7 @@ impl<'a> From<&'a Vec<Vector>> for SeenPoints<'a> {
 pub struct StreamFrame {
     /// Points of the collider.
     pub points: usize,
-    /// Points that were dropped since they are not finite.
+    /// Points that were dropped since they are not finite, or exactly at the sensor: rays that met nothing.
     pub dropped: usize,
     /// Points that were left out since they are on [what carries the sensor](CloudStream::without).
     pub own: usize,
@@ -239,8 +240,13 @@ impl CloudStream {
         let collider_from_world = world_from_collider.inverse();
         let collider_from_sensor = collider_from_world * *world_from_sensor;
         self.points.clear();
-        self.points
-            .extend(seen.points.iter().map(|p| collider_from_sensor * *p));
+        self.points.extend(seen.points.iter().map(|p| {
+            if *p == Vector::ZERO {
+                Vector::NAN
+            } else {
+                collider_from_sensor * *p
+            }
+        }));
         self.normals.clear();
         let turn = collider_from_sensor.rotation;
         self.normals

@@ -186,6 +186,50 @@ fn an_empty_frame_holds_nothing() -> TestResult {
     Ok(())
 }
 
+/// Drivers write (0, 0, 0) where a ray met nothing: no point is where the sensor is, whatever comes with it.
+#[test]
+fn rays_without_a_return_leave_no_points() -> TestResult {
+    let (mut world, mut tldi) = attached();
+    let mut stream = CloudStream::new(&mut world.colliders, RECIPE)?;
+    let sensor = Pose::from_translation(2.0 * Vector::Y);
+    let floor: Vec<Vector> = (square(0.8).iter()).map(|p| *p - 2.0 * Vector::Y).collect();
+    let mut seen = floor.clone();
+    seen.insert(3, Vector::ZERO);
+    seen.extend([Vector::ZERO, -Vector::ZERO]);
+    let (normals, radii) = (vec![Vector::Y; seen.len()], vec![SPACING; seen.len()]);
+    let told = SeenPoints {
+        points: &seen,
+        normals: Some(&normals),
+        radii: Some(&radii),
+    };
+    let expected = StreamFrame {
+        points: floor.len(),
+        dropped: 3,
+        own: 0,
+    };
+    for frame in [told, SeenPoints::from(&seen)] {
+        let taken = see(&mut stream, &mut world, &mut tldi, frame, &sensor)?;
+        assert_eq!(taken, expected);
+        let cloud = cloud_of(&world, &stream);
+        assert!(cloud.points().iter().all(|p| p.y.abs() < 1e-6));
+    }
+    let nothing = [Vector::ZERO; 4];
+    let taken = see(&mut stream, &mut world, &mut tldi, &nothing[..], &sensor)?;
+    assert_eq!((taken.points, taken.dropped), (0, 4));
+    assert!(!world.colliders[stream.collider()].is_enabled());
+    let recipe = CloudRecipe {
+        non_finite: NonFinite::Refuse,
+        ..RECIPE
+    };
+    let mut strict = CloudStream::new(&mut world.colliders, recipe)?;
+    let refused = refusal(see(&mut strict, &mut world, &mut tldi, &seen, &sensor));
+    assert!(matches!(
+        refused,
+        CloudError::NonFinite { index: 3, count: 3 }
+    ));
+    Ok(())
+}
+
 /// A stream enables what it disabled itself, and not what the user disabled.
 #[test]
 fn what_the_user_disables_stays_so() -> TestResult {
@@ -325,7 +369,8 @@ fn radii_may_come_with_a_frame() -> TestResult {
         ..SeenPoints::from(&points)
     };
     let taken = see(&mut stream, &mut world, &mut tldi, seen, &Pose::IDENTITY)?;
-    assert!(taken.own > 0 && taken.dropped == 1);
+    // The sensor is in the middle of the square, where no point can be seen.
+    assert!(taken.own > 0 && taken.dropped == 2);
     let cloud = cloud_of(&world, &stream);
     assert!(cloud.normals().is_some());
     for (i, point) in cloud.points().iter().copied().enumerate() {
