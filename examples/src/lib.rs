@@ -13,7 +13,6 @@ pub mod gallop;
 pub mod lidar;
 pub mod load;
 pub mod mesh;
-mod normal_signs;
 mod numbers;
 pub mod output;
 pub mod pictures;

@@ -2,7 +2,6 @@
 
 use crate::faces;
 use crate::mesh::{self, Mesh};
-use crate::normal_signs;
 use crate::numbers::median;
 use crate::robot::link_spacing;
 use crate::surface_sampling::SampledSurface;
@@ -77,17 +76,14 @@ fn read(path: &Path, spacing: impl Fn(Vec3) -> f32) -> anyhow::Result<RawCloud> 
                 );
             }
             raw = faces::sampled(raw, spacing)?;
+            raw.has_unsigned_normals = raw.normals_disagree();
         }
     }
-    if !raw.has_unsigned_normals
-        && let Some(normals) = &raw.normals
-        && normal_signs::are_mixed(&raw.points, normals)
-    {
+    if raw.has_unsigned_normals {
         eprintln!(
             "warning: normals of {} point to either side: their signs are not used",
             path.display()
         );
-        raw.has_unsigned_normals = true;
     }
     Ok(raw)
 }

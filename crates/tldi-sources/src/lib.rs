@@ -65,6 +65,7 @@ mod input;
 #[cfg(feature = "las")]
 mod las;
 mod moving;
+mod normal_signs;
 mod numbered;
 mod options;
 mod origin;

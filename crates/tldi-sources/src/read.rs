@@ -113,7 +113,7 @@ fn dispatch(
 ) -> Result<RawCloud> {
     let magic = Format::from_magic(input.peek(MAGIC_LENGTH)?);
     let format = magic.or(named).ok_or_else(|| unknown(path))?;
-    let cloud = match format {
+    let mut cloud = match format {
         Format::Ply => crate::ply::parse(&mut input, options)?,
         Format::Pcd => crate::pcd::parse(&mut input, options)?,
         Format::Kitti => crate::sweep::parse(&mut input, options, 4)?,
@@ -134,6 +134,7 @@ fn dispatch(
     };
     input.points_read = cloud.points.len() as u64;
     input.finish()?;
+    cloud.has_unsigned_normals = cloud.has_unsigned_normals || cloud.normals_disagree();
     Ok(cloud)
 }
 

@@ -300,6 +300,23 @@ fn builder_takes_all_attributes() {
     assert!(cloud.normals().is_none());
 }
 
+/// Programs estimate normals and leave their signs to chance: such a cloud does not know its inside.
+#[test]
+fn normals_that_disagree_tell_no_inside() {
+    for (sign, is_oriented) in [(1, true), (-1, false)] {
+        let mut file = String::from("x y z nx ny nz\n");
+        for k in 0..400 {
+            let ny = if k % 3 == 0 { sign } else { 1 };
+            file += &format!("{} 0 {} 0 {ny} 0\n", k % 20, k / 20);
+        }
+        let raw = text(&file);
+        assert_eq!(raw.has_unsigned_normals, !is_oriented);
+        let cloud = raw.into_builder().build().expect("a sound cloud");
+        assert!(cloud.normals().is_some());
+        assert_eq!(cloud.normals_oriented(), is_oriented);
+    }
+}
+
 #[test]
 fn errors_say_where() {
     let position = |bytes: &[u8], format| parse(bytes, format).expect_err("damaged").position;

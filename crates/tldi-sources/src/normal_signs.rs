@@ -1,4 +1,4 @@
-//! Whether the normals of a file agree about the side that is outside.
+//! Whether normals agree about the side that is outside.
 
 use rayon::prelude::*;
 use tldi::glamx::Vec3;
@@ -31,8 +31,11 @@ pub(crate) fn are_mixed(points: &[Vec3], normals: &[Vec3]) -> bool {
         Some((*point, normal))
     });
     let (points, normals): (Vec<Vec3>, Vec<Vec3>) = usable.unzip();
-    // Of too few, or of no extent, nothing can be said; what is wrong with them, the cloud itself says.
-    let Ok(cloud) = PointCloud::builder(&points).knn_radii(1, 1.0).build() else {
+    // Of fewer points than are compared, or of points without extent, nothing can be said.
+    let cloud = PointCloud::builder(&points)
+        .knn_radii(NEIGHBORS, 1.0)
+        .build();
+    let Some(cloud) = cloud.ok().filter(|cloud| cloud.len() > NEIGHBORS) else {
         return false;
     };
     let mut pairs = pairs(&KdTree::new(&cloud), &points, &normals);
