@@ -119,7 +119,7 @@ impl PatchScratch {
     fn link(&mut self, result: &mut PairResult, params: &Params) {
         order(&mut result.contacts);
         drop_between_faces(result);
-        self.way_out.keep_least(result, params, &mut self.links);
+        self.way_out.keep_least(result, params);
         self.links.find(&result.contacts, params);
     }
 

@@ -4,7 +4,6 @@
 //! contact pixel would push the bodies apart, another view sees them overlap by much less. And no overlap is deeper than the
 //! way on which all that a view shows comes apart.
 
-use crate::contact::links::Links;
 use crate::contact::retain_by_index;
 use crate::view::camera_policy::MAX_VIEWS;
 use crate::{ContactPixel, PairResult, Params, VirtualCamera};
@@ -23,26 +22,16 @@ const MOST_PLACES: f32 = 16.0;
 #[derive(Debug, Default)]
 pub(crate) struct WayOut {
     is_wide: Vec<bool>,
-    /// For each contact pixel, the first of those that links join it with.
-    roots: Vec<u32>,
-    /// For each of these, how many of its deep pixels are wide, less those that are not.
-    wide_balance: Vec<i32>,
 }
 
 impl WayOut {
     /// Drops the contact pixels deeper than the [least way out](PairResult::way_out), by more than a pixel: so much the images
     /// of a place differ. Then drops those deeper than a layer that lead through a place where another view sees the surfaces
-    /// apart or in each other by less than half of that. If at least half of linked deep pixels go so, all of them do: they are one
-    /// overlap, and no view sees every place. Then drops the pixels that are apart by more than contacts are asked for.
-    /// Contact pixels are ordered by view, row and column; `links` are overwritten.
+    /// apart or in each other by less than half of that, and the pixels that are apart by more than contacts are asked for.
+    /// Contact pixels are ordered by view, row and column.
     ///
-    /// Cost: for each deep pixel and each other view up to 17 binary searches; links, if any pixel goes.
-    pub(crate) fn keep_least(
-        &mut self,
-        result: &mut PairResult,
-        params: &Params,
-        links: &mut Links,
-    ) {
+    /// Cost: for each deep pixel and each other view up to 17 binary searches.
+    pub(crate) fn keep_least(&mut self, result: &mut PairResult, params: &Params) {
         let deepest = result.way_out.map(|way| way.max(0.0) + params.pixel_size);
         let PairResult { axes, contacts, .. } = result;
         if let Some(deepest) = deepest {
@@ -63,20 +52,6 @@ impl WayOut {
                         is_less_elsewhere(contact, contacts, camera, params)
                     })
         }));
-        if self.is_wide.contains(&true) {
-            links.find(contacts, params);
-            links.components(contacts.len(), &mut self.roots);
-            self.wide_balance.clear();
-            self.wide_balance.resize(contacts.len(), 0);
-            let deep = |k: &usize| is_deep(&contacts[*k]);
-            for k in (0..contacts.len()).filter(deep) {
-                let balance = &mut self.wide_balance[self.roots[k] as usize];
-                *balance += if self.is_wide[k] { 1 } else { -1 };
-            }
-            for k in (0..contacts.len()).filter(deep) {
-                self.is_wide[k] |= self.wide_balance[self.roots[k] as usize] >= 0;
-            }
-        }
         retain_by_index(contacts, |k, contact| {
             !self.is_wide[k] && contact.gap <= params.prediction
         });
