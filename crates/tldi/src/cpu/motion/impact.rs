@@ -225,13 +225,12 @@ impl Motion<'_> {
         if place == OUTSIDE {
             return None;
         }
-        let layers = a.layers_of(pixel);
-        let met = (0..layers.len()).filter(|&k| !leaves_solid(&layers[..=k]));
-        let leading = |k: usize| {
-            let moving = b.layers_of(pixel);
-            (0..moving.len())
-                .filter(|&l| is_leading(moving, l))
-                .map(move |l| Meeting::new(pixel, &layers[k], &moving[l], &query.params))
+        let (layers, moving) = (a.layers_of(pixel), b.layers_of(pixel));
+        let leading = (0..moving.len()).filter(|&l| is_leading(moving, l));
+        let met = |l: usize| {
+            (0..layers.len())
+                .filter(|&k| !leaves_solid(&layers[..=k]))
+                .map(move |k| Meeting::new(pixel, &layers[k], &moving[l], &query.params))
         };
         let in_way = |meeting: &Meeting| {
             let approach = meeting.facing * (length - meeting.distance);
@@ -240,7 +239,8 @@ impl Motion<'_> {
                 && (0.0..=length).contains(&meeting.distance)
                 && (meeting.distance >= query.touching || approach > query.params.pixel_size)
         };
-        met.flat_map(leading)
+        leading
+            .flat_map(met)
             .filter(|meeting| meeting.distance > beyond && in_way(meeting) && self.goes_in(meeting))
             .min_by(|m, n| m.distance.total_cmp(&n.distance))
     }
