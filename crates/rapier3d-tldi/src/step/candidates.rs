@@ -181,8 +181,11 @@ impl CandidateSearch {
                     (other.handle, proxy.handle)
                 };
                 let (c1, c2) = (&colliders[collider1], &colliders[collider2]);
+                if !may_meet(c1, c2) {
+                    continue;
+                }
                 let is_apart = are_apart(c1, c2, bodies, joints);
-                if may_meet(c1, c2) && !(is_apart && !may_be_swept(c1, c2, bodies)) {
+                if !is_apart || may_be_swept(c1, c2, bodies) {
                     let is_updated = |c, handle| is_awake(c, bodies) || changed.contains(handle);
                     self.candidates.push(Candidate {
                         collider1,
