@@ -8,9 +8,9 @@
 //! as it is, until the trough has closed over it. So the body loses the part of its velocity that points into the slope,
 //! as in an impact without friction and rebound.
 //!
-//! **Let through.** A user's hook may take the contacts of a pair away, as a one-way platform does, or their impulses; a joint or the types of the
-//! bodies may keep it apart. Rapier's sweeps ask nevertheless. They do not hold its own shapes while they touch, and a
-//! sweep must not hold such a pair either.
+//! **Let through.** A user's hook may take the contacts of a pair away, as a one-way platform does, or their impulses. A
+//! joint or the types of the bodies may keep the pair apart. Rapier's sweeps ask nevertheless. They do not hold its own
+//! shapes while they touch, and a sweep must not hold such a pair either.
 //!
 //! Rapier does not name the colliders of a sweep. They are found by their shapes, by the pose of the moving one at the
 //! beginning of the step, and by the place of its target.
