@@ -100,7 +100,7 @@ impl WgpuBackend {
     ///
     /// # Errors
     /// [`GpuError::Failed`] where the device refuses a stage, [`GpuError::TooLarge`] where it
-    /// allows no buffers.
+    /// allows no buffers, [`GpuError::OutOfMemory`] where it has no memory for them.
     pub fn new(gpu: Gpu) -> Result<Self, GpuError> {
         let gpu = gpu.with_own_tally();
         gpu.pipelines();

@@ -321,6 +321,13 @@ fn clouds_are_compared() {
     let mut other = build(&points);
     other.set_radii(Radii::Global(0.6)).expect("valid");
     assert!(cloud != other);
+    let [small, large] = [0.5, 0.6].map(|last| {
+        let mut radii = vec![0.5; points.len()];
+        radii[80] = last;
+        let builder = PointCloud::builder(&points[..]).radii(radii);
+        builder.build().expect("valid")
+    });
+    assert!(small != large && small != cloud);
     let normals = vec![Vec3::Y; points.len()];
     other = build(&points);
     other.set_points(&points, Some(&normals)).expect("valid");

@@ -169,16 +169,14 @@ impl Surroundings {
         if culled.is_empty() {
             return best;
         }
-        let mut ring = 0;
-        // All points within `ring` cells were offered.
-        while ring <= grid.longest()
-            && (ring == 0
-                || reach.min(best[NEIGHBORS - 1].0.sqrt()) > (ring - 1) as f32 * grid.cell())
-        {
-            sorted.shell(grid, grid.cell_of(place), ring, |row| {
-                offer_all(&mut best, sorted, row);
-            });
-            ring += 1;
+        let cell = grid.cell_of(place);
+        for ring in 0..=grid.longest() {
+            // All points up to there were offered.
+            let offered = (ring as f32 - 1.0) * grid.cell();
+            if reach.min(best[NEIGHBORS - 1].0.sqrt()) <= offered {
+                break;
+            }
+            sorted.shell(grid, cell, ring, |row| offer_all(&mut best, sorted, row));
         }
         best
     }
