@@ -136,42 +136,47 @@ fn a_depth_image_is_a_cloud() {
     let id = backend.add_depth_camera(camera).expect("a valid camera");
     let wall = backend.set_depth(id, &image).expect("a valid image");
 
-    let (mut points, mut radii) = (vec![], vec![]);
-    for ((i, j), units) in pixels.zip(&image) {
-        let z = f32::from(*units) * camera.metres_per_unit;
-        if *units != 0 && *units != u16::MAX && (0.3..=100.0).contains(&z) {
-            let [x, y] = [
-                (i as f32 - camera.principal_px[0]) / camera.focal_px[0] * z,
-                (j as f32 - camera.principal_px[1]) / camera.focal_px[1] * z,
-            ];
-            points.push(Vec3::new(x, y, z));
-            radii.push(camera.radius_px * z / camera.focal_px[0]);
+    let unprojected = |image: &[u16]| {
+        let (mut points, mut radii) = (vec![], vec![]);
+        for ((i, j), units) in pixels.clone().zip(image) {
+            let z = f32::from(*units) * camera.metres_per_unit;
+            if *units != 0 && *units != u16::MAX && (0.3..=100.0).contains(&z) {
+                let [x, y] = [
+                    (i as f32 - camera.principal_px[0]) / camera.focal_px[0] * z,
+                    (j as f32 - camera.principal_px[1]) / camera.focal_px[1] * z,
+                ];
+                points.push(Vec3::new(x, y, z));
+                radii.push(camera.radius_px * z / camera.focal_px[0]);
+            }
         }
-    }
-    let host = PointCloud::builder(points)
-        .radii(radii)
-        .build()
-        .expect("valid points");
+        let host = PointCloud::builder(points).radii(radii).build();
+        host.expect("valid points")
+    };
+    let host = unprojected(&image);
     assert!((wall.mean_radius / host.mean_radius() - 1.0).abs() < 1e-3);
     let ball = sampled_sphere(0.2, R).cloud(R);
-    let query = |a| {
-        let pose = Pose3::translation(0.1, -0.05, 1.82);
+    let query = |a, z| {
+        let pose = Pose3::translation(0.1, -0.05, z);
         aimed(a, Surface::Cloud(&ball), pose, Params::for_radius(R))
     };
     assert_like(
-        &compared(&mut CpuBackend::new(), query(Surface::Cloud(&host))),
-        &compared(&mut backend, query(Surface::Device(&wall))),
+        &compared(&mut CpuBackend::new(), query(Surface::Cloud(&host), 1.82)),
+        &compared(&mut backend, query(Surface::Device(&wall), 1.82)),
     );
     // The next image, as if the wall were nearer: what was told of the last one is not true of it.
     let nearer: Vec<u16> = image.iter().map(|depth| depth / 2).collect();
     let next = backend.set_depth(id, &nearer).expect("a valid image");
-    let refused = backend.compare(&[query(Surface::Device(&wall))], &mut Vec::new());
+    let refused = backend.compare(&[query(Surface::Device(&wall), 1.82)], &mut Vec::new());
     let error = refused.expect_err("it is gone").to_string();
     assert!(error.contains("last image"), "{error}");
-    compared(&mut backend, query(Surface::Device(&next)));
+    let host = unprojected(&nearer);
+    assert_like(
+        &compared(&mut CpuBackend::new(), query(Surface::Cloud(&host), 0.87)),
+        &compared(&mut backend, query(Surface::Device(&next), 0.87)),
+    );
     // The CPU cannot, and says so.
     let error = CpuBackend::new()
-        .compare(&[query(Surface::Device(&wall))], &mut Vec::new())
+        .compare(&[query(Surface::Device(&wall), 1.82)], &mut Vec::new())
         .expect_err("the points are not here");
     assert!(
         matches!(error, BackendError::Unsupported { pair: 0, .. }),

@@ -58,10 +58,9 @@ fn symmetric_in_a_and_b() {
     assert!(clear > 80 && collisions > 30, "{clear} {collisions}");
 }
 
-/// A common rigid motion of both bodies changes nothing but the rounding: results are in the frame
-/// of the first body.
+/// A pose of which the last bits are others, as of bodies that are 10 m from the origin, changes little.
 #[test]
-fn invariant_under_a_common_motion() {
+fn insensitive_to_the_rounding_of_poses() {
     for seed in 0..100 {
         let (a, b, a_from_b) = random_pair(seed);
         let mut rng = fastrand::Rng::with_seed(seed);
@@ -111,7 +110,6 @@ fn independent_of_the_frames_of_the_bodies() {
 /// Moving the second body out along the contact normal opens the gap by as much.
 #[test]
 fn gaps_follow_the_distance() {
-    let mut checked = 0;
     for seed in 0..200 {
         let mut rng = fastrand::Rng::with_seed(seed);
         let (ra, rb) = (0.05 + 0.1 * rng.f32(), 0.05 + 0.1 * rng.f32());
@@ -131,9 +129,7 @@ fn gaps_follow_the_distance() {
             (far - near - R).abs() < 0.6 * R,
             "seed {seed}: {near} {far}"
         );
-        checked += 1;
     }
-    assert_eq!(checked, 200);
 }
 
 /// A hundred thousand contact pixels are reduced to the same patches whatever their order.

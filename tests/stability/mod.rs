@@ -22,7 +22,8 @@ use report::Report;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-/// Runs what the command line asks for; the exit code is 1 if a row of ours fails undeclared.
+/// Runs what the command line asks for; the exit code is 1 if a row of ours fails undeclared, or
+/// declared ones fail too often.
 pub(crate) fn main() -> anyhow::Result<ExitCode> {
     let args = Args::parse();
     let scale = args.scale();
@@ -37,11 +38,14 @@ pub(crate) fn main() -> anyhow::Result<ExitCode> {
     }
     let mut out = io::stdout().lock();
     writeln!(out, "{}", report.summary())?;
-    let undeclared = report.undeclared_failures();
+    let (undeclared, frequent) = (report.undeclared_failures(), report.frequent_failures());
     for row in &undeclared {
         writeln!(out, "FAILED: {row}")?;
     }
-    Ok(if undeclared.is_empty() {
+    for failure in &frequent {
+        writeln!(out, "FAILED too often: {failure}")?;
+    }
+    Ok(if undeclared.is_empty() && frequent.is_empty() {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE

@@ -2,7 +2,7 @@
 
 use super::args::Args;
 use super::host::RunInfo;
-use super::known::KNOWN_FAILURES;
+use super::known::{KNOWN_FAILURES, KnownFailure};
 use super::method::Method;
 use super::row::Row;
 use super::runner::Timings;
@@ -74,6 +74,23 @@ impl Report {
         (self.rows.iter())
             .filter(|row| row.is_undeclared_failure())
             .collect()
+    }
+
+    /// Declared failures of ours that are more frequent than chance makes them, in words.
+    pub(crate) fn frequent_failures(&self) -> Vec<String> {
+        let ours = || {
+            self.rows
+                .iter()
+                .filter(|row| row.method == Method::Tldi.name())
+        };
+        let told = |known: &KnownFailure| {
+            let [failed, of] = known.excess(ours())?;
+            let (scene, case) = (known.scene, known.case_prefix);
+            Some(format!(
+                "{scene} / {case}: {failed} of {of}, declared are {known}"
+            ))
+        };
+        KNOWN_FAILURES.iter().filter_map(told).collect()
     }
 
     /// One line that says when, where and of what.
@@ -192,7 +209,7 @@ impl Report {
                 None => format!("{} rows, as {}", rows.len(), row.case),
             };
             let _infallible = write!(text, "- {} / {cases}: {reason}", row.scene);
-            if let Some(cause) = row.known_cause {
+            if let Some(cause) = &row.known_cause {
                 let _infallible = write!(text, ". **Known:** {cause}");
             }
             text.push('\n');

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 /// What one method did in one case.
-#[derive(Clone, Debug, Serialize, PartialEq)]
+#[derive(Clone, Debug, Default, Serialize, PartialEq)]
 pub(crate) struct Row {
     /// Name of the scene.
     pub(crate) scene: &'static str,
@@ -25,7 +25,7 @@ pub(crate) struct Row {
     pub(crate) reason: Option<String>,
     /// The cause of a failure of ours that is known.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) known_cause: Option<&'static str>,
+    pub(crate) known_cause: Option<String>,
 }
 
 impl Row {

@@ -1,23 +1,19 @@
 //! Scans and models as they come, against what is known of them. Skipped where they are not.
 
-use std::path::PathBuf;
+#[allow(
+    dead_code,
+    unreachable_pub,
+    reason = "a part of another package, of which this one uses a part"
+)]
+#[path = "../../../tests/testkit/skip.rs"]
+mod skip;
+
 use tldi::glamx::{DVec3, Vec3};
 use tldi_sources::{RawCloud, ReadOptions, read};
 
 /// The file in the folder of test data, unless it is not there.
 fn data(name: &str) -> Option<RawCloud> {
-    let folder = std::env::var_os("TLDI_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    let path = folder.join(name);
-    if !path.exists() {
-        eprintln!(
-            "SKIPPED: {name} is not in {} (set TLDI_DATA)",
-            folder.display()
-        );
-        return None;
-    }
+    let path = skip::test_data(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."), name)?;
     Some(read(&path, &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}")))
 }
 

@@ -1,5 +1,13 @@
 //! A device of their own for tests that change or break it.
 
+#[allow(
+    dead_code,
+    unreachable_pub,
+    reason = "a part of another package, of which this one uses a part"
+)]
+#[path = "../../../tests/testkit/skip.rs"]
+mod skip;
+
 use crate::{AdapterChoice, Gpu, GpuError};
 
 /// A device that no other test has; `None` (said loudly) where there is none.
@@ -33,17 +41,7 @@ pub(crate) fn open_small(bytes: u64) -> Option<Gpu> {
     }))
 }
 
-#[allow(
-    clippy::print_stderr,
-    reason = "a test that is skipped for want of a GPU must say so"
-)]
 fn told(opened: Result<Gpu, GpuError>) -> Option<Gpu> {
-    match opened {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var_os("TLDI_REQUIRE_GPU").is_some() => panic!("{error}"),
-        Err(error) => {
-            eprintln!("SKIPPED: {error} (set TLDI_REQUIRE_GPU to make this a failure)");
-            None
-        }
-    }
+    let said = |error: GpuError| skip::skip(&error.to_string(), skip::REQUIRE_GPU);
+    opened.map_err(said).ok()
 }

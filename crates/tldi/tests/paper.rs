@@ -4,7 +4,10 @@ mod paper_support;
 
 use paper_support::build as build_at;
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{Facing, Layer, Params, PointCloud, Tldi, VirtualCamera, paper};
+use tldi::{
+    Backend, CpuBackend, Facing, Layer, PairQuery, Params, PointCloud, Surface, Tldi, View,
+    VirtualCamera, paper,
+};
 
 fn build(cloud: &PointCloud, camera: &VirtualCamera, params: &Params) -> Tldi {
     build_at(cloud, &Pose3::IDENTITY, camera, params)
@@ -52,6 +55,10 @@ fn parallel_sheets_collide_within_the_compressed_thickness() {
     let points = sheet(0.05, 0.0);
     let radius = 0.05;
     let cloud = PointCloud::builder(&points).radius(radius).build().unwrap();
+    // The same sheet, elsewhere in a frame of its own: a backend must look at it where its pose puts it.
+    let lifted = sheet(0.05, 0.3);
+    let lifted = PointCloud::builder(&lifted).radius(radius).build().unwrap();
+    let (mut backend, mut results) = (CpuBackend::new(), Vec::new());
     let camera = VirtualCamera::along(Vec3::Z, 0.03);
     for rho in [0.0, 0.05, 0.5] {
         let params = Params {
@@ -83,6 +90,19 @@ fn parallel_sheets_collide_within_the_compressed_thickness() {
                     (found.gap.unwrap() - gap).abs() < 1e-6,
                     "{found:?} for {gap}"
                 );
+                let query = PairQuery {
+                    a: Surface::Cloud(&cloud),
+                    b: Surface::Cloud(&lifted),
+                    a_from_b: Pose3::translation(0.0, 0.0, sign * distance - 0.3),
+                    view: View::Fixed(camera),
+                    params,
+                };
+                backend.compare(&[query], &mut results).unwrap();
+                let [result] = &results[..] else {
+                    panic!("{results:?}");
+                };
+                assert_eq!(result.collides, collides, "rho {rho} distance {distance}");
+                assert!((result.gap.unwrap() - gap).abs() < 1e-6, "{gap}");
             }
         }
     }

@@ -4,6 +4,7 @@ mod drops;
 mod ground;
 
 use crate::suite::case::{Cases, Scale, Scene, Setup, Stop, Verdict};
+use crate::suite::known::{UNLIKELY, chance_of_as_many};
 use drops::{Outcome, SizeClass, Target, run_drop};
 
 /// The scene.
@@ -64,7 +65,14 @@ fn drop_all(
         }
     }
     verdict.note("drops", count as f64);
+    // Of 50 drops of a row, 35 to 49 hit.
+    let missed = count as u32 - hits;
     verdict.note("hits", hits);
+    verdict.require(
+        "hits",
+        chance_of_as_many([missed, count as u32], 0.3) > UNLIKELY,
+        || format!("only {hits} of {count} hit"),
+    );
     verdict.note("passed_through", failures.len() as f64);
     verdict.note(
         "passed_share",

@@ -63,7 +63,9 @@ fn fast_bodies_stop() -> TestResult {
                     for floor in floors.into_iter().take(1 + usize::from(is_cloud)) {
                         let is_exact = floor.shape.as_cuboid().is_some();
                         let lowest = lowest(body(), floor, velocity)?;
-                        assert!(lowest > 0.0, "{lowest}: {velocity:?}, exact {is_exact}");
+                        // The corners of the largest are 0.35 m from its middle.
+                        let stops = 0.0 < lowest && lowest < 0.5;
+                        assert!(stops, "{lowest}: {velocity:?}, exact {is_exact}");
                     }
                 }
             }

@@ -11,3 +11,4 @@ mod refusals;
 mod resting;
 mod rolling;
 mod sides;
+mod split_sets;

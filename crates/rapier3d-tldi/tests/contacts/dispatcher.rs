@@ -1,6 +1,7 @@
 //! What the dispatcher answers, asked directly, as rapier's narrow phase asks it.
 
 use crate::common::{SPACING, cube, shape, square};
+use rapier3d::glamx::Vec3Swizzles;
 use rapier3d::parry::query::{
     DefaultQueryDispatcher, PersistentQueryDispatcher, QueryDispatcher, Unsupported,
 };
@@ -96,7 +97,7 @@ fn both_orders_mirror_each_other() {
 }
 
 /// What is within the roughness of a rough floor of touching touches, and what is deeper counts by
-/// what it is deeper; smooth surfaces are trusted as they are.
+/// what it is deeper; smooth surfaces are trusted as they are, but for the 0.07 of a radius by which gaps at edges scatter.
 #[test]
 fn gaps_count_beyond_the_roughness() {
     let mut rng = fastrand::Rng::with_seed(1);
@@ -105,7 +106,7 @@ fn gaps_count_beyond_the_roughness() {
     for point in &mut rough {
         point.y += 0.5 * SPACING * (rng.f32() - 0.5);
     }
-    for (floor, least, most) in [(shape(&square(0.6)), 0.0, 0.2), (shape(&rough), 0.05, 0.2)] {
+    for (floor, least, most) in [(shape(&square(0.6)), 0.0, 0.09), (shape(&rough), 0.05, 0.2)] {
         for depth in [-0.005, 0.002, 0.008, 0.02] {
             let pose = Pose::from_translation(Vector::Y * (0.2 - depth));
             let gaps = |scatter| {
@@ -221,4 +222,42 @@ fn queries_of_others_are_declined() {
         ours.closest_points(&pose, &cuboid, &ball, 2.0).err(),
     ];
     assert_eq!(declined, [Some(Unsupported); 3]);
+}
+
+/// A cube in the corner of a floor and a wall. One view along the least overlap of the bounds sees one of them edge-on; the
+/// default looks at both. So it is with a wall alone that the one view sees edge-on.
+#[test]
+fn the_camera_policy_is_that_of_the_settings() {
+    let half = 0.2;
+    let wall = || square(0.6).into_iter().map(|p| p.yxz() - 0.6 * Vector::X);
+    let floor = || square(0.6).into_iter();
+    let corner = shape(
+        &floor()
+            .chain(wall().map(|p| p + 0.6 * Vector::Y))
+            .collect::<Vec<_>>(),
+    );
+    let body = shape(&cube(half));
+    let pose = Pose::from_translation(Vector::new(-0.6 + half - 0.002, half - 0.001, 0.0));
+    for (camera_policy, faces) in [
+        (CameraPolicy::ContactZone, 2),
+        (CameraPolicy::SmallestExtent, 1),
+    ] {
+        let config = TldiConfig {
+            camera_policy,
+            ..TldiConfig::default()
+        };
+        let ours = TldiPipeline::new(config)
+            .expect("valid settings")
+            .dispatcher();
+        let found = contacts(&ours, &pose, &corner, &body).expect("answered");
+        let is_met = |axis: Vector| {
+            found
+                .iter()
+                .any(|(_, normal, _)| normal.dot(axis).abs() > 0.9)
+        };
+        let met = [Vector::X, Vector::Y]
+            .into_iter()
+            .filter(|axis| is_met(*axis));
+        assert_eq!(met.count(), faces, "{camera_policy:?}: {found:?}");
+    }
 }

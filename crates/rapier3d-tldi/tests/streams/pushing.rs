@@ -136,8 +136,11 @@ fn what_is_locked_is_not_spun() -> TestResult {
     let (body, _) = world.insert(locked, box_collider());
     let mut fastest = 0.0_f32;
     rise((&mut world, &mut tldi), floor, (4.0, 30), |world, _| {
-        fastest = fastest.max(world.bodies[body].linvel().length());
+        let body = &world.bodies[body];
+        let of_edges = HALF * body.angvel().length();
+        fastest = fastest.max(body.linvel().length()).max(of_edges);
     })?;
+    // Rapier corrects penetrations at up to 3 m/s, here by spinning the body.
     assert!(fastest < 10.0, "{fastest} m/s");
     Ok(())
 }
