@@ -84,7 +84,7 @@ fn accuracy_of_samples() {
 }
 
 /// Error, false negatives, the deepest of them, in all cases of a model.
-pub(crate) fn of_all_cases(model: &str, name: &str) -> Option<Vec<f64>> {
+fn of_all_cases(model: &str, name: &str) -> Option<Vec<f64>> {
     let keys = [
         "error_pct",
         "false_negative_pct",

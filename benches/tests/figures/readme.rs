@@ -1,92 +1,85 @@
 //! The README.
 
-use crate::accuracy::{median_ms, of_all_cases};
+use crate::accuracy::median_ms;
 use crate::frames::frame;
 use crate::table::{is_rounded, numbers};
 use crate::{number, page, stored};
+use serde_json::Value;
 
-/// Of the culled bit grid, times (of a sample) and errors (of all cases) divided by those of this library, by the radius of its
-/// balls. First for the balls that err least on each model, then for all larger ones.
-fn balls() -> [Vec<[f64; 2]>; 2] {
-    let (mut least, mut larger) = (Vec::new(), Vec::new());
+/// Wrong answers of a row.
+fn wrong(row: &Value) -> f64 {
+    let tallies = row["by_distance"].as_array().expect("tallies");
+    let of = |tally| number(tally, "false_negatives") + number(tally, "false_positives");
+    tallies.iter().map(of).sum()
+}
+
+/// Of both large models: this library's wrong answers to all cases; then those of the balls that err least, and the ends of
+/// their times (of a sample) divided by this library's; then the ends of both for all larger balls.
+fn counts() -> Vec<f64> {
+    let (mut ours, mut least, mut larger) = (Vec::new(), Vec::new(), Vec::new());
     for model in ["bunny_watertight", "armadillo_86k"] {
-        let ours = of_all_cases(model, "this project, pixel 1 r").expect("all cases");
+        ours.push(wrong(&stored(&format!("more_cases/{model}.json"))[0]));
         let sample = stored(&format!("accuracy/speed_accuracy_{model}.json"));
         let our_ms = median_ms(&sample, "default", "pixel_scale", 1.0).expect("the default");
-        let rows = stored(&format!("more_cases/peers_{model}.json"));
-        let grids = rows
+        let mut balls: Vec<_> = stored(&format!("more_cases/peers_{model}.json"))
             .iter()
-            .filter(|row| row["variant"] == "bit grid, culled");
-        let mut balls: Vec<_> = grids
+            .filter(|row| row["variant"] == "bit grid, culled")
             .map(|row| {
                 let radius = number(row, "radius_scale");
                 let ms = median_ms(&sample, "bit grid, culled", "radius_scale", radius);
-                let ratios = [
-                    ms.expect("the same balls in the sample") / our_ms,
-                    number(row, "error_pct") / ours[0],
-                ];
-                (radius, ratios)
+                let time = ms.expect("the same balls in the sample") / our_ms;
+                (radius, wrong(row), time)
             })
             .collect();
-        balls.sort_by(|m, n| m.1[1].total_cmp(&n.1[1]));
+        balls.sort_by(|m, n| m.1.total_cmp(&n.1));
         let best = balls.remove(0);
-        least.push(best.1);
         assert!(
             balls.iter().all(|ball| ball.0 > best.0),
             "{model}: smaller balls err more than {best:?}: {balls:?}"
         );
-        larger.extend(balls.into_iter().map(|ball| ball.1));
+        least.push(best);
+        larger.extend(balls);
     }
-    [least, larger]
-}
-
-/// Whether the four numbers are the ends of the ranges of times and of errors, rounded.
-fn assert_ranges(shown: [&str; 4], rows: &[[f64; 2]]) {
-    let ends = |k: usize| {
-        let of = || rows.iter().map(|row| row[k]);
+    type Ball = (f64, f64, f64);
+    let ends = |balls: &[Ball], of: fn(&Ball) -> f64| {
+        let values = || balls.iter().map(of);
         [
-            of().fold(f64::INFINITY, f64::min),
-            of().fold(f64::NEG_INFINITY, f64::max),
+            values().fold(f64::INFINITY, f64::min),
+            values().fold(f64::NEG_INFINITY, f64::max),
         ]
     };
-    let [times, errors] = [ends(0), ends(1)];
-    for (shown, is) in shown.iter().zip([times, errors].concat()) {
-        assert!(is_rounded(shown, is), "{shown} is {is}: {rows:?}");
+    ours.extend(least.iter().map(|ball| ball.1));
+    ours.extend(ends(&least, |ball| ball.2));
+    ours.extend(ends(&larger, |ball| ball.1));
+    ours.extend(ends(&larger, |ball| ball.2));
+    ours
+}
+
+/// Three texts have the counts in the same order, behind the number of all cases.
+#[test]
+fn wrong_answers() {
+    let counts = counts();
+    for (name, begin) in [
+        ("README.md", "**Accuracy.**"),
+        ("docs/benchmarks.md", "| wrong answers, all"),
+        ("docs/benchmarks.md", "On both large models, "),
+    ] {
+        let page = page(name);
+        let (_, text) = page.split_once(begin).expect("a paragraph");
+        let shown = numbers(text);
+        assert_eq!(shown[0], "27900", "{begin}");
+        for (shown, is) in shown[1..].iter().zip(&counts) {
+            assert!(
+                is_rounded(shown, *is),
+                "{begin}: {shown} is {is}: {counts:?}"
+            );
+        }
     }
 }
 
 #[test]
-fn the_readme() {
+fn a_grid_beside_it() {
     let page = page("README.md");
-    let [bunny, armadillo] = ["bunny_watertight", "armadillo_86k"]
-        .map(|model| of_all_cases(model, "this project, pixel 1 r").expect("all cases"));
-    let (_, accuracy) = page.split_once("**Accuracy.**").expect("a paragraph");
-    let shown = numbers(accuracy);
-    assert!(
-        is_rounded(&shown[1], bunny[0]) && is_rounded(&shown[2], armadillo[0]),
-        "{shown:?}"
-    );
-    // "Balls that err least err 7 to 8 times as often, in 0.5 to 0.9 of the time. Larger balls take 0.4 to 0.8 of the time
-    // and err 8 to 19 times as often."
-    let [least, larger] = balls();
-    let n = |k: usize| shown[k].as_str();
-    assert_ranges([n(5), n(6), n(3), n(4)], &least);
-    assert_ranges([n(7), n(8), n(9), n(10)], &larger);
-    // The same on the page of the benchmarks.
-    let benchmarks = crate::page("docs/benchmarks.md");
-    let row = benchmarks
-        .lines()
-        .find(|line| line.starts_with("| wrong answers"));
-    let shown = numbers(row.expect("a row"));
-    let n = |k: usize| shown[k].as_str();
-    assert_ranges([n(5), n(6), n(3), n(4)], &least);
-    assert_ranges([n(9), n(10), n(7), n(8)], &larger);
-    let (_, text) = (benchmarks.split_once("the balls that err least")).expect("a paragraph");
-    let shown = numbers(text);
-    let n = |k: usize| shown[k].as_str();
-    // Behind the radius.
-    assert_ranges([n(3), n(4), n(1), n(2)], &least);
-    assert_ranges([n(5), n(6), n(7), n(8)], &larger);
     // Deep: "0.3 of a grid's time or less, from 134,000 points"; slight: "up to 5 times faster".
     let rows = stored("frames/frames_generated.json");
     let ratio = |points, k| {
