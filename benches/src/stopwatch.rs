@@ -5,7 +5,7 @@ use std::time::Instant;
 
 /// Measures from when it was started. Work of one thread is measured in processor time of the thread
 /// that started it, so that other programs on the machine count as little as can be; work of several
-/// threads by the clock.
+/// threads or of a GPU by the clock.
 pub enum Stopwatch {
     /// Of this thread.
     Processor(ThreadTime),
@@ -23,8 +23,13 @@ impl Stopwatch {
     pub fn of_threads(threads: usize) -> Self {
         match threads {
             1 => Self::of_thread(),
-            _ => Self::Clock(Instant::now()),
+            _ => Self::of_clock(),
         }
+    }
+
+    /// For work of a device, for which this thread waits.
+    pub fn of_clock() -> Self {
+        Self::Clock(Instant::now())
     }
 
     /// Seconds since the start.

@@ -123,7 +123,11 @@ impl Comparison {
             noise,
             results,
         } = self;
-        let start = Stopwatch::of_threads(rayon::current_num_threads());
+        // Of a GPU's work this thread only waits for the end.
+        let start = match backend.name() {
+            "cpu" => Stopwatch::of_threads(rayon::current_num_threads()),
+            _ => Stopwatch::of_clock(),
+        };
         let (a, b) = rayon::join(|| cloud(frame, 0, *noise), || cloud(frame, 1, *noise));
         let built = start.seconds();
         let query = PairQuery {
@@ -178,5 +182,42 @@ impl Peer for TldiPeer {
             .threads
             .install(|| staged(|| comparison.compare(frame)));
         Some(times)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::tldi::{BackendError, CpuBackend};
+    use std::time::Duration;
+
+    /// Waits for a device.
+    struct Waiting(CpuBackend);
+
+    const WAIT: Duration = Duration::from_millis(30);
+
+    impl Backend for Waiting {
+        fn name(&self) -> &str {
+            "waiting"
+        }
+
+        fn compare(
+            &mut self,
+            queries: &[PairQuery<'_>],
+            results: &mut Vec<PairResult>,
+        ) -> Result<(), BackendError> {
+            std::thread::sleep(WAIT);
+            self.0.compare(queries, results)
+        }
+    }
+
+    #[test]
+    fn time_of_a_device_counts() {
+        let points = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let method = Method::Default { pixel_scale: 1.0 };
+        let backend = Box::new(Waiting(CpuBackend::new()));
+        let mut peer = TldiPeer::new(backend, method, 1).expect("a thread can be started");
+        let found = peer.compare(&Frame::new(&points, &points, 0.5));
+        assert!(found.query_seconds >= WAIT.as_secs_f64(), "{found:?}");
     }
 }
