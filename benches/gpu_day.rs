@@ -3,6 +3,7 @@
 
 use anyhow::Context;
 use clap::Parser;
+use std::fs::File;
 use std::path::PathBuf;
 use tldi_benches::gpu_day::{Report, Settings, print};
 use tldi_benches::stored::write_json;
@@ -56,14 +57,23 @@ fn main() -> anyhow::Result<()> {
                 .all(|n| (100..=20_000_000).contains(n)),
         "at least one repeat, and 100 to 20,000,000 points, are needed"
     );
+    anyhow::ensure!(
+        settings.parity_pairs > 0 && settings.seconds > 0.0,
+        "--pairs and --seconds must be above 0: else no answer is checked"
+    );
+    // Before minutes of measuring.
+    if let Some(path) = &args.json {
+        let opened = File::options().create(true).append(true).open(path);
+        opened.with_context(|| format!("cannot write {}", path.display()))?;
+    }
     if let Some(out) = &args.out {
         std::fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
     }
     let report = Report::measure(settings, args.out.as_deref())?;
+    print(&report);
     if let Some(path) = &args.json {
         write_json(path, &report)?;
     }
-    print(&report);
     anyhow::ensure!(report.faults.is_empty(), "answers are wrong: see above");
     Ok(())
 }
