@@ -41,10 +41,11 @@ pub struct Card {
 
 /// The device that the other parts use, and what it is.
 pub(super) fn open() -> anyhow::Result<(Gpu, Card)> {
-    let adapter = any_adapter()?;
+    // First of all, so that the driver is loaded within the time.
     let start = Instant::now();
     let gpu = Gpu::open(AdapterChoice::Any)?;
     let open_seconds = start.elapsed().as_secs_f64();
+    let adapter = any_adapter()?;
     let compile_seconds = seconds_to_compile(&gpu)?;
     let compile_again_seconds = seconds_to_compile(&Gpu::open(AdapterChoice::Any)?)?;
     let info = gpu.device().adapter_info();
