@@ -91,6 +91,7 @@ fn edge_meets([p, q]: [DVec3; 2], [a, b, c]: &[DVec3; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::protocol::cases;
 
     /// A regular tetrahedron.
     fn tetrahedron() -> ExactMesh {
@@ -113,6 +114,25 @@ mod tests {
         assert!(!triangles_intersect(&floor, &spike(1e-12)));
         let beside = t([[2.0, -1.0, 0.0], [3.0, 1.0, 0.0], [2.0, 1.0, 1.0]]);
         assert!(!triangles_intersect(&floor, &beside));
+    }
+
+    /// No pair of triangles is lost that all pairs, one by one, find.
+    #[test]
+    fn no_near_pair_is_lost() {
+        let (points, faces) = crate::bumpy_ball(100);
+        let mesh = ExactMesh::new(&points, &faces);
+        let mut met = [0; 2];
+        for case in cases(310) {
+            let exact = DPose3::from_parts(
+                case.a_from_b.translation.as_dvec3(),
+                case.a_from_b.rotation.as_dquat().normalize(),
+            );
+            let mut moved = mesh.triangles.iter().map(|t| t.map(|p| exact * p));
+            let meets = moved.any(|b| mesh.triangles.iter().any(|a| triangles_intersect(a, &b)));
+            assert_eq!(mesh.intersects(&mesh, &case.a_from_b), meets, "{case:?}");
+            met[usize::from(meets)] += 1;
+        }
+        assert!(met.iter().all(|count| *count > 50), "{met:?}");
     }
 
     /// Whether they touch is known to the last bit, and does not depend on the order of corners.
