@@ -167,6 +167,14 @@ fn check(args: &Args) -> anyhow::Result<()> {
             && args.resolution.iter().all(|n| (16..=8192).contains(n)),
         "rho must be within 0 and 1, resolutions within 16 and 8192"
     );
+    // The last of a sweep must not end what others have measured.
+    let only_told = |&variant: &VariantChoice| variant == VariantChoice::Told;
+    ensure!(
+        args.variant.is_empty()
+            || !args.variant.iter().all(only_told)
+            || args.noise.iter().all(|s| *s > 0.0),
+        "--variant told needs noise above 0 in all of --noise: else there is nothing to tell"
+    );
     Ok(())
 }
 
@@ -211,7 +219,7 @@ fn contenders(args: &Args, model: &Model, noise: f32) -> anyhow::Result<Vec<Cont
     }
     ensure!(
         !all.is_empty(),
-        "no method is left: of --variant, --only and --without, or no noise to tell"
+        "no peer is left: of --only and --without, which choose among peers alone"
     );
     Ok(all)
 }

@@ -86,6 +86,10 @@ fn main() -> anyhow::Result<()> {
             provenance.adapter = adapter(peers).or(provenance.adapter);
         }
     }
+    ensure!(
+        !rows.is_empty(),
+        "no method that --only and --without leave takes such frames: meshes need a --model with faces"
+    );
     args.run.store(provenance, rows)?;
     Ok(())
 }
