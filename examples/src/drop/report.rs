@@ -18,7 +18,7 @@ pub struct DropReport {
     pub mean_radius: f32,
     /// Up direction, in the frame of the scan.
     pub up: [f32; 3],
-    /// Deepest penetration in metres after the last step.
+    /// Deepest penetration in metres of the last step's contacts, which are those of the poses before it.
     pub max_penetration: f32,
     /// The bodies, in the order in which they were inserted.
     pub bodies: Vec<DropBody>,

@@ -51,9 +51,9 @@ pub struct LinkReport {
     pub points: usize,
     /// Steps in which it touched the scan, a loose body or another link.
     pub contact_steps: usize,
-    /// Largest contact force in one step, N.
+    /// Largest normal force of its contacts in one step, without friction, N.
     pub max_force: f32,
-    /// Mean contact force over the steps with contact, N.
+    /// Mean normal force over the steps with contact, N.
     pub mean_force: f32,
     /// When that largest force was, and what pushed; null if nothing touched it.
     pub hardest: Option<Hardest>,

@@ -234,7 +234,7 @@ impl RobotSimulation {
         !touched.is_empty()
     }
 
-    /// Contact force in N on the link that was pushed most in the last step.
+    /// Normal force in N on the link that was pushed most in the last step.
     pub fn largest_force(&self) -> f32 {
         let forces = self.tally.iter().map(|tally| tally.force);
         forces.fold(0.0, f32::max)

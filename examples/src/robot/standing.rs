@@ -113,7 +113,7 @@ impl Standing {
         }
     }
 
-    /// After a step: contacts (point and depth) with the scan, and the contact force of each link.
+    /// After a step: contacts (point and depth) with the scan, and the normal force on each link.
     pub(super) fn observe(
         &mut self,
         scan: &PointCloud<'_>,

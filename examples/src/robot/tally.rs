@@ -1,4 +1,4 @@
-//! Contact forces of each link, step by step.
+//! Normal forces of each link's contacts, without friction, step by step.
 
 use super::report::{Hardest, LinkReport};
 use rapier3d::prelude::*;
@@ -9,7 +9,7 @@ use tldi::glamx::Vec3;
 pub(super) struct LinkTally {
     /// Whether it touched something in the last step.
     pub(super) touches: bool,
-    /// Contact force in the last step, N.
+    /// Normal force of its contacts in the last step, N.
     pub(super) force: f32,
     contact_steps: usize,
     max_force: f32,
