@@ -72,6 +72,16 @@ fn a_frame_without_points_is_passed_over() {
     let report = report(BINARY, &folder, &format!("{ONE_BODY} frames"));
     let frames = list(&report["frames"]);
     assert_eq!(frames.len(), 60);
+    // The second for which the first frame is held counts in no median.
+    let is_new = |frame: &&Value| frame["held"] == false;
+    let mut latencies: Vec<f64> = (frames.iter().filter(is_new))
+        .map(|frame| number(&frame["latency_ms"]))
+        .collect();
+    assert_eq!(latencies.len(), 30);
+    latencies.sort_by(f64::total_cmp);
+    assert_eq!(number(&report["median_latency_ms"]), latencies[14]);
+    // The surface below is the one that stayed.
+    assert!(!report["bodies"][0]["displacement"].is_null(), "{report}");
     let empty = frames.iter().filter(|frame| frame["points"] == 0);
     assert!(empty.eq([&frames[37], &frames[59]]));
     assert_height(&report, 0.35);

@@ -24,9 +24,9 @@ pub struct DepthReport {
     pub deepest: ContactKinds,
     /// Frames that are listed but not there, without a pose, or without a point before the first that has some.
     pub missing_frames: Vec<String>,
-    /// Median of the frames' `latency_ms`.
+    /// Median of the `latency_ms` of the frames that are not `held`.
     pub median_latency_ms: f64,
-    /// Largest of the frames' `latency_ms`.
+    /// Largest of them.
     pub max_latency_ms: f64,
     /// The frames, in the order in which they came.
     pub frames: Vec<FrameReport>,
@@ -39,6 +39,8 @@ pub struct DepthReport {
 pub struct FrameReport {
     /// Name of the file.
     pub name: String,
+    /// Whether it is the frame before once more: it counts in no median.
+    pub held: bool,
     /// Points.
     pub points: usize,
     /// Pixels without a measurement.
@@ -99,7 +101,7 @@ impl Report for DepthReport {
             ("latency ms", &|f| f.latency_ms),
         ];
         for (name, value) in rows {
-            let [median, most] = median_and_most(self.frames.iter().map(value));
+            let [median, most] = median_and_most(self.frames.iter().filter(|f| !f.held).map(value));
             let digits = if name.ends_with("ms") { 2 } else { 0 };
             writeln!(out, "{name:<22} {median:>10.digits$} {most:>10.digits$}")?;
         }

@@ -104,7 +104,6 @@ impl DepthSimulation {
     ) -> anyhow::Result<Self> {
         let DepthScene { mut camera, up, .. } = scene;
         let points = camera.points(&first.depths, &first.world_from_camera)?;
-        let seen = points.points.clone();
         let cloud = points.into_builder().build()?.into_owned();
         let mut stage = Stage::new(up, backend)?;
         // Its mass is never asked for: it is fixed.
@@ -119,7 +118,8 @@ impl DepthSimulation {
                 let lift = height * (1.0 + 2.0 * spot.level as f32);
                 let pose = Pose3::from_parts(spot.surface + lift * up, upright * turn);
                 let radius = load::ball_radius(&named.cloud);
-                let below = height_below(&seen, pose.translation, radius, up);
+                let surface = stage.cloud(surface).map_or(&[][..], PointCloud::points);
+                let below = height_below(surface, pose.translation, radius, up);
                 Followed {
                     body: Body::insert(&mut stage, named, pose, MATERIAL),
                     radius,
@@ -153,6 +153,7 @@ impl DepthSimulation {
         let unprojected = start.elapsed();
         let mut report = FrameReport {
             name: frame.name.clone(),
+            held: (self.frames.last()).is_some_and(|last| last.name == frame.name),
             points: points.points.len(),
             empty_pixels: points.empty,
             flying_pixels: points.flying,
@@ -162,8 +163,7 @@ impl DepthSimulation {
         };
         let whole = (self.memory).complete(points, &self.camera, &frame.world_from_camera);
         report.remembered_points = whole.points.len() - report.points;
-        let seen = whole.points.clone();
-        if !seen.is_empty() {
+        if !whole.points.is_empty() {
             let cloud = whole.into_builder().build()?.into_owned();
             let Stage { world, tldi, .. } = &mut self.stage;
             tldi.set_cloud(world, self.surface, cloud)?;
@@ -180,7 +180,7 @@ impl DepthSimulation {
         }
         let seconds = start.elapsed().as_secs_f64();
         self.stage.totals.add_wall_seconds(seconds);
-        self.follow(&seen);
+        self.follow();
         if self.former.len() == MOVED_FRAMES {
             self.former.pop_front();
         }
@@ -192,7 +192,8 @@ impl DepthSimulation {
 
     /// Notes where the bodies are relative to the surface below them, which drifts with the poses of the
     /// frames, and which of them rest.
-    fn follow(&mut self, surface: &[Vec3]) {
+    fn follow(&mut self) {
+        let surface = (self.stage.cloud(self.surface)).map_or(&[][..], PointCloud::points);
         for body in &mut self.bodies {
             let place = self.stage.pose(body.body.handle).translation;
             let Some(below) = height_below(surface, place, body.radius, self.up) else {
@@ -263,7 +264,8 @@ impl DepthSimulation {
 
     /// What happened so far.
     pub fn report(&self, missing_frames: Vec<String>) -> DepthReport {
-        let latencies = self.frames.iter().map(|frame| frame.latency_ms);
+        let new = self.frames.iter().filter(|frame| !frame.held);
+        let latencies = new.map(|frame| frame.latency_ms);
         let [median_latency_ms, max_latency_ms] = median_and_most(latencies);
         DepthReport {
             totals: self.stage.totals.clone(),
