@@ -2,6 +2,7 @@
 
 use crate::query::{Answer, CloudQuery};
 use crate::query_views::Views;
+use std::collections::HashMap;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{CloudError, ContactPixel, Facing, KdTree, PointCloud, Tldi, VirtualCamera};
 use tldi_pictures::sheet::{Key, Panel, sheet};
@@ -153,9 +154,13 @@ fn contact_panel(query: &CloudQuery, answer: &Answer, view: usize) -> Panel {
         .collect();
     let views = Views::of_contacts(query, answer, view, &contacts);
     let images = views.images(query);
+    // Of several on one pixel, the first.
+    let at_pixel: HashMap<[i32; 2], &ContactPixel> = (contacts.iter().rev())
+        .map(|contact| (contact.pixel, *contact))
+        .collect();
     let mut picture = views.panel(CONTACTS_EDGE, |x, y| {
         let covered = (images.each_ref()).map(|image| !views.layers_at(image, [x, y]).is_empty());
-        let Some(contact) = contacts.iter().find(|c| c.pixel == [x, y]) else {
+        let Some(contact) = at_pixel.get(&[x, y]) else {
             return match covered {
                 [true, true] => BOTH,
                 [true, false] => ONLY[0],

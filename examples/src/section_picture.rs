@@ -3,6 +3,7 @@
 use crate::query::{Answer, CloudQuery};
 use crate::query_pictures::{DEEP, NOTHING, faded, set_pixel};
 use crate::query_views::Views;
+use std::collections::HashMap;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Facing, Layer, PointCloud};
 use tldi_pictures::Picture;
@@ -56,12 +57,16 @@ pub fn section(query: &CloudQuery, answer: &Answer) -> Picture {
 fn fullest_row(views: &Views, answer: &Answer) -> i32 {
     let by_query = answer.params.pixel_size / views.params.pixel_size;
     let contacts = (answer.result.contacts.iter()).filter(|contact| contact.view == 0);
-    let rows: Vec<i32> = contacts
-        .map(|contact| ((contact.pixel[1] as f32 + 0.5) * by_query).floor() as i32)
-        .collect();
-    let count = |row: i32| rows.iter().filter(|other| **other == row).count();
-    let fullest = rows.iter().copied().max_by_key(|row| (count(*row), -*row));
-    fullest.unwrap_or(views.origin[1] + views.size[1] as i32 / 2)
+    let mut counts: HashMap<i32, usize> = HashMap::new();
+    for contact in contacts {
+        let row = ((contact.pixel[1] as f32 + 0.5) * by_query).floor() as i32;
+        *counts.entry(row).or_default() += 1;
+    }
+    let fullest = counts
+        .into_iter()
+        .max_by_key(|(row, count)| (*count, -*row));
+    let middle = views.origin[1] + views.size[1] as i32 / 2;
+    fullest.map_or(middle, |(row, _)| row)
 }
 
 /// How a row is enlarged.
