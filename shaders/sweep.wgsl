@@ -255,7 +255,7 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
         && atomicLoad(&work[SPLATS]) <= batch.splats;
     let s = k / max(pixels, 1u);
     let pixel = k - s * pixels;
-    let exists = fits && k < 2u * pixels;
+    let exists = k < 2u * pixels;
     var begin = 0u;
     var end = 0u;
     var view = 0u;
@@ -264,8 +264,12 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
         view = view_of(pixel, false);
         begin = atomicLoad(&work[begin_at(s, pixel)]);
         end = atomicLoad(&work[end_at(s, pixel)]);
-        if end - begin > MOST_FRAGMENTS {
+        let is_crowded = end - begin > MOST_FRAGMENTS;
+        if fits && is_crowded {
             atomicStore(&found[view / MAX_VIEWS * PAIR_WORDS + CROWDED], 1u);
+        }
+        // Where not all fragments are there, no pixel has layers: later stages would take what is left of others for some.
+        if !fits || is_crowded {
             end = begin;
         }
     }

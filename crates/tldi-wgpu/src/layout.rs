@@ -27,6 +27,8 @@ pub(crate) const PIXEL_BYTES: u64 = 4 * 4;
 pub(crate) const SAMPLE_SLOTS: u64 = numbers::SAMPLE_SLOTS as u64;
 pub(crate) const SAMPLE_BYTES: u64 = 32;
 pub(crate) const MAX_VIEWS: u32 = plan::MAX_VIEWS as u32;
+// The shaders have words, lanes and arrays for three.
+const _: () = assert!(MAX_VIEWS == 3);
 
 /// Splats that a fragment can number.
 pub(crate) const MOST_SPLATS: u32 = 1 << (u32::BITS - WEIGHT_BITS);
