@@ -163,6 +163,38 @@ fn bad_radii_are_refused() {
     ));
 }
 
+/// Radii are looked at in blocks of points. The first fault counts, and faults of radii before those of coordinates.
+#[test]
+fn faults_are_found_anywhere() {
+    for at in [0, 1, 255, 256, 511, 512, 698] {
+        for bad in [
+            0.0,
+            -0.0,
+            -1.0,
+            -1e13,
+            f32::NAN,
+            -f32::NAN,
+            f32::INFINITY,
+            1e13,
+        ] {
+            let mut points: Vec<Vec3> = (0..700).map(|i| i as f32 * Vec3::X).collect();
+            let mut radii: Vec<f32> = (0..700).map(|i| 1.0 + i as f32).collect();
+            (radii[at], radii[699]) = (bad, 1e-20);
+            let error = error_of(&points, |b| b.radii(radii.clone()));
+            let is_first = matches!(error, CloudError::BadRadius { index, radius }
+                if index == at && radius.to_bits() == bad.to_bits());
+            assert!(is_first, "{bad} at {at}: {error}");
+            // A place that suits the radii of others.
+            (radii[at], radii[699]) = (1e-3, 1.0);
+            (points[at].y, points[699].y) = (-600.0, 1e6);
+            let error = error_of(&points, |b| b.radii(radii));
+            let is_first = matches!(error, CloudError::CoordinateTooLarge { index, coordinate, radius }
+                if index == at && coordinate == if at < 600 { -600.0 } else { at as f32 } && radius == 1e-3);
+            assert!(is_first, "{at}: {error}");
+        }
+    }
+}
+
 #[test]
 fn lengths_must_agree() {
     let points = [Vec3::ZERO, Vec3::NAN, Vec3::X];

@@ -8,7 +8,7 @@ use crate::cloud::morton::{morton_order, permuted};
 use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_cloud::{Spare, next_content_id};
 use crate::cloud::point_normals::{fill_from_nearest, normalize, turn_towards};
-use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
+use crate::cloud::radii::{check_radii, mean_and_max};
 use crate::stage::stage;
 use crate::{Aabb, CloudError, CloudRecipe, NonFinite, PointCloud, Radii, RadiusRule};
 use glamx::Vec3;
@@ -262,8 +262,7 @@ impl<'a> CloudBuilder<'a> {
             (None, RadiusRule::Global(radius)) => Radii::Global(radius),
             (None, RadiusRule::NearestNeighbors { .. }) => Radii::PerPoint(found.radii.into()),
         };
-        check_radii(&radii, given_index)?;
-        check_coordinates(&points, bounds, &radii, given_index)?;
+        check_radii(&points, &blocks, &radii, given_index)?;
 
         let normals_given = normals.is_some();
         let normals = match (normals, recipe.viewpoint) {

@@ -5,7 +5,7 @@ use crate::cloud::gather::{Gathered, extend_without, index_before_drop, merged};
 use crate::cloud::morton::permuted;
 use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_normals::{fill_from_nearest, normalize, unit_or_zero};
-use crate::cloud::radii::{check_coordinates, check_radii, mean_and_max};
+use crate::cloud::radii::{check_radii, mean_and_max};
 use crate::stage::stage;
 use crate::{Aabb, CloudError, CloudRecipe, Radii, RadiusRule};
 use glamx::Vec3;
@@ -93,10 +93,7 @@ impl<'a> PointCloud<'a> {
 
     /// Radius of one point in metres.
     pub fn radius(&self, index: usize) -> f32 {
-        match &self.radii {
-            Radii::Global(r) => *r,
-            Radii::PerPoint(r) => r[index],
-        }
+        self.radii.of(index)
     }
 
     /// Mean radius r̄ in metres.
@@ -360,8 +357,7 @@ impl<'a> PointCloud<'a> {
             let kept = order.map_or(i, |order| order[i] as usize);
             index_before_drop(kept, &gathered.dropped)
         };
-        check_radii(radii, given_index)?;
-        check_coordinates(new_points, bounds, radii, given_index)?;
+        check_radii(new_points, &gathered.blocks, radii, given_index)?;
         if let Some(normals) = normals {
             new_normals.clear();
             match order {
@@ -415,8 +411,7 @@ impl<'a> PointCloud<'a> {
             }
         }
         let given_index = |i: usize| self.order.as_ref().map_or(i, |order| order[i] as usize);
-        check_radii(&radii, given_index)?;
-        check_coordinates(&self.points, self.bounds, &radii, given_index)?;
+        check_radii(&self.points, &self.blocks, &radii, given_index)?;
         (self.mean_radius, self.max_radius) = mean_and_max(&radii);
         self.radii_given = matches!(radii, Radii::PerPoint(_));
         self.radii_kept = false;

@@ -1,9 +1,10 @@
 //! Point radii: validation, and the spherical cover from nearest neighbours.
 
+use crate::cloud::gather::BLOCK;
 use crate::{Aabb, CloudError, KdTree};
 use glamx::Vec3;
 use std::borrow::Cow;
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 /// Radius of the ball around each point, in metres.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,6 +13,16 @@ pub enum Radii<'a> {
     Global(f32),
     /// One for each point.
     PerPoint(Cow<'a, [f32]>),
+}
+
+impl Radii<'_> {
+    /// Of the i-th point.
+    pub(crate) fn of(&self, i: usize) -> f32 {
+        match self {
+            Self::Global(radius) => *radius,
+            Self::PerPoint(radii) => radii[i],
+        }
+    }
 }
 
 /// Radii in metres that a cloud accepts: with [`COORDINATE_PER_RADIUS`], squares and cubes of all
@@ -30,73 +41,86 @@ pub(crate) fn is_valid(radius: f32) -> bool {
     RADIUS_RANGE.contains(&radius)
 }
 
-/// Fails for the first radius that a cloud does not accept. `given_index` turns an index of
-/// `radii` into the user's.
+/// Fails for the first radius that a cloud does not accept, then for the first point whose coordinates are too coarse for
+/// its radius. `blocks` are the [bounds](crate::cloud::gather::bounds_of_blocks) of the points; `given_index` turns an
+/// index of the points into the user's.
+///
+/// Cost: a pass over the radii; only blocks that have something wrong are looked at point by point.
 pub(crate) fn check_radii(
-    radii: &Radii<'_>,
-    given_index: impl Fn(usize) -> usize,
-) -> Result<(), CloudError> {
-    let bad = |index, radius| Err(CloudError::BadRadius { index, radius });
-    match radii {
-        Radii::Global(r) if !is_valid(*r) => bad(0, *r),
-        Radii::Global(_) => Ok(()),
-        Radii::PerPoint(r) => match r.iter().position(|r| !is_valid(*r)) {
-            Some(i) => bad(given_index(i), r[i]),
-            None => Ok(()),
-        },
-    }
-}
-
-/// Fails for the first point whose coordinates are too coarse for its radius. `given_index` turns
-/// an index of the coordinates into the user's.
-pub(crate) fn check_coordinates(
     points: &[Vec3],
-    bounds: Aabb,
+    blocks: &[Aabb],
     radii: &Radii<'_>,
     given_index: impl Fn(usize) -> usize,
 ) -> Result<(), CloudError> {
-    let largest = |i: usize| points[i].abs().max_element();
-    let too_large = match radii {
-        Radii::Global(r) => {
-            let limit = COORDINATE_PER_RADIUS * r;
-            if bounds.min.abs().max(bounds.max.abs()).max_element() <= limit {
-                return Ok(());
-            }
-            (0..points.len()).find(|&i| largest(i) > limit)
-        }
-        Radii::PerPoint(r) => {
-            (0..points.len()).find(|&i| largest(i) > COORDINATE_PER_RADIUS * r[i])
-        }
-    };
-    match too_large {
+    let is_bad = |[least, largest]: [f32; 2]| !(is_valid(least) && is_valid(largest));
+    let of_block = |k: usize| k * BLOCK..points.len().min((k + 1) * BLOCK);
+    let mut bad = (0..blocks.len()).filter(|&k| is_bad(extremes(radii, of_block(k))));
+    if let Some(i) = bad.find_map(|k| of_block(k).find(|&i| !is_valid(radii.of(i)))) {
+        let radius = radii.of(i);
+        // One for all has no index.
+        let index = match radii {
+            Radii::Global(_) => 0,
+            Radii::PerPoint(_) => given_index(i),
+        };
+        return Err(CloudError::BadRadius { index, radius });
+    }
+    let is_coarse = |coordinate: f32, radius: f32| coordinate > COORDINATE_PER_RADIUS * radius;
+    let coarse = blocks.iter().enumerate().filter(|(k, block)| {
+        let largest = block.min.abs().max(block.max.abs()).max_element();
+        is_coarse(largest, extremes(radii, of_block(*k))[0])
+    });
+    let of_point = |i: &usize| is_coarse(points[*i].abs().max_element(), radii.of(*i));
+    match coarse.flat_map(|(k, _)| of_block(k)).find(of_point) {
         None => Ok(()),
         Some(i) => Err(CloudError::CoordinateTooLarge {
             index: given_index(i),
             coordinate: (points[i].to_array().into_iter())
                 .fold(0.0, |a: f32, b| if b.abs() > a.abs() { b } else { a }),
-            radius: match radii {
-                Radii::Global(r) => *r,
-                Radii::PerPoint(r) => r[i],
-            },
+            radius: radii.of(i),
         }),
     }
 }
 
-/// Mean and largest radius in metres.
+/// Mean and largest of valid radii in metres.
 pub(crate) fn mean_and_max(radii: &Radii<'_>) -> (f32, f32) {
+    let Radii::PerPoint(all) = radii else {
+        let radius = radii.of(0);
+        return (radius, radius);
+    };
+    // As many sums as are added at once, always in the same order.
+    let mut sums = [0.0; 8];
+    let (chunks, rest) = all.as_chunks::<8>();
+    for chunk in chunks {
+        for (sum, radius) in sums.iter_mut().zip(chunk) {
+            *sum += f64::from(*radius);
+        }
+    }
+    let sum: f64 = sums
+        .into_iter()
+        .chain(rest.iter().copied().map(f64::from))
+        .sum();
+    let [_, largest] = extremes(radii, 0..all.len());
+    ((sum / all.len() as f64) as f32, largest)
+}
+
+/// Least and largest of some radii. Their bits are compared as integers, since folds of these are vectorised: the order is
+/// that of positive numbers. Where a radius is negative, the least one is negative or NaN; where one is NaN, one of both is.
+fn extremes(radii: &Radii<'_>, points: Range<usize>) -> [f32; 2] {
     match radii {
-        Radii::Global(r) => (*r, *r),
-        Radii::PerPoint(r) => {
-            let sum: f64 = r.iter().copied().map(f64::from).sum();
-            let mean = (sum / r.len() as f64) as f32;
-            (mean, r.iter().copied().fold(0.0, f32::max))
+        Radii::Global(radius) => [*radius; 2],
+        Radii::PerPoint(radii) => {
+            let bits = radii[points].iter().map(|radius| radius.to_bits() as i32);
+            let [least, largest] = bits.fold([i32::MAX, i32::MIN], |[least, largest], bits| {
+                [least.min(bits), largest.max(bits)]
+            });
+            [least, largest].map(|bits| f32::from_bits(bits as u32))
         }
     }
 }
 
 /// Radii that cover a surface: of those of distinct positions, from the distance to a neighbour, let m be the
 /// median. Radii above [`CAP_PER_MEDIAN`] × m are lowered
-/// to it. Radii that [`check_coordinates`] would refuse are raised to what it accepts, but not
+/// to it. Radii that [`check_radii`] would refuse are raised to what it accepts, but not
 /// above m. So a few points that nearly coincide do not make a cloud unusable, but coordinates too
 /// large for its typical spacing do.
 pub(crate) fn covering_radii(tree: &KdTree, mut radii: Vec<f32>) -> Result<Vec<f32>, CloudError> {
