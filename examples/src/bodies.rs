@@ -40,6 +40,14 @@ impl NamedCloud {
             })
             .collect()
     }
+
+    /// Radius in metres of a ball around the origin that holds each of these bodies.
+    pub(crate) fn largest_radius<'a>(bodies: impl IntoIterator<Item = &'a Self>) -> f32 {
+        let radii = bodies
+            .into_iter()
+            .map(|body| load::ball_radius(&body.cloud));
+        radii.fold(0.0, f32::max)
+    }
 }
 
 /// What a body is made of.

@@ -5,7 +5,6 @@
 //! holes and level.
 
 use crate::bodies::NamedCloud;
-use crate::load;
 use crate::numbers::range;
 use fastrand::Rng;
 use thiserror::Error;
@@ -22,6 +21,14 @@ pub struct Spot {
     pub level: usize,
 }
 
+impl Spot {
+    /// What a body starts above: the surface or, in a stack, room over it for a ball of `body_radius` metres and `gap` metres
+    /// for each body below. `up` is a unit vector.
+    pub(crate) fn base(&self, up: Vec3, body_radius: f32, gap: f32) -> Vec3 {
+        self.surface + self.level as f32 * (2.0 * body_radius + gap) * up
+    }
+}
+
 /// What the bodies need.
 #[derive(Clone, Copy, Debug)]
 pub struct Demand {
@@ -36,10 +43,9 @@ pub struct Demand {
 impl Demand {
     /// What bodies need that are centred on their origins.
     pub fn of(bodies: &[NamedCloud], seed: u64) -> Self {
-        let radii = bodies.iter().map(|body| load::ball_radius(&body.cloud));
         Self {
             count: bodies.len(),
-            body_radius: radii.fold(0.0, f32::max),
+            body_radius: NamedCloud::largest_radius(bodies),
             seed,
         }
     }

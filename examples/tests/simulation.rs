@@ -1,12 +1,18 @@
-//! How a drop starts, and what its report says.
+//! How bodies start, and what the report of a drop says.
 
-use tldi::glamx::Vec3;
+use tldi::glamx::{Pose3, Vec3};
 use tldi::{Backend, CpuBackend, PointCloud};
 use tldi_examples::bodies::NamedCloud;
+use tldi_examples::depth::{
+    DepthScene, DepthSimulation, FrameSource, GeneratedCamera, WantedBodies,
+};
 use tldi_examples::drop::DropSimulation;
+use tldi_examples::gallop::{GallopScene, GallopSimulation, WavyGround, creature};
+use tldi_examples::lidar::LidarSimulation;
 use tldi_examples::load;
 use tldi_examples::spots::Spot;
 use tldi_examples::surface_sampling::sample_surface;
+use tldi_sources::depth::{DepthCamera, SensorModel};
 use tldi_wgpu::{AdapterChoice, Gpu, WgpuBackend};
 
 /// Edge of the bodies, metres.
@@ -78,6 +84,121 @@ fn bodies_start_above_their_spots_and_above_each_other() {
         // Up to 5° of tilt about the body's own y axis.
         assert!((pose.rotation * Vec3::Y).z > 0.996);
     }
+}
+
+/// Asserts that no two bodies are in each other: they are apart along `up` (an axis), or the balls around them are across it.
+fn assert_apart<'a>(
+    clouds: impl Iterator<Item = &'a PointCloud<'static>>,
+    poses: &[Pose3],
+    up: Vec3,
+) {
+    let bodies: Vec<([f32; 2], Vec3, f32)> = (clouds.zip(poses))
+        .map(|(cloud, pose)| {
+            let heights = cloud.points().iter().map(|&p| (*pose * p).dot(up));
+            let range = heights.fold([f32::MAX, f32::MIN], |[min, max], h| {
+                [min.min(h), max.max(h)]
+            });
+            let place = pose.translation.reject_from(up);
+            (range, place, load::ball_radius(cloud))
+        })
+        .collect();
+    assert!(bodies.len() > 1);
+    for (k, a) in bodies.iter().enumerate() {
+        for b in &bodies[k + 1..] {
+            let is_over = a.0[1] < b.0[0] || b.0[1] < a.0[0];
+            assert!(is_over || a.1.distance(b.1) > a.2 + b.2, "{a:?} {b:?}");
+        }
+    }
+}
+
+/// A cube and one of four times its height, twice on one spot.
+fn unlike_cubes() -> (Vec<NamedCloud>, Vec<Spot>) {
+    let tall = NamedCloud {
+        cloud: load::resized(&cube().cloud, 4.0 * EDGE).unwrap(),
+        ..cube()
+    };
+    let spots = (0..4).map(|level| Spot {
+        surface: Vec3::ZERO,
+        level,
+    });
+    (vec![tall.clone(), cube(), tall, cube()], spots.collect())
+}
+
+#[test]
+fn bodies_of_a_stack_start_apart_whatever_their_heights() {
+    let (bodies, spots) = unlike_cubes();
+    let cpu = || Box::new(CpuBackend::new());
+    let dropped = DropSimulation::new(floor(), Vec3::Z, bodies.clone(), &spots, 3, cpu()).unwrap();
+    let poses = dropped.snapshot().scan_from_body;
+    assert_apart(dropped.clouds(), &poses, Vec3::Z);
+    let large = bodies.iter().map(|body| NamedCloud {
+        name: body.name.clone(),
+        cloud: load::resized(&body.cloud, 3.0).unwrap(),
+    });
+    let lidar = LidarSimulation::new(large.collect(), &spots, Vec3::Z, 12.0, cpu()).unwrap();
+    assert_apart(lidar.clouds(), &lidar.world_from_body(), Vec3::Z);
+    let source = FrameSource::Generated(GeneratedCamera { frames: 3, seed: 1 });
+    let scene = DepthScene {
+        camera: DepthCamera::new(source.intrinsics(), SensorModel::default()),
+        up: Vec3::Z,
+        bodies,
+        spots,
+        memory: 0,
+        seed: 1,
+    };
+    let depth = DepthSimulation::new(scene, &source.frame(0).unwrap(), cpu()).unwrap();
+    let poses = depth.snapshot(1).unwrap().world_from_body;
+    assert_apart(depth.clouds(), &poses, Vec3::Z);
+}
+
+/// Bodies of the generated depth frames that are too wide for its spots get others.
+#[test]
+fn wide_bodies_of_the_generated_frames_start_apart() {
+    let source = FrameSource::Generated(GeneratedCamera { frames: 3, seed: 1 });
+    let mut camera = DepthCamera::new(source.intrinsics(), SensorModel::default());
+    let seen = source.first_seen(&mut camera).unwrap();
+    let cloud = seen.cloud.into_builder().build().unwrap().into_owned();
+    let wanted = WantedBodies {
+        count: 3,
+        size: Some(0.3),
+        seed: 1,
+    };
+    let (bodies, spots) = (wanted.placed(&source, camera.clone(), &cloud, Vec3::Z)).unwrap();
+    let scene = DepthScene {
+        camera,
+        up: Vec3::Z,
+        bodies,
+        spots,
+        memory: 0,
+        seed: 1,
+    };
+    let depth = DepthSimulation::new(scene, &seen.frame, Box::new(CpuBackend::new())).unwrap();
+    let poses = depth.snapshot(1).unwrap().world_from_body;
+    assert_apart(depth.clouds(), &poses, Vec3::Z);
+}
+
+#[test]
+fn many_bodies_of_the_gallop_start_apart() {
+    let mut runner = creature(1).unwrap();
+    runner.stand(Vec3::Y, 2.0);
+    let scene = GallopScene {
+        runner,
+        size: 2.0,
+        speed: 1.0,
+        cycle: 0.8,
+        ground: WavyGround {
+            half_size: [5.2, 1.6],
+            spacing: 0.1,
+            amplitude: 0.05,
+            wavelength: 1.8,
+            period: 1.6,
+        },
+        bodies: 100,
+        seed: 1,
+    };
+    let gallop = GallopSimulation::new(scene, Box::new(CpuBackend::new())).unwrap();
+    let poses = gallop.snapshot().world_from_body;
+    assert_apart(gallop.body_clouds(), &poses, Vec3::Y);
 }
 
 #[test]

@@ -10,7 +10,7 @@ use tldi::PointCloud;
 use tldi::glamx::{Pose3, Vec3};
 use tldi_sources::depth::DepthCamera;
 
-/// Width in metres of a body of the generated sequence.
+/// Width in metres of a body of the generated sequence, for which there is room on its spots.
 const GENERATED_SIZE: f32 = 0.14;
 /// Width of a body that is not given one: a share of the median distance, smaller by a factor until there is
 /// place, and at least this many mean radii of a frame.
@@ -56,7 +56,7 @@ impl WantedBodies {
         if matches!(source, FrameSource::Generated(_)) {
             let size = self.size.unwrap_or(GENERATED_SIZE.max(least));
             let spots = GeneratedCamera::spots();
-            if self.count <= spots.len() {
+            if self.count <= spots.len() && size <= GENERATED_SIZE {
                 return Ok((of_size(size)?, spots));
             }
         }

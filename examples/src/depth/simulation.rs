@@ -111,12 +111,13 @@ impl DepthSimulation {
         let (_, surface) = stage.world.insert(RigidBodyBuilder::fixed(), collider);
         let mut rng = Rng::with_seed(scene.seed);
         let upright = Quat::from_rotation_arc(Vec3::Y, up);
+        let radius = NamedCloud::largest_radius(&scene.bodies);
         let bodies = (scene.bodies.into_iter().zip(&scene.spots))
             .map(|(named, spot)| {
                 let turn = Quat::from_rotation_y(rng.f32() * TAU);
-                let height = 0.5 * named.cloud.bounds().extents().y + DROP;
-                let lift = height * (1.0 + 2.0 * spot.level as f32);
-                let pose = Pose3::from_parts(spot.surface + lift * up, upright * turn);
+                let lift = 0.5 * named.cloud.bounds().extents().y + DROP;
+                let place = spot.base(up, radius, DROP) + lift * up;
+                let pose = Pose3::from_parts(place, upright * turn);
                 let radius = load::ball_radius(&named.cloud);
                 let surface = stage.cloud(surface).map_or(&[][..], PointCloud::points);
                 let below = height_below(surface, pose.translation, radius, up);

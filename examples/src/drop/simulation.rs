@@ -20,6 +20,8 @@ const MATERIAL: Material = Material {
 };
 /// Largest tilt of a body at the start, in radians (5°).
 const MAX_TILT: f32 = 0.087;
+/// Least and greatest height of a body's lowest point over its place at the start, metres.
+const DROP: [f32; 2] = [0.15, 0.3];
 
 /// Poses and contacts at one moment.
 #[derive(Clone, Debug)]
@@ -47,7 +49,7 @@ struct Dropped {
 
 impl DropSimulation {
     /// Places a body over each spot: its y axis along `up`, turned and slightly tilted at random,
-    /// its lowest point between 15 and 30 cm above the surface.
+    /// its lowest point between 15 and 30 cm above the surface or the room of the bodies below.
     ///
     /// # Errors
     /// Those of [`TldiPipeline::with_backend`].
@@ -63,9 +65,10 @@ impl DropSimulation {
         let collider = stage.tldi.collider(scan.clone());
         stage.world.insert(RigidBodyBuilder::fixed(), collider);
         let mut rng = Rng::with_seed(seed);
+        let radius = NamedCloud::largest_radius(&bodies);
         let bodies = (bodies.into_iter().zip(spots))
             .map(|(named, spot)| {
-                let pose = start_pose(&named.cloud, up, spot, &mut rng);
+                let pose = start_pose(&named.cloud, up, spot.base(up, radius, DROP[1]), &mut rng);
                 Dropped {
                     body: Body::insert(&mut stage, named, pose, MATERIAL),
                     slept_at_step: None,
@@ -162,16 +165,14 @@ impl DropSimulation {
     }
 }
 
-/// From the frame of a body into that of the scan, at the start.
-fn start_pose(cloud: &PointCloud<'_>, up: Vec3, spot: &Spot, rng: &mut Rng) -> Pose3 {
+/// From the frame of a body into that of the scan, at the start, over a place.
+fn start_pose(cloud: &PointCloud<'_>, up: Vec3, base: Vec3, rng: &mut Rng) -> Pose3 {
     let upright = Quat::from_rotation_arc(Vec3::Y, up);
     let yaw = Quat::from_rotation_y(rng.f32() * TAU);
     let tilt_axis = Quat::from_rotation_y(rng.f32() * TAU) * Vec3::X;
     let tilt = Quat::from_axis_angle(tilt_axis, rng.f32() * MAX_TILT);
     let rotation = upright * tilt * yaw;
     let [lowest, highest] = range(cloud.points().iter().map(|&p| (rotation * p).dot(up)));
-    let drop_height = (highest - lowest).clamp(0.15, 0.3);
-    let level_height = spot.level as f32 * (1.2 * (highest - lowest) + drop_height);
-    let lift = drop_height + level_height - lowest;
-    Pose3::from_parts(spot.surface + lift * up, rotation)
+    let drop_height = (highest - lowest).clamp(DROP[0], DROP[1]);
+    Pose3::from_parts(base + (drop_height - lowest) * up, rotation)
 }

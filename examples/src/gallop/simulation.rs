@@ -8,6 +8,7 @@ use crate::bodies::{Body, Material, NamedCloud};
 use crate::contact_kinds::{ByKind, ContactKinds, Kind};
 use crate::load;
 use crate::scene::BodyShape;
+use crate::spots::Spot;
 use crate::world::{DT, Stage, is_of};
 use fastrand::Rng;
 use rapier3d::prelude::*;
@@ -286,34 +287,44 @@ impl GallopSimulation {
     }
 }
 
-/// Bodies along the run, over the waves, their y axis up.
+/// Bodies along the run, over the waves, their y axis up; above each other where there is no room for all in a row.
 fn lay_bodies(stage: &mut Stage, scene: &GallopScene) -> anyhow::Result<Vec<LooseBody>> {
     let mut rng = Rng::with_seed(scene.seed);
     let size = BODY_SIZE * scene.size;
     let length = scene.ground.half_size[0] - scene.size;
-    let mut bodies = Vec::new();
-    for (k, shape) in (BodyShape::ALL.into_iter().cycle().take(scene.bodies)).enumerate() {
-        let sample = load::body_from_surface(shape.sample(BODY_SPACING, scene.seed))?;
-        let named = NamedCloud {
-            name: format!("{} {}", shape.name(), k + 1),
-            cloud: load::resized(&sample, size)?,
-        };
-        let along = (2.0 * (k as f32 + 0.5) / scene.bodies as f32 - 1.0) * length;
-        let place = Vec3::new(
-            along,
-            scene.ground.amplitude + named.cloud.bounds().extents().y,
-            (2.0 * rng.f32() - 1.0) * STRIP * scene.size,
-        );
-        let turn = Quat::from_rotation_y(rng.f32() * TAU);
-        bodies.push(LooseBody {
-            body: Body::insert(stage, named, Pose3::from_parts(place, turn), MATERIAL),
-            truth: TrueBody {
+    let shapes = BodyShape::ALL.into_iter().cycle().take(scene.bodies);
+    let made = (shapes.enumerate())
+        .map(|(k, shape)| {
+            let sample = load::body_from_surface(shape.sample(BODY_SPACING, scene.seed))?;
+            let named = NamedCloud {
+                name: format!("{} {}", shape.name(), k + 1),
+                cloud: load::resized(&sample, size)?,
+            };
+            let truth = TrueBody {
                 shape,
                 center: sample.bounds().center(),
                 scale: size / sample.bounds().extents().max_element(),
-            },
+            };
+            Ok((named, truth))
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let radius = NamedCloud::largest_radius(made.iter().map(|(named, _)| named));
+    let levels = (scene.bodies as f32 * radius / length).ceil() as usize;
+    let bodies = (made.into_iter().enumerate()).map(|(k, (named, truth))| {
+        let along = (2.0 * (k as f32 + 0.5) / scene.bodies as f32 - 1.0) * length;
+        let across = (2.0 * rng.f32() - 1.0) * STRIP * scene.size;
+        let spot = Spot {
+            surface: Vec3::new(along, scene.ground.amplitude, across),
+            level: k % levels,
+        };
+        let lift = named.cloud.bounds().extents().y;
+        let place = spot.base(Vec3::Y, radius, size) + lift * Vec3::Y;
+        let turn = Quat::from_rotation_y(rng.f32() * TAU);
+        LooseBody {
+            body: Body::insert(stage, named, Pose3::from_parts(place, turn), MATERIAL),
+            truth,
             kicked: false,
-        });
-    }
-    Ok(bodies)
+        }
+    });
+    Ok(bodies.collect())
 }

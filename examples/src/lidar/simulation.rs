@@ -18,7 +18,7 @@ const MATERIAL: Material = Material {
     density: 500.0,
     rolling_resistance: 1.0,
 };
-/// Height over the surface at the start, metres.
+/// Height of a body's lowest point over its place at the start, metres.
 const DROP: f32 = 0.2;
 
 /// A world with a stream of sweeps and bodies.
@@ -49,10 +49,11 @@ impl LidarSimulation {
         let mut stage = Stage::new(up, backend)?;
         let stream = CloudStream::new(&mut stage.world.colliders, recipe())?;
         let upright = Quat::from_rotation_arc(Vec3::Y, up);
+        let radius = NamedCloud::largest_radius(&bodies);
         let bodies = (bodies.into_iter().zip(spots))
             .map(|(named, spot)| {
-                let lift = DROP - named.cloud.bounds().min.y + spot.level as f32;
-                let pose = Pose3::from_parts(spot.surface + lift * up, upright);
+                let lift = DROP - named.cloud.bounds().min.y;
+                let pose = Pose3::from_parts(spot.base(up, radius, DROP) + lift * up, upright);
                 let body = Body::insert(&mut stage, named, pose, MATERIAL);
                 (body, spot.surface)
             })
