@@ -107,7 +107,7 @@ impl LidarSimulation {
             self.stage.totals.count(&stepped, has_contacts);
             if step == 0 {
                 report.step_ms = milliseconds(start);
-                report.contacts = self.stage.contacts().count();
+                report.contacts = self.contacts().len();
             }
             let seconds = start.elapsed().as_secs_f64();
             self.stage.totals.add_wall_seconds(seconds);
@@ -135,9 +135,10 @@ impl LidarSimulation {
             .collect()
     }
 
-    /// Contact points in the frame of the world, metres.
+    /// Points where surfaces touch, in the frame of the world, metres.
     pub fn contacts(&self) -> Vec<Vec3> {
-        let contacts = self.stage.contacts();
+        let radius = self.cloud().map_or(0.0, PointCloud::mean_radius);
+        let contacts = self.stage.touching(radius);
         contacts.map(|contact| contact.point).collect()
     }
 
