@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use tldi::glamx::{DVec3, Vec3};
 use tldi::{Aabb, CloudBuilder, CloudError, KdTree, PointCloud};
-use tldi_sources::{RawCloud, ReadOptions};
+use tldi_sources::{Format, RawCloud, ReadOptions};
 
 /// Neighbours for the normals of a scan: enough to average the noise of a depth camera.
 const SCAN_NORMAL_NEIGHBORS: usize = 24;
@@ -206,8 +206,7 @@ pub fn resized(cloud: &PointCloud<'_>, size: f32) -> Result<PointCloud<'static>,
 }
 
 /// The points of a cloud with these indices, with their normals and colours, at another place and with
-/// another radius. `place` must not turn the cloud. Normals that do not know their side are estimated
-/// anew, and do not know it then either.
+/// another radius. `place` must not turn the cloud. Normals that do not know their side do not know it then either.
 ///
 /// # Errors
 /// [`CloudError`] if there is none, or places or radii are refused.
@@ -221,21 +220,30 @@ pub fn subset(
     let points: Vec<Vec3> = kept().map(|i| place(cloud.point(i))).collect();
     let radii: Vec<f32> = kept().map(|i| radius(cloud.radius(i))).collect();
     let mut builder = PointCloud::builder(points).radii(radii);
-    builder = match cloud.normals() {
-        Some(normals) if cloud.normals_oriented() => {
-            builder.normals(kept().map(|i| normals[i]).collect::<Vec<_>>())
-        }
-        Some(_) => builder.pca_normals(SCAN_NORMAL_NEIGHBORS),
-        None => builder,
-    };
+    if let Some(normals) = cloud.normals() {
+        let normals: Vec<Vec3> = kept().map(|i| normals[i]).collect();
+        builder = match cloud.normals_oriented() {
+            true => builder.normals(normals),
+            false => builder.unoriented_normals(normals),
+        };
+    }
     if let Some(colors) = cloud.colors() {
         builder = builder.colors(kept().map(|i| colors[i]).collect::<Vec<_>>());
     }
     Ok(builder.build()?.into_owned())
 }
 
-/// The name of a file without its folder and extensions.
+/// The name of a file without its folder and the extensions of known formats.
 pub fn stem(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    name.split('.').next().unwrap_or_default().to_owned()
+    let mut rest = Path::new(path.file_name().unwrap_or_default());
+    let is_known = |path: &Path| {
+        let packed = path
+            .extension()
+            .is_some_and(|end| end.eq_ignore_ascii_case("gz"));
+        packed || mesh::is_mesh_file(path) || Format::from_extension(path).is_some()
+    };
+    while let Some(stem) = rest.file_stem().filter(|_| is_known(rest)) {
+        rest = Path::new(stem);
+    }
+    rest.to_string_lossy().into_owned()
 }

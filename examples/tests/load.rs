@@ -6,7 +6,7 @@ use common::{CORNERS, SIDES, ball, cube_as_stl, lines, ply};
 use std::fs;
 use tldi::PointCloud;
 use tldi::glamx::Vec3;
-use tldi_examples::load::{self, on_surfaces, resized, subset};
+use tldi_examples::load::{self, on_surfaces, resized, stem, subset};
 
 #[test]
 fn a_resized_cloud_is_scaled_about_its_middle_and_so_are_its_radii() {
@@ -23,6 +23,18 @@ fn a_resized_cloud_is_scaled_about_its_middle_and_so_are_its_radii() {
     assert_eq!([half.radius(0), half.radius(1)], [0.25, 0.5]);
     assert_eq!(half.normals(), cloud.normals());
     assert_eq!(half.colors(), cloud.colors());
+}
+
+#[test]
+fn names_lose_known_extensions_only() {
+    for (path, expected) in [
+        ("scans/cat.v2.PLY.gz", "cat.v2"),
+        ("1532402927.647951.pcd.bin", "1532402927.647951"),
+        ("000007.bin", "000007"),
+        ("robot.stl", "robot"),
+    ] {
+        assert_eq!(stem(path.as_ref()), expected);
+    }
 }
 
 /// Estimated normals do not know their side: no cloud that is made of theirs may claim to.
@@ -45,6 +57,7 @@ fn only_normals_with_a_side_count_as_such() {
             let normals = made.normals().expect("they are kept or estimated");
             assert!(normals.iter().all(|n| n.z.abs() > 0.999));
         }
+        assert_eq!(half.normals(), cloud.normals());
     }
 }
 
