@@ -1,7 +1,7 @@
 //! Asks about two clouds once: do they collide, what is the gap, where do they touch.
 
-use anyhow::bail;
-use clap::Parser;
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tldi::glamx::{DVec3, Pose3};
@@ -58,13 +58,15 @@ const MOTION_PICTURES: usize = 24;
 const MOTION_PICTURE_SECONDS: f32 = 0.06;
 
 fn main() -> ExitCode {
-    ended(run(&Args::parse()))
+    let args = Args::parse();
+    if args.animate && args.velocity.0 == DVec3::ZERO {
+        let message = "--animate shows B on its way: give a --velocity that is not zero";
+        (Args::command().error(ErrorKind::ValueValidation, message)).exit();
+    }
+    ended(run(&args))
 }
 
 fn run(args: &Args) -> anyhow::Result<()> {
-    if args.animate && args.velocity.0 == DVec3::ZERO {
-        bail!("--animate shows B on its way: give a --velocity that is not zero");
-    }
     args.common.check_outputs()?;
     let (query, origin) = load_query(args)?;
     let mut backend = args.common.backend.open()?;

@@ -173,7 +173,7 @@ fn what_is_wrong_is_said() {
         ("a.ply b.ply --velocity fast", 2, "three numbers"),
         ("a.ply b.ply --backend fast", 2, "is no backend"),
         ("a.ply b.ply --animate", 2, "--velocity <X,Y,Z>"),
-        ("--animate --velocity 0,0,0", 1, "give a --velocity"),
+        ("--animate --velocity 0,0,0", 2, "give a --velocity"),
         ("a.ply", 2, "<B>"),
         ("a.ply missing.ply", 1, "missing.ply"),
         ("a.ply point.ply", 1, "at one position"),
