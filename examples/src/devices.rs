@@ -27,7 +27,7 @@ impl Devices {
 
     /// Takes note of a step.
     pub fn note(&mut self, report: &StepReport) {
-        if self.backend.is_empty() || (report.adapter.is_some() && self.adapter.is_none()) {
+        if report.adapter.is_some() && self.adapter.is_none() {
             self.backend = report.backend.to_string();
             self.adapter = report.adapter.as_deref().map(str::to_owned);
         }

@@ -1,5 +1,6 @@
 //! The world in which every simulation takes place.
 
+use crate::devices::Devices;
 use crate::step_totals::StepTotals;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -25,6 +26,8 @@ pub(crate) struct Stage {
 impl Stage {
     /// An empty world with gravity against `up` (unit length).
     pub(crate) fn new(up: Vec3, backend: Box<dyn Backend>) -> Result<Self, TldiError> {
+        let mut totals = StepTotals::new(DT);
+        totals.devices = Devices::of(&*backend);
         let tldi = TldiPipeline::with_backend(TldiConfig::default(), backend)?;
         let mut world = PhysicsWorld {
             gravity: -GRAVITY * up,
@@ -35,7 +38,7 @@ impl Stage {
         Ok(Self {
             world,
             tldi,
-            totals: StepTotals::new(DT),
+            totals,
             max_penetration: 0.0,
         })
     }

@@ -214,6 +214,8 @@ fn the_report_says_who_is_beside_or_below_the_scan() {
         .map(|body| body.inside_bounds)
         .collect();
     assert_eq!(inside, [true, false, false, false, true]);
+    // Before the first step the backend is known.
+    assert_eq!(simulation.report().totals.devices.backend, "cpu");
 }
 
 #[test]
