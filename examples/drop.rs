@@ -117,8 +117,11 @@ fn load_bodies(args: &Args, scan_radius: f32) -> anyhow::Result<Vec<NamedCloud>>
         };
         let default_size = || load::default_size(own_size, scan_radius);
         let size = args.size.unwrap_or_else(default_size);
-        let points = cloud.len();
-        eprintln!("{name}: {points} points, {file_size:.3} in its file, {size:.3} m here");
+        let of_file = match args.body {
+            Some(_) => format!(" {file_size:.3} in its file,"),
+            None => String::new(),
+        };
+        eprintln!("{name}: {} points,{of_file} {size:.3} m here", cloud.len());
         *cloud = load::resized(cloud, size)?;
     }
     let numbered = |(k, NamedCloud { name, cloud }): (usize, &NamedCloud)| NamedCloud {
