@@ -145,9 +145,10 @@ fn open(args: &Args) -> anyhow::Result<(FrameSource, Vec<String>)> {
     eprintln!("{} frames in {}", sequence.frames.len(), folder.display());
     let missing = sequence.missing.clone();
     if !missing.is_empty() {
-        let names = &missing[..missing.len().min(3)].join(", ");
+        let names = missing[..missing.len().min(3)].join(", ");
+        let more = if missing.len() > 3 { " …" } else { "" };
         eprintln!(
-            "warning: {} frames of poses.txt are not there, or have no pose: {names} …",
+            "warning: {} frames of poses.txt are not there, or have no pose: {names}{more}",
             missing.len()
         );
     }
@@ -186,7 +187,7 @@ fn simulate(
         if let Some(recording) = &mut recording {
             let snapshot = simulation.snapshot(ANIMATION_POINT_STEP)?;
             let things = entities(simulation, &snapshot);
-            recording.show(k as f32 * FRAME_SECONDS, &things, &snapshot.contacts)?;
+            recording.show((k + 1) as f32 * FRAME_SECONDS, &things, &snapshot.contacts)?;
             let intrinsics = source.intrinsics();
             recording.camera(&RecordedCamera {
                 size: intrinsics.size.map(|n| n as f32),
@@ -218,11 +219,15 @@ fn draw(
     let start = &initial.world_from_body;
     let near =
         |pose: &Pose3| (start.iter()).any(|from| from.translation.distance(pose.translation) < 1.0);
-    let places: Vec<Vec3> = (snapshots.iter())
+    let mut places: Vec<Vec3> = (snapshots.iter())
         .flat_map(|snapshot| snapshot.world_from_body.iter())
         .filter(|pose| near(pose))
         .map(|pose| pose.translation)
         .collect();
+    // Without bodies, all of the surface is to be seen.
+    if places.is_empty() {
+        places.extend(initial.frame.points());
+    }
     let camera = |size| viewpoint::choose(&scene_of(simulation, up, initial), &places, size);
     let large = camera(PICTURE_SIZE);
     let mid = &snapshots[(snapshots.len() * 3 / 5).min(snapshots.len() - 2)];

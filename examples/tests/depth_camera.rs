@@ -191,6 +191,25 @@ fn what_is_wrong_is_said() {
     assert_refused(BINARY, &folder, &[case]);
 }
 
+/// Without bodies the pictures show the surface, wherever it is.
+#[test]
+fn pictures_without_bodies_show_the_surface() {
+    let folder = folder("depth_bare");
+    write_frames(&folder.join("frames"), &[false; 2]);
+    let poses = fs::read_to_string(folder.join("frames/poses.txt")).unwrap();
+    let poses = poses.replace("1 0 0 0 0 -1", "1 0 0 50 0 -1");
+    fs::write(folder.join("frames/poses.txt"), poses).unwrap();
+    let options = "--frames frames --count 0 --hold 0 --up 0,0,1";
+    report_with_pictures(BINARY, &folder, options);
+    let file = fs::File::open(folder.join("out/depth_camera/final.png")).unwrap();
+    let mut reader = (png::Decoder::new(std::io::BufReader::new(file)).read_info()).unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    // The surface is in the middle, and lighter than what is around it.
+    let row = &bytes[info.line_size * (info.height as usize / 2)..][..info.line_size];
+    assert_ne!(row[..3], row[info.line_size / 2..][..3]);
+}
+
 /// A floor at 15 m counts where it is said to.
 #[test]
 fn the_range_can_be_set() {
