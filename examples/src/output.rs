@@ -111,7 +111,10 @@ pub fn publish(report: &impl Report, origin: DVec3, json: Option<&Path>) -> anyh
     let origin = Some(origin.to_array()).filter(|origin| *origin != [0.0; 3]);
     let told = report.write_table(&mut out).and_then(|()| {
         if let Some([x, y, z]) = origin {
-            writeln!(out, "places are relative to {x} {y} {z} in the file")?;
+            writeln!(
+                out,
+                "places are relative to {x} {y} {z} in the file, in metres"
+            )?;
         }
         out.flush()
     });
