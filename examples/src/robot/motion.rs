@@ -79,11 +79,11 @@ impl Motion {
         Self::Path(path)
     }
 
-    /// Wheels roll forward (along x of the root), limbs step on the spot.
+    /// Wheels, which have a radius in metres, roll forward (along x of the root), limbs step on the spot.
     pub fn gait(
         kinematics: &Kinematics,
         pose: &[f32],
-        wheel_radius: impl Fn(usize) -> f32,
+        wheel_radius: impl Fn(usize) -> Option<f32>,
     ) -> Self {
         let joints = &kinematics.joints;
         let limb = |k: usize| {
@@ -112,14 +112,14 @@ impl Motion {
             let joint = &joints[k];
             let axis = (poses[joint.parent] * joint.parent_from_joint).rotation * joint.axis;
             // A wheel's axle points to the side; what turns about the vertical swivels freely.
-            (joint.kind == JointKind::Continuous).then(|| {
-                let speed = ROLLING_SPEED / wheel_radius(joint.child).max(1e-3);
-                if axis.y.abs() > 0.5 {
-                    speed * axis.y.signum()
-                } else {
-                    0.0
+            match joint.kind {
+                JointKind::Continuous if axis.y.abs() > 0.5 => {
+                    let radius = wheel_radius(joint.child)?;
+                    Some(ROLLING_SPEED / radius.max(1e-3) * axis.y.signum())
                 }
-            })
+                JointKind::Continuous => Some(0.0),
+                _ => None,
+            }
         };
         let all = || 0..joints.len();
         Self::Gait {

@@ -5,6 +5,7 @@ use super::kinematics::{Aim, JointKind, Kinematics};
 use super::links::LinkCloud;
 use super::model::Model;
 use super::placing::Placement;
+use crate::numbers::range;
 use fastrand::Rng;
 use tldi::PointCloud;
 use tldi::glamx::{Pose3, Vec3};
@@ -101,7 +102,7 @@ impl Build {
             footprint: footprint.clamp(LEAST_FOOTPRINT.min(0.5 * size), size),
             size,
             tip: if is_fixed {
-                tip_of(kinematics, clouds)
+                tip_of(kinematics, clouds, size)
             } else {
                 None
             },
@@ -115,8 +116,9 @@ impl Build {
     }
 }
 
-/// The link with a surface that most joints move, and its point farthest from its joint.
-fn tip_of(kinematics: &Kinematics, clouds: &[LinkCloud]) -> Option<Tip> {
+/// The link with a surface that most joints move, and its point farthest from its joint. No joint slides farther than the
+/// robot's size (metres): limits that are larger stand for none.
+fn tip_of(kinematics: &Kinematics, clouds: &[LinkCloud], size: f32) -> Option<Tip> {
     let driven = |link: usize| -> Vec<usize> {
         let chain = kinematics.chain(link).into_iter();
         chain
@@ -135,7 +137,10 @@ fn tip_of(kinematics: &Kinematics, clouds: &[LinkCloud]) -> Option<Tip> {
         .map(|k| {
             let joint = &kinematics.joints[*k];
             let slide = match joint.kind {
-                JointKind::Prismatic => joint.limits[1].abs().max(joint.limits[0].abs()),
+                JointKind::Prismatic => {
+                    let [low, high] = joint.limits.map(f32::abs);
+                    low.max(high).min(size)
+                }
                 _ => 0.0,
             };
             joint.parent_from_joint.translation.length() + slide
@@ -213,13 +218,9 @@ pub(super) fn plan_motion(
 ) -> Motion {
     let kinematics = &model.description.kinematics;
     let Some(tip) = model.build.tip else {
-        let wheel_radius = |link: usize| {
-            let cloud = model.clouds.iter().find(|cloud| cloud.link == link);
-            let mut extents = cloud.map_or([0.0; 3], |c| c.cloud.bounds().extents().to_array());
-            extents.sort_by(f32::total_cmp);
-            0.5 * extents[1]
-        };
-        return Motion::gait(kinematics, &model.start, wheel_radius);
+        let radius =
+            |link: usize| wheel_radius(kinematics, &model.clouds, &model.root_from_link, link);
+        return Motion::gait(kinematics, &model.start, radius);
     };
     let root_from_scan = placement.scan_from_root.inverse();
     let home = model.root_from_link[tip.link] * tip.point;
@@ -252,6 +253,31 @@ pub(super) fn plan_motion(
     Motion::reaching(kinematics, tip.link, stations, &model.start)
 }
 
+/// The radius in metres of a link that is a wheel: with what is fixed to it, it reaches the robot's lowest points, up to half
+/// that radius.
+fn wheel_radius(
+    kinematics: &Kinematics,
+    clouds: &[LinkCloud],
+    root_from_link: &[Pose3],
+    link: usize,
+) -> Option<f32> {
+    let lowest = |cloud: &LinkCloud| {
+        let points = cloud.cloud.points().iter();
+        range(points.map(|&p| (root_from_link[cloud.link] * p).z))[0]
+    };
+    let ground = clouds.iter().map(lowest).fold(f32::INFINITY, f32::min);
+    (clouds
+        .iter()
+        .filter(|cloud| kinematics.group(cloud.link) == link))
+    .filter_map(|cloud| {
+        let mut extents = cloud.cloud.bounds().extents().to_array();
+        extents.sort_by(f32::total_cmp);
+        let radius = 0.5 * extents[1];
+        (lowest(cloud) <= ground + 0.5 * radius).then_some(radius)
+    })
+    .max_by(f32::total_cmp)
+}
+
 /// Points of the scan in front of the robot and in reach, in the frame of the root.
 fn touchable(scan: &PointCloud<'_>, root_from_scan: &Pose3, tip: &Tip, seed: u64) -> Vec<Vec3> {
     let mut points: Vec<Vec3> = (scan.points().iter().map(|&p| *root_from_scan * p))
@@ -275,4 +301,71 @@ fn polyline(corners: &[Vec3], step: f32) -> Vec<Vec3> {
         }
     }
     path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::kinematics::JointModel;
+    use super::*;
+
+    /// A link whose surface is the corners of a cube 20 cm wide.
+    fn cube(link: usize) -> LinkCloud {
+        let corners =
+            (0..8).map(|k| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32));
+        let points: Vec<Vec3> = corners.map(|p| 0.2 * p - Vec3::splat(0.1)).collect();
+        LinkCloud {
+            link,
+            name: String::new(),
+            cloud: PointCloud::builder(points).radius(0.1).build().unwrap(),
+        }
+    }
+
+    /// A joint of the root with this child, which is there in the frame of the root.
+    fn joint(kind: JointKind, child: usize, place: Vec3, limit: f32) -> JointModel {
+        JointModel {
+            name: String::new(),
+            kind,
+            parent: 0,
+            child,
+            parent_from_joint: Pose3::from_translation(place),
+            axis: Vec3::Y,
+            limits: [-limit, limit],
+            max_effort: None,
+            max_speed: None,
+            mimic: None,
+        }
+    }
+
+    /// A wheel and a fan on one axis, and a joint that moves nothing: only the wheel rolls.
+    #[test]
+    fn what_reaches_the_ground_rolls() {
+        let turning = |child, z| joint(JointKind::Continuous, child, z * Vec3::Z, f32::INFINITY);
+        let joints = vec![turning(1, -0.2), turning(2, 0.3), turning(3, -0.2)];
+        let kinematics = Kinematics::new(4, joints);
+        let clouds = [cube(0), cube(1), cube(2)];
+        let rest = kinematics.rest();
+        let poses = kinematics.poses(&rest);
+        let radius = |link| wheel_radius(&kinematics, &clouds, &poses, link);
+        let motion = Motion::gait(&kinematics, &rest, radius);
+        let rolling = [0, 1, 2].map(|k| motion.rolling(k).is_some());
+        assert_eq!(rolling, [true, false, false]);
+    }
+
+    /// Limits of a kilometre are those of a slide that has none.
+    #[test]
+    fn a_slide_reaches_no_farther_than_the_robot_is_large() {
+        let mut joints = vec![
+            joint(JointKind::Revolute, 1, Vec3::Z, 1.0),
+            joint(JointKind::Prismatic, 2, 0.5 * Vec3::Z, 1e3),
+        ];
+        joints[1].parent = 1;
+        let kinematics = Kinematics::new(3, joints);
+        let clouds = [cube(0), cube(1), cube(2)];
+        let build = Build::of(&kinematics, &clouds, Base::Fixed);
+        // From the lowest corner at −0.1 m to the highest at 1.6 m.
+        assert!((build.size - 1.7).abs() < 1e-5, "{build:?}");
+        let reach = build.tip.unwrap().reach;
+        let expected = 0.5 + 1.7 + 0.1 * 3.0_f32.sqrt();
+        assert!((reach - expected).abs() < 1e-4, "{reach}");
+    }
 }
