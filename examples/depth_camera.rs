@@ -69,7 +69,7 @@ struct Args {
 
 /// Frames of the generated sequence.
 const GENERATED_FRAMES: usize = 150;
-/// Frames from one picture of the animation to the next.
+/// Frames from one picture of the animation to the next, at least.
 const ANIMATION_FRAMES: usize = 3;
 /// Of the points of a frame, one in as many is kept for the animation.
 const ANIMATION_POINT_STEP: usize = 4;
@@ -121,11 +121,11 @@ fn run(args: &Args) -> anyhow::Result<()> {
     };
     let mut simulation = DepthSimulation::new(scene, &first, args.common.backend.open()?)?;
     let recording = args.recording.start("depth_camera", up)?;
-    let snapshots = simulate(&mut simulation, &source, start, recording, args)?;
+    let (snapshots, interval) = simulate(&mut simulation, &source, start, recording, args)?;
     let report = simulation.report(missing);
     output::publish(&report, source.origin(), args.common.json.as_deref())?;
     if !args.common.no_pictures {
-        draw(&simulation, up, &snapshots, args)?;
+        draw(&simulation, up, &snapshots, interval, args)?;
     }
     Ok(())
 }
@@ -169,16 +169,17 @@ fn find_up(frame: &PointCloud<'_>, world_from_camera: &Pose3) -> anyhow::Result<
 }
 
 /// Shows all frames from `start` on; snapshots before the first, at three fifths and after the last or, for an
-/// animation, after every [`ANIMATION_FRAMES`].
+/// animation, after every few frames; and how many these are.
 fn simulate(
     simulation: &mut DepthSimulation,
     source: &FrameSource,
     start: usize,
     mut recording: Option<Recording>,
     args: &Args,
-) -> anyhow::Result<Vec<DepthSnapshot>> {
+) -> anyhow::Result<(Vec<DepthSnapshot>, usize)> {
     let held = (args.hold / FRAME_SECONDS).round() as usize;
     let all = held + source.count() - start;
+    let interval = output::picture_interval(all, ANIMATION_FRAMES);
     let mut snapshots = vec![simulation.snapshot(1)?];
     let order = std::iter::repeat_n(start, held).chain(start..source.count());
     for (k, index) in output::with_progress(order.enumerate(), "frames") {
@@ -198,17 +199,18 @@ fn simulate(
         }
         if k == all * 3 / 5 || k + 1 == all {
             snapshots.push(simulation.snapshot(1)?);
-        } else if args.animate && k % ANIMATION_FRAMES == 0 {
+        } else if args.animate && k % interval == 0 {
             snapshots.push(simulation.snapshot(ANIMATION_POINT_STEP)?);
         }
     }
-    Ok(snapshots)
+    Ok((snapshots, interval))
 }
 
 fn draw(
     simulation: &DepthSimulation,
     up: Vec3,
     snapshots: &[DepthSnapshot],
+    interval: usize,
     args: &Args,
 ) -> anyhow::Result<()> {
     let picture = |snapshot: &DepthSnapshot, camera: &VirtualCamera| {
@@ -240,7 +242,7 @@ fn draw(
     if args.animate {
         let small = camera(ANIMATION_SIZE);
         let pictures = snapshots.iter().map(|snapshot| picture(snapshot, &small));
-        let seconds = ANIMATION_FRAMES as f32 * FRAME_SECONDS;
+        let seconds = interval as f32 * FRAME_SECONDS;
         output::write_animation(&args.out, seconds, 0, pictures)?;
     }
     eprintln!("pictures are in {}", args.out.display());

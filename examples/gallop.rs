@@ -83,7 +83,7 @@ const MOST_STEPS: usize = 600;
 const TINTED: f32 = 0.06;
 const SKIN: [f32; 3] = [166.0, 122.0, 84.0];
 const TINT: [f32; 3] = [235.0, 60.0, 30.0];
-/// Steps from one picture of the animation to the next.
+/// Steps from one picture of the animation to the next, at least.
 const ANIMATION_STEPS: usize = 3;
 
 fn main() -> ExitCode {
@@ -122,11 +122,13 @@ fn run(args: &Args) -> anyhow::Result<()> {
         .steps
         .unwrap_or_else(|| simulation.steps_of_run().min(MOST_STEPS));
     let recording = args.recording.start("gallop", Vec3::Y)?;
-    let snapshots = simulate(&mut simulation, steps, args.animate, recording)?;
+    let interval = output::picture_interval(steps, ANIMATION_STEPS);
+    let shown = args.animate.then_some(interval);
+    let snapshots = simulate(&mut simulation, steps, shown, recording)?;
     let report = simulation.report();
     output::publish(&report, DVec3::ZERO, args.common.json.as_deref())?;
     if !args.common.no_pictures {
-        draw(&simulation, &snapshots, args)?;
+        draw(&simulation, &snapshots, shown, args)?;
     }
     Ok(())
 }
@@ -158,11 +160,11 @@ fn load_runner(args: &Args) -> anyhow::Result<Runner> {
 }
 
 /// Takes all steps; snapshots before the first, in the middle and after the last or, for an
-/// animation, after every [`ANIMATION_STEPS`].
+/// animation, whenever so many steps are `shown` by a picture.
 fn simulate(
     simulation: &mut GallopSimulation,
     steps: usize,
-    animate: bool,
+    shown: Option<usize>,
     mut recording: Option<Recording>,
 ) -> anyhow::Result<Vec<GallopSnapshot>> {
     let mut snapshots = vec![simulation.snapshot()];
@@ -178,7 +180,7 @@ fn simulate(
                 recording.camera(&camera)?;
             }
         }
-        if animate && step % ANIMATION_STEPS == 0 {
+        if shown.is_some_and(|steps| step % steps == 0) {
             snapshots.push(simulation.snapshot());
         }
         // Of the middle third, the moment with the most contacts.
@@ -199,6 +201,7 @@ fn simulate(
 fn draw(
     simulation: &GallopSimulation,
     snapshots: &[GallopSnapshot],
+    shown: Option<usize>,
     args: &Args,
 ) -> anyhow::Result<()> {
     let size = simulation.size();
@@ -218,10 +221,10 @@ fn draw(
     ];
     let stills = stills.map(|(name, k)| (name, picture(&snapshots[k], PICTURE_SIZE)));
     output::write_pictures(&args.out, stills)?;
-    if args.animate {
+    if let Some(steps) = shown {
         let moments = snapshots[..middle].iter().chain(&snapshots[middle + 1..]);
         let pictures = moments.map(|snapshot| picture(snapshot, ANIMATION_SIZE));
-        output::write_animation(&args.out, ANIMATION_STEPS as f32 * DT, 0, pictures)?;
+        output::write_animation(&args.out, steps as f32 * DT, 0, pictures)?;
     }
     eprintln!("pictures are in {}", args.out.display());
     Ok(())

@@ -145,11 +145,11 @@ fn run(args: &Args) -> anyhow::Result<()> {
     if let Some(recording) = &mut recording {
         record_start(recording, &simulation, up)?;
     }
-    let (snapshots, hardest) = simulate(&mut simulation, args.steps, recording)?;
+    let (snapshots, interval, hardest) = simulate(&mut simulation, args.steps, recording)?;
     let report = simulation.report();
     output::publish(&report, origin, args.common.json.as_deref())?;
     if !args.common.no_pictures {
-        draw(&simulation, up, &snapshots, &hardest, args)?;
+        draw(&simulation, up, (&snapshots, interval), &hardest, args)?;
     }
     if let Some(link) = simulation.thrown_out() {
         bail!(
@@ -184,18 +184,19 @@ fn load_robot(args: &Args) -> anyhow::Result<Description> {
     Ok(robot)
 }
 
-/// Takes all steps, up to that in which a link is thrown out. Gives snapshots before the first and after every
-/// [`ANIMATION_STEPS`], and one of the moment in which a link is pushed most.
+/// Takes all steps, up to that in which a link is thrown out. Gives snapshots before the first and after every few
+/// steps, how many these are, and a snapshot of the moment in which a link is pushed most.
 fn simulate(
     simulation: &mut RobotSimulation,
     steps: Option<usize>,
     mut recording: Option<Recording>,
-) -> anyhow::Result<(Vec<RobotSnapshot>, RobotSnapshot)> {
+) -> anyhow::Result<(Vec<RobotSnapshot>, usize, RobotSnapshot)> {
     let seconds = match simulation.motion_seconds() {
         seconds if seconds.is_finite() => (seconds + 0.5).min(LONGEST_SECONDS),
         _ => ENDLESS_SECONDS,
     };
     let steps = steps.unwrap_or((seconds / DT).ceil() as usize);
+    let interval = output::picture_interval(steps, ANIMATION_STEPS);
     let mut snapshots = vec![simulation.snapshot()];
     let mut hardest = (0.0, simulation.snapshot());
     for step in output::with_progress(1..=steps, "steps") {
@@ -205,7 +206,7 @@ fn simulate(
             let things = entities(simulation, simulation.scan(), &snapshot);
             recording.show(step as f32 * DT, &things, &snapshot.contacts)?;
         }
-        if step % ANIMATION_STEPS == 0 || step == steps {
+        if step % interval == 0 || step == steps {
             snapshots.push(simulation.snapshot());
         }
         if simulation.largest_force() > hardest.0 {
@@ -216,7 +217,7 @@ fn simulate(
             break;
         }
     }
-    Ok((snapshots, hardest.1))
+    Ok((snapshots, interval, hardest.1))
 }
 
 /// The start, and a camera that sees the robot well.
@@ -239,7 +240,7 @@ fn record_start(
 fn draw(
     simulation: &RobotSimulation,
     up: Vec3,
-    snapshots: &[RobotSnapshot],
+    (snapshots, interval): (&[RobotSnapshot], usize),
     hardest: &RobotSnapshot,
     args: &Args,
 ) -> anyhow::Result<()> {
@@ -267,7 +268,7 @@ fn draw(
     if args.animate {
         let small = camera(ANIMATION_SIZE);
         let pictures = snapshots.iter().map(|snapshot| picture(snapshot, &small));
-        output::write_animation(&args.out, ANIMATION_STEPS as f32 * DT, 0, pictures)?;
+        output::write_animation(&args.out, interval as f32 * DT, 0, pictures)?;
     }
     eprintln!("pictures are in {}", args.out.display());
     Ok(())

@@ -44,6 +44,15 @@ pub fn write_pictures<'a>(
     Ok(())
 }
 
+/// Pictures of an animation, about: all of them are held in memory until it is written.
+const MOST_PICTURES: usize = 150;
+
+/// Steps from one picture of an animation to the next, where it has so many in all: `least`, or more if they would be too
+/// many pictures.
+pub fn picture_interval(steps: usize, least: usize) -> usize {
+    least.max(steps.div_ceil(MOST_PICTURES))
+}
+
 /// Draws pictures one after the other, and writes them to `motion.png` of a folder, each shown for so many seconds; the
 /// last one stays for `held` pictures more.
 ///
@@ -123,4 +132,15 @@ pub fn publish(report: &impl Report, origin: DVec3, json: Option<&Path>) -> anyh
         write_file(path, &serde_json::to_vec_pretty(&report)?)?;
     }
     told.context("cannot write the table")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_runs_have_no_more_pictures() {
+        assert_eq!(picture_interval(195, 3), 3);
+        assert_eq!(picture_interval(30_000, 3), 30_000 / MOST_PICTURES);
+    }
 }
