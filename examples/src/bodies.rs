@@ -62,8 +62,6 @@ pub(crate) struct Material {
 /// A body in a world.
 pub(crate) struct Body {
     pub(crate) name: String,
-    /// In the frame of the body.
-    pub(crate) cloud: PointCloud<'static>,
     pub(crate) handle: RigidBodyHandle,
     pub(crate) collider: ColliderHandle,
     /// Where it was put.
@@ -79,7 +77,7 @@ impl Body {
         material: Material,
     ) -> Self {
         let NamedCloud { name, cloud } = named;
-        let collider = stage.tldi.collider(cloud.clone());
+        let collider = stage.tldi.collider(cloud);
         let (handle, collider) = stage.world.insert(
             RigidBodyBuilder::dynamic()
                 .pose(world_from_body)
@@ -88,11 +86,16 @@ impl Body {
         );
         Self {
             name,
-            cloud,
             handle,
             collider,
             start: world_from_body.translation,
         }
+    }
+
+    /// Its points, in its own frame.
+    pub(crate) fn cloud<'a>(&self, stage: &'a Stage) -> &'a PointCloud<'static> {
+        let cloud = stage.cloud(self.collider);
+        cloud.expect("it was made of a cloud")
     }
 
     /// How far it is from where it was put, metres.
@@ -104,7 +107,7 @@ impl Body {
     pub(crate) fn report(&self, stage: &Stage) -> PlacedBody {
         PlacedBody {
             name: self.name.clone(),
-            points: self.cloud.len(),
+            points: self.cloud(stage).len(),
             translation: stage.pose(self.handle).translation.to_array(),
         }
     }

@@ -239,7 +239,8 @@ impl DepthSimulation {
 
     /// The clouds of the bodies, each in its own frame.
     pub fn clouds(&self) -> impl Iterator<Item = &PointCloud<'static>> {
-        self.bodies.iter().map(|body| &body.body.cloud)
+        let bodies = self.bodies.iter();
+        bodies.map(|body| body.body.cloud(&self.stage))
     }
 
     /// Where everything is now, with every `step`-th point of the frame.

@@ -36,7 +36,7 @@ pub struct Snapshot {
 pub struct DropSimulation {
     stage: Stage,
     up: Vec3,
-    scan: PointCloud<'static>,
+    scan: ColliderHandle,
     bodies: Vec<Dropped>,
     /// After the last step, metres.
     penetration: f32,
@@ -62,8 +62,8 @@ impl DropSimulation {
         backend: Box<dyn Backend>,
     ) -> Result<Self, TldiError> {
         let mut stage = Stage::new(up, backend)?;
-        let collider = stage.tldi.collider(scan.clone());
-        stage.world.insert(RigidBodyBuilder::fixed(), collider);
+        let collider = stage.tldi.collider(scan);
+        let (_, scan) = stage.world.insert(RigidBodyBuilder::fixed(), collider);
         let mut rng = Rng::with_seed(seed);
         let radius = NamedCloud::largest_radius(&bodies);
         let bodies = (bodies.into_iter().zip(spots))
@@ -108,18 +108,20 @@ impl DropSimulation {
 
     /// The scan.
     pub fn scan(&self) -> &PointCloud<'static> {
-        &self.scan
+        let scan = self.stage.cloud(self.scan);
+        scan.expect("it was made of a cloud")
     }
 
     /// The clouds of the bodies, each in its own frame.
     pub fn clouds(&self) -> impl Iterator<Item = &PointCloud<'static>> {
-        self.bodies.iter().map(|dropped| &dropped.body.cloud)
+        let bodies = self.bodies.iter();
+        bodies.map(|dropped| dropped.body.cloud(&self.stage))
     }
 
     /// Where everything is now.
     pub fn snapshot(&self) -> Snapshot {
         let bodies = self.bodies.iter();
-        let contacts = self.stage.touching(self.scan.mean_radius());
+        let contacts = self.stage.touching(self.scan().mean_radius());
         Snapshot {
             scan_from_body: bodies.map(|b| self.stage.pose(b.body.handle)).collect(),
             contacts: contacts.map(|contact| contact.point).collect(),
@@ -131,8 +133,8 @@ impl DropSimulation {
         let body_radii = self.clouds().map(PointCloud::mean_radius);
         DropReport {
             totals: self.stage.totals.clone(),
-            scan_points: self.scan.len(),
-            mean_radius: body_radii.fold(self.scan.mean_radius(), f32::max),
+            scan_points: self.scan().len(),
+            mean_radius: body_radii.fold(self.scan().mean_radius(), f32::max),
             up: self.up.to_array(),
             max_penetration: self.penetration,
             bodies: self.bodies.iter().map(|b| self.body_report(b)).collect(),
@@ -156,7 +158,7 @@ impl DropSimulation {
     /// Whether a point is not beside and not below the scan. Above it there is room.
     fn is_inside(&self, point: Vec3) -> bool {
         let (right, forward) = self.up.any_orthonormal_pair();
-        let extent = |axis: Vec3| range(self.scan.points().iter().map(|&p| p.dot(axis)));
+        let extent = |axis: Vec3| range(self.scan().points().iter().map(|&p| p.dot(axis)));
         let within = |axis: Vec3| {
             let [min, max] = extent(axis);
             (min..=max).contains(&point.dot(axis))

@@ -216,9 +216,10 @@ impl GallopSimulation {
         let truth = depth_in_ground(runner_cloud, world_from_runner);
         compare([runner, ground], truth, Kind::Scripted);
         for (LooseBody { body, truth, .. }, pose) in self.bodies.iter().zip(world_from_body) {
-            let in_ground = depth_in_ground(&body.cloud, pose);
+            let cloud = body.cloud(&self.stage);
+            let in_ground = depth_in_ground(cloud, pose);
             compare([body.collider, ground], in_ground, Kind::Resting);
-            let reach = body.cloud.bounds().extents().length();
+            let reach = cloud.bounds().extents().length();
             let body_from_runner = pose.inverse() * *world_from_runner;
             let in_body = truth.depth_of(runner_cloud, &body_from_runner, reach);
             compare([body.collider, runner], in_body, Kind::Pushed);
@@ -238,7 +239,8 @@ impl GallopSimulation {
 
     /// The clouds of the bodies, each in its own frame.
     pub fn body_clouds(&self) -> impl Iterator<Item = &PointCloud<'static>> {
-        self.bodies.iter().map(|loose| &loose.body.cloud)
+        let bodies = self.bodies.iter();
+        bodies.map(|loose| loose.body.cloud(&self.stage))
     }
 
     /// Size of what runs, metres.

@@ -124,7 +124,8 @@ impl LidarSimulation {
 
     /// The clouds of the bodies, each in its own frame.
     pub fn clouds(&self) -> impl Iterator<Item = &PointCloud<'static>> {
-        self.bodies.iter().map(|(body, _)| &body.cloud)
+        let bodies = self.bodies.iter();
+        bodies.map(|(body, _)| body.cloud(&self.stage))
     }
 
     /// From the frames of the bodies into that of the world.
@@ -161,7 +162,8 @@ impl LidarSimulation {
 
     fn body_report(&self, body: &Body, place: Vec3) -> LidarBody {
         let world_from_body = self.stage.pose(body.handle);
-        let points = body.cloud.points().iter();
+        let cloud = body.cloud(&self.stage);
+        let points = cloud.points().iter();
         let [lowest, _] = range(points.map(|&p| (world_from_body * p).dot(self.up)));
         let height = lowest - place.dot(self.up);
         LidarBody {
@@ -169,7 +171,7 @@ impl LidarSimulation {
             height,
             linear_speed: self.stage.world.bodies[body.handle].linvel().length(),
             // Deeper than it is large.
-            lost: height < -body.cloud.bounds().extents().max_element(),
+            lost: height < -cloud.bounds().extents().max_element(),
         }
     }
 }

@@ -282,7 +282,7 @@ impl RobotSimulation {
 
     /// The clouds of the loose bodies, each in its own frame.
     pub fn loose_clouds(&self) -> impl Iterator<Item = &PointCloud<'static>> {
-        self.loose.iter().map(|loose| &loose.body.cloud)
+        self.loose.iter().map(|loose| loose.body.cloud(&self.stage))
     }
 
     /// Where everything is now.
