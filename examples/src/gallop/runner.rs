@@ -61,13 +61,12 @@ impl Runner {
         all.fold(Aabb::EMPTY, Aabb::including)
     }
 
-    /// Turns `up` to y, scales the largest extent to `size` metres, sets the feet on y = 0 and the
-    /// middle over the origin, and turns it to run along x: against the way that the feet, its lowest
-    /// points, go while they are down. Gives the distance that they go so in a cycle, metres.
+    /// Turns `up` to y, and it to run along x: against the way that the feet, its lowest points, go while they are down.
+    /// Then scales the largest extent to `size` metres, and sets the feet on y = 0 and the middle over the origin. Gives
+    /// the distance that the feet go so in a cycle, metres.
     pub fn stand(&mut self, up: Vec3, size: f32) -> f32 {
-        let scale = size / self.size();
         let upright = Quat::from_rotation_arc(up, Vec3::Y);
-        self.points.map(|p| scale * (upright * p));
+        self.points.map(|p| upright * p);
         let stride = self.stride();
         let ahead = Vec3::new(-stride.x, 0.0, -stride.z);
         let turn = match ahead.try_normalize() {
@@ -75,13 +74,15 @@ impl Runner {
             None => Quat::IDENTITY,
         };
         self.points.map(|p| turn * p);
+        let scale = size / self.size();
+        self.points.map(|p| scale * p);
         if let Normals::Given(normals) = &mut self.normals {
             normals.map(|n| turn * (upright * n));
         }
         let bounds = self.bounds();
         let lift = bounds.center().with_y(bounds.min.y);
         self.points.map(|p| p - lift);
-        ahead.length()
+        scale * ahead.length()
     }
 
     /// How far its lowest points go in a cycle, while they are that.
@@ -158,6 +159,23 @@ mod tests {
         // The first foot is down and goes back.
         let (later, _) = runner.at(1.0 / 8.0);
         assert!((later[0] - points[0]).distance(-0.1 * scale * Vec3::X) < 1e-4);
+    }
+
+    /// A body 1 m long that runs along the diagonal of its frame: its size is its length.
+    #[test]
+    fn the_size_is_that_of_what_runs_ahead() {
+        let ahead = Vec3::new(1.0, 0.0, 1.0).normalize();
+        // Each foot goes back while it is down, and ahead over the ground.
+        let frame = |k: usize| {
+            let (back, ahead_by) = (-0.02 * k as f32 * ahead, 0.02 * k as f32 * ahead);
+            let [lift, fall] = [k, 1 - k].map(|k| 0.05 * k as f32 * Vec3::Y);
+            let ends = [-0.5, 0.5].map(|share| 0.1 * Vec3::Y + share * ahead);
+            vec![back + lift, ahead_by + fall, ends[0], ends[1]]
+        };
+        let moving = MovingPoints::new((0..2).map(frame).collect()).unwrap();
+        let mut runner = Runner::new(moving);
+        runner.stand(Vec3::Y, 2.0);
+        assert!((runner.size() - 2.0).abs() < 1e-4, "{}", runner.size());
     }
 
     #[test]
