@@ -166,8 +166,9 @@ fn measure(
         if number == 0 {
             methods.retain(|(method, _)| method.takes(&frame));
         }
-        floors.push(floor(&frame));
         for ((method, _), done) in methods.iter_mut().zip(&mut all_done) {
+            // Every method then finds the points in the cache, where they fit.
+            floors.push(floor(&frame));
             MEMORY.reset_peak_usage();
             let before = MEMORY.current_usage_as_mb();
             let found = method.compare(&frame);
@@ -176,9 +177,9 @@ fn measure(
             // The first frame warms memory up.
             done.found.extend((number > 0).then_some(found));
         }
-        // After what is timed, with the points in the cache again, as the first method found them.
-        floor(&frame);
+        // After what is timed, on the same terms.
         for ((method, _), done) in methods.iter_mut().zip(&mut all_done) {
+            floor(&frame);
             let stages = method.stages(&frame);
             done.stages.extend(stages.filter(|_| number > 0));
         }

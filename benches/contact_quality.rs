@@ -87,12 +87,13 @@ fn contenders(args: &Args) -> anyhow::Result<Vec<Contender>> {
         add(Box::new(Culled::new(VoxelsRebuild::default())), Some(scale));
     }
     add(Box::new(Culled::new(TriMeshPeer::rebuilt())), None);
+    add(Box::new(Culled::new(TriMeshPeer::outward())), None);
     Ok(all)
 }
 
 fn print(rows: &[ContactRow]) {
     println!(
-        "{:<15} {:<8} {:<32} {:>5} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9}",
+        "{:<15} {:<8} {:<40} {:>5} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>9}",
         "pair",
         "regime",
         "variant",
@@ -110,7 +111,7 @@ fn print(rows: &[ContactRow]) {
     let error = |value: Option<f64>| value.map_or_else(|| "inf".to_owned(), |v| format!("{v:.3}"));
     for row in rows {
         println!(
-            "{:<15} {:<8} {:<32} {:>5} {:>6} {:>8.1} {:>8.1} {:>8} {:>8} {:>8} {:>8} {:>9.3}",
+            "{:<15} {:<8} {:<40} {:>5} {:>6} {:>8.1} {:>8.1} {:>8} {:>8} {:>8} {:>8} {:>9.3}",
             row.pair.map_or("all", ContactPair::name),
             row.regime.name(),
             row.variant,

@@ -233,6 +233,10 @@ fn main() -> anyhow::Result<()> {
         measured.push(part);
     }
     progress.finish_and_clear();
+    ensure!(
+        soak.gpu.is_none(),
+        "no pair was in contact: the device was not lost"
+    );
     println!("cycles  bodies  KiB live  pairs  contact pixels  ms a step");
     for part in &measured {
         println!(
@@ -266,6 +270,7 @@ fn check(settling: &Part, measured: &[Part]) -> anyhow::Result<()> {
         grown <= SLACK + PER_BODY * bodies as isize,
         "memory grew by {grown} B over {bodies} bodies"
     );
+    ensure!(first.contact_pixels > 0.0, "no bodies were in contact");
     for part in measured {
         let differs = |of: f64, first: f64| (of - first).abs() > WORK * first;
         ensure!(

@@ -17,7 +17,13 @@ impl Mesh {
         match shape {
             ContactShape::Sphere(radius) => {
                 let area = 4.0 * std::f32::consts::PI * radius * radius;
-                let (unit, faces) = icosphere((area / (spacing * spacing)) as usize);
+                let (unit, mut faces) = icosphere((area / (spacing * spacing)) as usize);
+                let at = |i: u32| unit[i as usize];
+                for [a, b, c] in &mut faces {
+                    if (at(*b) - at(*a)).cross(at(*c) - at(*a)).dot(at(*a)) < 0.0 {
+                        std::mem::swap(b, c);
+                    }
+                }
                 Self {
                     vertices: unit.into_iter().map(|p| radius * p).collect(),
                     faces,

@@ -11,6 +11,8 @@ pub struct TriMeshPeer {
     /// Of the frame before, where vertices are only moved.
     kept: Option<[TriMesh; 2]>,
     is_kept: bool,
+    /// Of meshes that are built.
+    flags: TriMeshFlags,
 }
 
 impl TriMeshPeer {
@@ -19,6 +21,15 @@ impl TriMeshPeer {
         Self {
             kept: None,
             is_kept: false,
+            flags: TriMeshFlags::empty(),
+        }
+    }
+
+    /// The same for faces that wind outwards: normals at inner edges are corrected, and contacts from inside dropped.
+    pub fn outward() -> Self {
+        Self {
+            flags: TriMeshFlags::FIX_INTERNAL_EDGES,
+            ..Self::rebuilt()
         }
     }
 
@@ -27,6 +38,7 @@ impl TriMeshPeer {
         Self {
             kept: None,
             is_kept: true,
+            flags: TriMeshFlags::DEFORMABLE,
         }
     }
 }
@@ -46,10 +58,12 @@ fn meshes(frame: &Frame, flags: TriMeshFlags) -> Option<[TriMesh; 2]> {
 
 impl Peer for TriMeshPeer {
     fn name(&self) -> String {
-        match self.is_kept {
-            false => "mesh rebuild (TriMesh)".to_owned(),
-            true => "mesh set_vertices (TriMesh)".to_owned(),
-        }
+        let name = match (self.is_kept, self.flags.is_empty()) {
+            (true, _) => "mesh set_vertices (TriMesh)",
+            (false, true) => "mesh rebuild (TriMesh)",
+            (false, false) => "mesh rebuild, outward (TriMesh)",
+        };
+        name.to_owned()
     }
 
     fn needs_faces(&self) -> bool {
@@ -66,7 +80,7 @@ impl Peer for TriMeshPeer {
                 .kept
                 .take()
                 .filter(fits)
-                .or_else(|| meshes(frame, TriMeshFlags::DEFORMABLE));
+                .or_else(|| meshes(frame, self.flags));
         }
         let start = Stopwatch::of_thread();
         if self.is_kept {
@@ -75,7 +89,7 @@ impl Peer for TriMeshPeer {
                 b.set_vertices(&vertices(frame.b));
             }
         } else {
-            self.kept = meshes(frame, TriMeshFlags::empty());
+            self.kept = meshes(frame, self.flags);
         }
         let built = start.seconds();
         match &self.kept {
