@@ -44,6 +44,17 @@ fn length(x: f32, y: f32) -> f32 {
     (x * x + y * y).sqrt()
 }
 
+/// Sums of a row of a window: of the values, of their products with the column, and with its square.
+#[inline(always)]
+fn moments([a, b, c, d, e]: [f32; WINDOW.len()]) -> [f32; 3] {
+    let [outer, inner] = [a + e, b + d];
+    [
+        outer + inner + c,
+        2.0 * (e - a) + (d - b),
+        4.0 * outer + inner,
+    ]
+}
+
 /// What is the same for all pixels of a frame.
 pub(super) struct Optics {
     /// Metres that a depth may change by from one pixel to the next by a surface's slope, for each
@@ -113,12 +124,25 @@ impl<'a> Window<'a> {
 /// What the pixels of a line show, in the frame of the world, metres; anything where there is no depth.
 #[derive(Default)]
 pub(super) struct Pixels {
-    pub(super) points: [[f32; 3]; TILE],
-    pub(super) normals: [[f32; 3]; TILE],
+    /// Along x, y and z, as the processor likes it.
+    points: [[f32; TILE]; 3],
+    normals: [[f32; TILE]; 3],
     pub(super) radii: [f32; TILE],
     /// Whether it is on no surface: a neighbour is farther off than a surface may be, or the pixels
     /// around tell no plane, or one that it is off.
     pub(super) flies: [bool; TILE],
+}
+
+impl Pixels {
+    pub(super) fn point(&self, k: usize) -> Vec3 {
+        let [x, y, z] = &self.points;
+        Vec3::new(x[k], y[k], z[k])
+    }
+
+    pub(super) fn normal(&self, k: usize) -> Vec3 {
+        let [x, y, z] = &self.normals;
+        Vec3::new(x[k], y[k], z[k])
+    }
 }
 
 /// Planes through the windows of a line's pixels: inverse depth, which on a plane is linear in the
@@ -155,27 +179,25 @@ impl Planes {
         let middle = window.line(window.inverses, 0, 0);
         for down in WINDOW {
             let y = f32::from(down);
-            let lines = WINDOW.map(|right| {
+            let mut lines = [middle; WINDOW.len()];
+            for (line, right) in lines.iter_mut().zip(WINDOW) {
                 let [right, down] = [right, down].map(|k| isize::from(k) * spacing as isize);
-                window.line(window.inverses, right, down)
-            });
+                *line = window.line(window.inverses, right, down);
+            }
             for k in 0..TILE {
-                // The row's sums without y, which is the same for all of it: they stay in registers.
-                let [mut n, mut x, mut d, mut xx, mut xd] = [0.0_f32; 5];
-                for (right, line) in WINDOW.into_iter().zip(lines) {
+                // The row's sums without y, which is the same for all of it.
+                let (mut ones, mut differences) = ([0.0_f32; 5], [0.0_f32; 5]);
+                for (at, (right, line)) in WINDOW.into_iter().zip(lines).enumerate() {
                     let right = f32::from(right);
                     let difference = line[k] - middle[k];
                     let off = difference - (self.slopes[0][k] * right + self.slopes[1][k] * y);
                     let most = slack[k] + length(right, y) * slack_step[k];
                     let is_on = (line[k] > 0.0) & (off.abs() <= most);
-                    let one = if is_on { 1.0 } else { 0.0 };
-                    let difference = if is_on { difference } else { 0.0 };
-                    n += one;
-                    x += right * one;
-                    d += difference;
-                    xx += right * right * one;
-                    xd += right * difference;
+                    ones[at] = if is_on { 1.0 } else { 0.0 };
+                    differences[at] = if is_on { difference } else { 0.0 };
                 }
+                let [n, x, xx] = moments(ones);
+                let [d, xd, _] = moments(differences);
                 let terms = [n, x, y * n, d, xx, y * x, y * y * n, xd, y * d];
                 for (sum, term) in sums.iter_mut().zip(terms) {
                     sum[k] += term;
@@ -213,8 +235,11 @@ impl Planes {
         slack: &[f32; TILE],
         slope_step: &[f32; TILE],
     ) -> Self {
-        let slope_step = slope_step.map(|step| spacing as f32 * step);
-        let error_step = slack.map(|slack| ERROR_STEP * slack);
+        let (mut slope_step, mut error_step) = (*slope_step, *slack);
+        for k in 0..TILE {
+            slope_step[k] *= spacing as f32;
+            error_step[k] *= ERROR_STEP;
+        }
         Self::LEVEL
             .fitted(window, spacing, slack, &slope_step)
             .fitted(window, spacing, slack, &error_step)
@@ -230,11 +255,12 @@ impl Planes {
 /// window. Where it holds too few, a small one takes its place, as on what is thin, or else a larger one.
 ///
 /// It is compiled for several instruction sets, of which the machine's is chosen. Results are the same: no
-/// fused multiply-add is made of two operations. What it calls must be inlined, or else is not among them.
+/// fused multiply-add is made of two operations. What it calls must be inlined, or else is not among them: long
+/// closures in `map` of an array are not.
 #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
 pub(super) fn compute<'a>(
     window: &Window<'a>,
-    columns: &[f32],
+    columns: &[f32; TILE],
     row: f32,
     optics: &Optics,
     pixels: &mut Pixels,
@@ -272,16 +298,20 @@ pub(super) fn compute<'a>(
             }
         }
     }
-    let around = [(-1, 0), (1, 0), (0, -1), (0, 1)]
-        .map(|(right, down)| window.line(window.depths, right, down));
+    // Largest difference of depth from one pixel to the next on a surface.
+    let mut limits = [0.0; TILE];
+    for k in 0..TILE {
+        limits[k] = DEVIATIONS * deviations[k] + optics.slope_step * depth[k];
+        pixels.flies[k] = !planes.are_told[k] | (planes.offsets[k].abs() > slack[k]);
+    }
+    for (right, down) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
+        let beside = window.line(window.depths, right, down);
+        for k in 0..TILE {
+            pixels.flies[k] |= (beside[k] > 0.0) & ((beside[k] - depth[k]).abs() > limits[k]);
+        }
+    }
     for k in 0..TILE {
         let (z, w) = (depth[k], inverse[k]);
-        // Largest difference of depth from one pixel to the next on a surface.
-        let limit = DEVIATIONS * deviations[k] + optics.slope_step * z;
-        let is_off = |other: f32| (other > 0.0) & ((other - z).abs() > limit);
-        let jumps = (around.iter()).fold(false, |jumps, line| jumps | is_off(line[k]));
-        let is_off_plane = planes.offsets[k].abs() > slack[k];
-        pixels.flies[k] = jumps | !planes.are_told[k] | is_off_plane;
         let ray = Vec3::new(columns[k], row, 1.0);
         // On the plane n · p = 1: n.x x / z + n.y y / z + n.z = 1 / z.
         let [x, y] = [0, 1].map(|axis| planes.slopes[axis][k] * optics.focal[axis]);
@@ -289,8 +319,12 @@ pub(super) fn compute<'a>(
         let normal = Vec3::new(x, y, w - (x * ray.x + y * ray.y));
         let towards = if normal.dot(ray) > 0.0 { -1.0 } else { 1.0 };
         let normal = normal * (towards / normal.length());
-        pixels.points[k] = (optics.origin + optics.rotation * (z * ray)).to_array();
-        pixels.normals[k] = (optics.rotation * normal).to_array();
+        let point = optics.origin + optics.rotation * (z * ray);
+        let normal = optics.rotation * normal;
+        for axis in 0..3 {
+            pixels.points[axis][k] = point[axis];
+            pixels.normals[axis][k] = normal[axis];
+        }
         pixels.radii[k] = length(optics.footprint * z, deviations[k]);
     }
 }
