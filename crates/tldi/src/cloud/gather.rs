@@ -78,20 +78,33 @@ pub(crate) fn bounds_of_blocks(points: &[Vec3]) -> impl Iterator<Item = Aabb> + 
     points.chunks(BLOCK).map(bounds_of)
 }
 
-/// Points whose coordinates are compared at once.
+/// Bounds of points; not finite where one of them is not.
+fn bounds_of(points: &[Vec3]) -> Aabb {
+    let [min, max] = extremes_of_thirds(bytemuck::cast_slice(points)).map(Vec3::from);
+    Aabb { min, max }
+}
+
+/// Least and greatest of values, in the total order of `f32`.
+pub(crate) fn extremes(values: &[f32]) -> [f32; 2] {
+    let [mut least, mut greatest] = extremes_of_thirds(values);
+    least.sort_unstable_by(f32::total_cmp);
+    greatest.sort_unstable_by(f32::total_cmp);
+    [least[0], greatest[2]]
+}
+
+/// Values that are compared at once.
 const LANES: usize = 3 * 16;
 
-/// Bounds of points; not finite where one of them is not.
+/// Least and greatest of every third value, from the first, the second and the third on: of coordinates, those of the
+/// axes. The order is the total one of `f32`, where −NaN < −∞ and ∞ < NaN.
 ///
-/// Coordinates are compared as integers in the total order of `f32`, where −NaN < −∞ and ∞ < NaN: folds of integers are
-/// vectorised, folds of floats, which must not be reordered, not. Every third lane holds the same axis.
+/// Values are compared as integers: folds of these are vectorised, folds of floats, which must not be reordered, not.
 #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn bounds_of(points: &[Vec3]) -> Aabb {
+fn extremes_of_thirds(values: &[f32]) -> [[f32; 3]; 2] {
     // Flips the magnitude of negative values, as `f32::total_cmp` does; its own inverse.
     let key = |bits: i32| bits ^ ((bits >> 31) & i32::MAX);
     let (mut least, mut greatest) = ([i32::MAX; LANES], [i32::MIN; LANES]);
-    let coordinates: &[f32] = bytemuck::cast_slice(points);
-    let (chunks, rest) = coordinates.as_chunks::<LANES>();
+    let (chunks, rest) = values.as_chunks::<LANES>();
     for chunk in chunks {
         for l in 0..LANES {
             let key = key(chunk[l].to_bits() as i32);
@@ -112,12 +125,7 @@ fn bounds_of(points: &[Vec3]) -> Aabb {
             greatest[l] = greatest[l].max(greatest[l + lanes]);
         }
     }
-    let value = |l: usize, keys: &[i32; LANES]| f32::from_bits(key(keys[l]) as u32);
-    let point = |keys| Vec3::new(value(0, keys), value(1, keys), value(2, keys));
-    Aabb {
-        min: point(&least),
-        max: point(&greatest),
-    }
+    [least, greatest].map(|keys| [keys[0], keys[1], keys[2]].map(|k| f32::from_bits(key(k) as u32)))
 }
 
 /// The index, among the points given, of the one with index `kept` among those not dropped. `dropped` is ascending.

@@ -1,6 +1,6 @@
 //! Point radii: validation, and the spherical cover from nearest neighbours.
 
-use crate::cloud::gather::BLOCK;
+use crate::cloud::gather::{BLOCK, extremes};
 use crate::{Aabb, CloudError, KdTree};
 use glamx::Vec3;
 use std::borrow::Cow;
@@ -45,17 +45,24 @@ pub(crate) fn is_valid(radius: f32) -> bool {
 /// its radius. `blocks` are the [bounds](crate::cloud::gather::bounds_of_blocks) of the points; `given_index` turns an
 /// index of the points into the user's.
 ///
-/// Cost: a pass over the radii; only blocks that have something wrong are looked at point by point.
+/// Cost: a pass over the radii; points are looked at only where a block may have a fault.
 pub(crate) fn check_radii(
     points: &[Vec3],
     blocks: &[Aabb],
     radii: &Radii<'_>,
     given_index: impl Fn(usize) -> usize,
 ) -> Result<(), CloudError> {
-    let is_bad = |[least, largest]: [f32; 2]| !(is_valid(least) && is_valid(largest));
-    let of_block = |k: usize| k * BLOCK..points.len().min((k + 1) * BLOCK);
-    let mut bad = (0..blocks.len()).filter(|&k| is_bad(extremes(radii, of_block(k))));
-    if let Some(i) = bad.find_map(|k| of_block(k).find(|&i| !is_valid(radii.of(i)))) {
+    let is_coarse = |coordinate: f32, radius: f32| coordinate > COORDINATE_PER_RADIUS * radius;
+    let may_have_fault = |(k, block): (usize, &Aabb)| {
+        let of_block = k * BLOCK..points.len().min((k + 1) * BLOCK);
+        let [least, largest] = least_and_largest(radii, of_block);
+        let coordinate = block.min.abs().max(block.max.abs()).max_element();
+        !is_valid(least) | !is_valid(largest) | is_coarse(coordinate, least)
+    };
+    if !blocks.iter().enumerate().any(may_have_fault) {
+        return Ok(());
+    }
+    if let Some(i) = (0..points.len()).find(|&i| !is_valid(radii.of(i))) {
         let radius = radii.of(i);
         // One for all has no index.
         let index = match radii {
@@ -64,13 +71,8 @@ pub(crate) fn check_radii(
         };
         return Err(CloudError::BadRadius { index, radius });
     }
-    let is_coarse = |coordinate: f32, radius: f32| coordinate > COORDINATE_PER_RADIUS * radius;
-    let coarse = blocks.iter().enumerate().filter(|(k, block)| {
-        let largest = block.min.abs().max(block.max.abs()).max_element();
-        is_coarse(largest, extremes(radii, of_block(*k))[0])
-    });
     let of_point = |i: &usize| is_coarse(points[*i].abs().max_element(), radii.of(*i));
-    match coarse.flat_map(|(k, _)| of_block(k)).find(of_point) {
+    match (0..points.len()).find(of_point) {
         None => Ok(()),
         Some(i) => Err(CloudError::CoordinateTooLarge {
             index: given_index(i),
@@ -99,22 +101,16 @@ pub(crate) fn mean_and_max(radii: &Radii<'_>) -> (f32, f32) {
         .into_iter()
         .chain(rest.iter().copied().map(f64::from))
         .sum();
-    let [_, largest] = extremes(radii, 0..all.len());
+    let [_, largest] = least_and_largest(radii, 0..all.len());
     ((sum / all.len() as f64) as f32, largest)
 }
 
-/// Least and largest of some radii. Their bits are compared as integers, since folds of these are vectorised: the order is
-/// that of positive numbers. Where a radius is negative, the least one is negative or NaN; where one is NaN, one of both is.
-fn extremes(radii: &Radii<'_>, points: Range<usize>) -> [f32; 2] {
+/// Least and largest of some radii: where one is negative, the least one is negative or NaN; where one is NaN, one of both
+/// is.
+fn least_and_largest(radii: &Radii<'_>, points: Range<usize>) -> [f32; 2] {
     match radii {
         Radii::Global(radius) => [*radius; 2],
-        Radii::PerPoint(radii) => {
-            let bits = radii[points].iter().map(|radius| radius.to_bits() as i32);
-            let [least, largest] = bits.fold([i32::MAX, i32::MIN], |[least, largest], bits| {
-                [least.min(bits), largest.max(bits)]
-            });
-            [least, largest].map(|bits| f32::from_bits(bits as u32))
-        }
+        Radii::PerPoint(radii) => extremes(&radii[points]),
     }
 }
 
