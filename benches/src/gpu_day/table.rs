@@ -54,10 +54,11 @@ pub fn print(report: &Report) {
         "one core"
     );
     for row in &report.workloads {
-        let times = row.stages.iter().filter_map(|stage| stage.ms);
-        let stages = times.fold(0.0, |sum, ms| sum + ms);
+        // Where no pair is in reach, no stage ran.
+        let sum = || row.stages.iter().map(|stage| stage.ms).sum();
+        let stages: Option<f64> = (!row.stages.is_empty()).then(sum).flatten();
         println!(
-            "{:<14} {:<8} {:>8} {:>6} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9} {:>9}",
+            "{:<14} {:<8} {:>8} {:>6} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9} {:>9} {:>9}",
             row.placement,
             row.kind,
             row.points,
@@ -66,11 +67,12 @@ pub fn print(report: &Report) {
             row.resident.p95_ms,
             row.uploaded.p50_ms,
             row.uploaded.p95_ms,
-            stages,
-            optional(row.cpu),
-            optional(row.cpu_one_core)
+            number(stages),
+            median(row.cpu),
+            median(row.cpu_one_core)
         );
     }
+    stages(report);
     for what in &report.skipped {
         println!("skipped: {what}");
     }
@@ -85,8 +87,41 @@ pub fn print(report: &Report) {
     );
 }
 
-fn optional(spread: Option<Spread>) -> String {
-    spread.map_or("-".to_owned(), |s| format!("{:.3}", s.p50_ms))
+fn median(spread: Option<Spread>) -> String {
+    number(spread.map(|spread| spread.p50_ms))
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |value| format!("{value:.3}"))
+}
+
+/// Of the scene with the most contacts.
+fn stages(report: &Report) {
+    let measured = report.workloads.iter().filter(|row| !row.stages.is_empty());
+    let Some(row) = measured.max_by_key(|row| row.contacts) else {
+        return;
+    };
+    println!(
+        "\n{:<16} {:>9} {:>9} {:>9}   {} {}, {} points, {} pairs, {} contact pixels",
+        "stage",
+        "ms",
+        "floor ms",
+        "MB",
+        row.placement,
+        row.kind,
+        row.points,
+        row.pairs,
+        row.contacts
+    );
+    for stage in &row.stages {
+        println!(
+            "{:<16} {:>9} {:>9} {:>9.3}",
+            stage.stage,
+            number(stage.ms),
+            number(stage.floor_ms),
+            stage.bytes as f64 * 1e-6
+        );
+    }
 }
 
 fn floors(report: &Report) {

@@ -32,7 +32,6 @@ pub use backend::{InFlight, WgpuBackend};
 pub use choice::{BACKEND_VARIABLE, BackendChoice};
 pub use device::{AdapterChoice, Gpu};
 pub use error::GpuError;
-pub use measure::bandwidth::copy_bandwidth;
 pub use measure::timer::StageTime;
 pub use measure::traffic::Traffic;
 pub use sources::DepthCamera;
