@@ -1,6 +1,7 @@
 //! Which pairs the device compares, and which ones the CPU.
 
-use tldi::{PairQuery, Projection, Surface, Variant, View, plan};
+use tldi::plan::{self, DepthScale};
+use tldi::{PairQuery, Projection, Surface, Variant, View};
 
 /// Whether only the device has the points of a cloud of the pair.
 pub(crate) fn lives_on_device(query: &PairQuery) -> bool {
@@ -31,9 +32,20 @@ fn is_light(surface: Surface<'_>, pixel_size: f32) -> bool {
         && cloud.len() as f32 * radius * radius <= MOST_DENSITY * area
 }
 
+/// Whether an image of the device has depths enough for all in which both clouds can be in reach. It counts them from the
+/// nearest of these; the CPU leaves out what is too far from the middle.
+fn is_within_depths(query: &PairQuery) -> bool {
+    let across = |surface| match surface {
+        Surface::Cloud(cloud) => (cloud.bounds().loosened(cloud.max_radius()).extents()).length(),
+        _ => f32::INFINITY,
+    };
+    let most = across(query.a).min(across(query.b)) + query.params.prediction;
+    most <= 2.0 * DepthScale::reach(&query.params)
+}
+
 /// Whether the device takes a pair: two clouds, oriented splats and an orthographic view. All else
-/// is compared by the CPU backend. So are uneven clouds, since the device goes by their mean radii, and clouds with large or
-/// crowded splats, which take it long, unless it alone has the points of one of them.
+/// is compared by the CPU backend. Unless the device alone has the points of one of them, so are uneven clouds, since the
+/// device goes by their mean radii, clouds with large or crowded splats, which take it long, and those too large for its depths.
 pub(crate) fn is_for_device(query: &PairQuery) -> bool {
     let is_orthographic = match query.view {
         View::Fixed(camera) => matches!(
@@ -45,12 +57,13 @@ pub(crate) fn is_for_device(query: &PairQuery) -> bool {
     let is_cloud = |surface| !matches!(surface, Surface::Exact(_));
     let is_light = |surface| is_light(surface, query.params.pixel_size);
     let is_even = |surface| !matches!(surface, Surface::Cloud(cloud) if cloud.is_uneven());
+    let is_suited = |surface| is_even(surface) && is_light(surface);
     query.params.check().is_ok()
         && is_orthographic
         && is_cloud(query.a)
         && is_cloud(query.b)
-        && (is_even(query.a) && is_even(query.b) && is_light(query.a) && is_light(query.b)
-            || lives_on_device(query))
+        && (lives_on_device(query)
+            || is_suited(query.a) && is_suited(query.b) && is_within_depths(query))
         && query.params.variant() == Variant::Oriented
 }
 
@@ -60,12 +73,15 @@ mod tests {
     use tldi::glamx::{Pose3, Vec3};
     use tldi::{Params, PointCloud};
 
-    /// 80 × 80 points, 1 m apart. With radii of 8 m there are 34 in the square of a radius, with 16 m 84.
+    /// 80 × 80 points, 1 m apart. With radii of 8 m there are 34 in the square of a radius, with 16 m 84. With radii of 0.2 mm,
+    /// and thicknesses of 0.4 mm, depths reach over 105 m, and the diagonal is 112 m.
     #[test]
-    fn large_and_crowded_splats_are_the_cpus() {
+    fn what_takes_the_device_long_or_has_no_depths_is_the_cpus() {
         let at = |i: usize| Vec3::new((i % 80) as f32, 0.0, (i / 80) as f32);
         let points: Vec<Vec3> = (0..6400).map(at).collect();
         for (radius, radius_px, is_the_devices) in [
+            (0.0002, 1.0, false),
+            (0.0003, 1.0, true),
             (1.0, 1.0, true),
             (1.0, 60.0, true),
             (1.0, 80.0, false),

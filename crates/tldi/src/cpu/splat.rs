@@ -111,8 +111,15 @@ impl DepthScale {
         }
     }
 
-    /// How far from the middle depth the scale reaches on either side, metres. Within it, an `f32` tells its steps apart.
-    pub(crate) fn reach(params: &Params) -> f32 {
+    /// How far from the middle depth the scale reaches on either side, metres: 2¹⁷ thicknesses. Within it, an `f32` tells
+    /// its steps apart.
+    ///
+    /// ```
+    /// use tldi::{Params, plan::DepthScale};
+    /// let params = Params::for_radius(0.001);
+    /// assert!((DepthScale::reach(&params) - 131_072.0 * params.thickness).abs() < 0.01);
+    /// ```
+    pub fn reach(params: &Params) -> f32 {
         0.5 * MAX_DEPTH * params.thickness / DEPTH_STEPS as f32
     }
 
