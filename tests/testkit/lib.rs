@@ -35,5 +35,5 @@ pub use shapes::{
     Samples, cloud_of, sampled_box, sampled_plane, sampled_ramp, sampled_sphere, sampled_torus,
 };
 pub use sheets::{Sheet, standard_normal};
-pub use skip::{REQUIRE_DATA, REQUIRE_GPU, say_skipped, skip, test_data};
+pub use skip::{REQUIRE_DATA, REQUIRE_GPU, data_folder, say_skipped, skip, test_data};
 pub use way_out::WayOut;

@@ -29,17 +29,21 @@ pub fn say_skipped(why: &str) {
     let _nobody = std::io::stderr().write_all(text.as_bytes());
 }
 
-/// The path of a file of the test data, or `None` (said) where it is absent. The folder is named by the environment variable
-/// `TLDI_DATA`, else it is `shared/data` beside the checkout. `checkout` is the path of the checkout.
+/// The folder of test data: the environment variable `TLDI_DATA` names it, else it is `shared/data` beside the checkout.
+/// `checkout` is the path of the checkout.
+pub fn data_folder(checkout: &str) -> PathBuf {
+    std::env::var_os("TLDI_DATA").map_or_else(
+        || PathBuf::from(checkout).join("../shared/data"),
+        PathBuf::from,
+    )
+}
+
+/// The path of a file in the [folder of test data](data_folder), or `None` (said) where it is absent.
 ///
 /// # Panics
 /// There, if the variable [`REQUIRE_DATA`] is set.
 pub fn test_data(checkout: &str, name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("TLDI_DATA").map_or_else(
-        || PathBuf::from(checkout).join("../shared/data"),
-        PathBuf::from,
-    );
-    let path = folder.join(name);
+    let path = data_folder(checkout).join(name);
     if path.exists() {
         return Some(path);
     }

@@ -1,6 +1,14 @@
 //! What the tests of the binaries share.
 #![allow(dead_code, reason = "each test file uses a part")]
 
+#[allow(
+    dead_code,
+    unreachable_pub,
+    reason = "a part of another package, of which this one uses a part"
+)]
+#[path = "../../../tests/testkit/skip.rs"]
+mod skip;
+
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -108,7 +116,7 @@ pub(crate) fn keys(value: &Value) -> String {
 
 /// Runs a binary in `folder`. White space is between options; `$TLDI_DATA` stands for the folder of test data.
 pub(crate) fn run(binary: &str, folder: &Path, options: &str) -> Output {
-    let data = data_folder();
+    let data = skip::data_folder(CHECKOUT);
     let options = options.split_whitespace();
     Command::new(binary)
         .current_dir(folder)
@@ -211,21 +219,10 @@ pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-fn data_folder() -> PathBuf {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    std::env::var_os("TLDI_DATA").map_or_else(beside, PathBuf::from)
-}
+const CHECKOUT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
 /// Test data that is not part of the project, or `None`, said aloud, where it is not at hand; a failure where the variable
 /// `TLDI_REQUIRE_DATA` is set.
 pub(crate) fn data(name: &str) -> Option<PathBuf> {
-    let path = data_folder().join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    let place = path.display();
-    let is_required = std::env::var_os("TLDI_REQUIRE_DATA").is_some();
-    assert!(!is_required, "no test data at {place} (set TLDI_DATA)");
-    eprintln!("SKIPPED: no test data at {place} (set TLDI_DATA)");
-    None
+    skip::test_data(CHECKOUT, name)
 }
