@@ -42,6 +42,8 @@ where
 /// What is done to a file at some place.
 #[derive(Clone, Debug)]
 enum Damage {
+    /// Of a byte.
+    FlippedBit(u8),
     Bytes(Vec<u8>),
     Insert(Vec<u8>),
     Remove(usize),
@@ -78,6 +80,7 @@ fn damage() -> impl Strategy<Value = Damage> {
         )
     };
     prop_oneof![
+        2 => (0..8u8).prop_map(Damage::FlippedBit),
         3 => bytes().prop_map(Damage::Bytes),
         1 => bytes().prop_map(Damage::Insert),
         1 => (1..40usize).prop_map(Damage::Remove),
@@ -95,6 +98,7 @@ fn damaged(mut bytes: Vec<u8>, places: &[(prop::sample::Index, Damage)]) -> Vec<
         let at = place.index(bytes.len());
         let end = |length: usize| (at + length).min(bytes.len());
         match damage {
+            Damage::FlippedBit(bit) => bytes[at] ^= 1 << bit,
             Damage::Bytes(new) => {
                 let range = at..end(new.len());
                 let count = range.len();
