@@ -1,13 +1,8 @@
 //! How bodies start, and what the report of a drop says.
 
-#[allow(
-    dead_code,
-    unreachable_pub,
-    reason = "a part of another package, of which this one uses a part"
-)]
-#[path = "../../tests/testkit/skip.rs"]
-mod skip;
+mod common;
 
+use common::skip;
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{Backend, CpuBackend, PointCloud};
 use tldi_examples::bodies::NamedCloud;

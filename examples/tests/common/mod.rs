@@ -7,7 +7,7 @@
     reason = "a part of another package, of which this one uses a part"
 )]
 #[path = "../../../tests/testkit/skip.rs"]
-mod skip;
+pub(crate) mod skip;
 
 use serde_json::Value;
 use std::fs;

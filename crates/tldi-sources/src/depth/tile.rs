@@ -186,7 +186,8 @@ impl Planes {
             }
             for k in 0..TILE {
                 // The row's sums without y, which is the same for all of it.
-                let (mut ones, mut differences) = ([0.0_f32; 5], [0.0_f32; 5]);
+                let mut ones = [0.0_f32; WINDOW.len()];
+                let mut differences = ones;
                 for (at, (right, line)) in WINDOW.into_iter().zip(lines).enumerate() {
                     let right = f32::from(right);
                     let difference = line[k] - middle[k];
