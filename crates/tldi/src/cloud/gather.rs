@@ -125,7 +125,9 @@ fn extremes_of_thirds(values: &[f32]) -> [[f32; 3]; 2] {
             greatest[l] = greatest[l].max(greatest[l + lanes]);
         }
     }
-    [least, greatest].map(|keys| [keys[0], keys[1], keys[2]].map(|k| f32::from_bits(key(k) as u32)))
+    let value = |l: usize, keys: &[i32; LANES]| f32::from_bits(key(keys[l]) as u32);
+    let of_thirds = |keys| [value(0, keys), value(1, keys), value(2, keys)];
+    [of_thirds(&least), of_thirds(&greatest)]
 }
 
 /// The index, among the points given, of the one with index `kept` among those not dropped. `dropped` is ascending.
