@@ -1,10 +1,12 @@
 //! Whole pairs of clouds against analytic truth: gap, collision, contact normals and support points.
 
 use tldi::glamx::{Pose3, Vec3};
-use tldi::{CameraPolicy, ContactPoint, PairQuery, PairResult, PointCloud, View, Work};
+use tldi::{
+    CameraPolicy, ContactPoint, PairQuery, PairResult, Params, PointCloud, Surface, View, Work,
+};
 use tldi_tests::{
-    Samples, aimed_clouds, compare_batch, compare_clouds, deepest_point, random_pose, random_unit,
-    sampled_box, sampled_plane, sampled_sphere,
+    Samples, aimed_clouds, compare, compare_batch, compare_clouds, deepest_point, random_pose,
+    random_unit, sampled_box, sampled_plane, sampled_sphere,
 };
 
 /// Spacing of all samples here, and with radius = spacing a mean radius, in metres.
@@ -20,6 +22,49 @@ fn deepest_normal(result: &PairResult) -> Vec3 {
 
 fn least_patch_gap(result: &PairResult) -> f32 {
     deepest_point(result).expect("there is a patch").0
+}
+
+/// A ball that is nearly out of reach touches below its middle, although few of its pixels are within the prediction.
+/// What is beyond is no contact, but the gap is told.
+#[test]
+fn a_ball_at_the_prediction_touches_in_its_lowest_point() {
+    let mut rng = fastrand::Rng::with_seed(3);
+    let radius = 0.05;
+    let sphere = sampled_sphere(radius, R);
+    let plane = sampled_plane(0.3, R, &mut rng);
+    for cloud in [Samples::cloud, Samples::bare_cloud] {
+        let (plane, ball) = (cloud(&plane, R), cloud(&sphere, R));
+        for case in 0..40 {
+            let within = 0.2 + 0.7 * case as f32 / 40.0;
+            for (gap, is_contact) in [(within * R, true), ((within + 1.0) * R, false)] {
+                let mut pose = random_pose(&mut rng, 0.0);
+                let aside = 0.1 * Vec3::new(rng.f32() - 0.5, 0.0, rng.f32() - 0.5);
+                pose.translation = aside + Vec3::Y * (radius + gap);
+                let result = compare(
+                    Surface::Cloud(&plane),
+                    Surface::Cloud(&ball),
+                    pose,
+                    Params::for_radius(R).with_prediction(R),
+                );
+                let what = format!("case {case}, gap {} r: {result:?}", gap / R);
+                let found = result.gap.expect(&what);
+                assert!((found - gap).abs() < 0.2 * R, "{what}");
+                assert!(result.contacts.iter().all(|c| c.gap <= R), "{what}");
+                if !is_contact {
+                    assert!(result.patches.is_empty(), "{what}");
+                    continue;
+                }
+                let [patch] = &result.patches[..] else {
+                    panic!("{what}");
+                };
+                let [point] = &patch.points[..] else {
+                    panic!("{what}");
+                };
+                // As in `spheres`, to a pixel.
+                assert!(point.middle().with_y(0.0).distance(aside) < R, "{what}");
+            }
+        }
+    }
 }
 
 /// Two spheres of 0.1 and 0.07 m, from 1.5 r̄ apart to 3 r̄ deep, from random directions, with and

@@ -2,6 +2,7 @@
 
 use crate::common::worlds::{HALF, REST_TOLERANCE, TestResult, attached, dynamic_at, settle};
 use crate::common::{SPACING, cube, shape, square};
+use rapier3d::parry::shape::Ball;
 use rapier3d::parry::utils::Array2;
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
@@ -40,6 +41,29 @@ fn rests(
         body.translation()
     );
     assert!(deepest < REST_TOLERANCE, "{deepest}");
+    Ok(())
+}
+
+/// A ball that falls straight down leaves a flat cloud straight up, wherever the step before ended above it.
+#[test]
+fn balls_do_not_leave_sideways() -> TestResult {
+    let floor = shape(&square(1.0));
+    let ball = PointCloudShape::new(sample_shape(&Ball::new(HALF), SPACING)?);
+    for case in 0..40 {
+        let (mut world, mut tldi) = attached();
+        world.insert(RigidBodyBuilder::fixed(), cloud_collider(floor.clone()));
+        let case = case as f32;
+        // Not over a point; up to 7 m/s.
+        let from = Vector::new(0.013 * case % SPACING, HALF + 0.05 * case, 0.01);
+        let falling = RigidBodyBuilder::dynamic().translation(from);
+        let (body, _) = world.insert(falling, cloud_collider(ball.clone()));
+        let mut most = 0.0_f32;
+        for _ in 0..70 {
+            tldi.step(&mut world)?;
+            most = most.max(world.bodies[body].linvel().with_y(0.0).length());
+        }
+        assert!(most < 0.1, "from {from}: {most} m/s sideways");
+    }
     Ok(())
 }
 

@@ -69,8 +69,8 @@ impl PatchScratch {
     /// Confirms the contact pixels of `result`, derives `collides` and `gap` from them as if
     /// normals told inside from outside, and fills the patches, deepest first.
     ///
-    /// The contact pixels may come in any order. Afterwards they are ordered by view, row and column; of one pixel, the
-    /// greatest gap comes first. Where `result` has several axes, they are those of the pixels' views. Cost: linear in their
+    /// The contact pixels may come in any order. Those beyond the prediction tell the shape of patches, and are dropped then.
+    /// Afterwards they are ordered by view, row and column; of one pixel, the greatest gap comes first. Where `result` has several axes, they are those of the pixels' views. Cost: linear in their
     /// number, except for sorting the groups, and the pixels if needed.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         let _stage = stage!("patches");
@@ -156,6 +156,7 @@ impl PatchScratch {
             start += part.len();
         }
         self.parts.clear();
+        let is_reported = |contact: &ContactPixel| contact.gap <= params.prediction;
         while let Some((start, end, splits)) = self.stack.pop() {
             let members = &mut self.groups.members[start..end];
             let shape = Shape::of(members, contacts, &self.smooth, params);
@@ -167,6 +168,9 @@ impl PatchScratch {
                     continue;
                 }
             }
+            if !members.iter().any(|&m| is_reported(&contacts[m as usize])) {
+                continue;
+            }
             self.parts.push(Part {
                 members: start..end,
                 normal: shape.normal,
@@ -174,6 +178,7 @@ impl PatchScratch {
             });
         }
         self.emit_planes(contacts, params, out);
+        result.contacts.retain(is_reported);
     }
 
     /// Pushes a patch for the parts of each plane, starting with the deepest, up to [`MAX_PATCHES`].

@@ -53,7 +53,7 @@ impl WayOut {
                     })
         }));
         retain_by_index(contacts, |k, contact| {
-            !self.is_wide[k] && contact.gap <= params.prediction
+            !self.is_wide[k] && contact.gap <= params.seen_gap()
         });
     }
 }

@@ -195,8 +195,8 @@ fn contact_pixels(
         }
         if gap > params.prediction {
             result.gap = Some(result.gap.map_or(gap, |g| g.min(gap)));
-            // It is no contact, but tells other views how deep theirs can be.
-            if order == Order::Reversed || at.others.is_empty() {
+            // It is no contact, but tells the shape of contacts beside it, and other views how deep theirs can be.
+            if order == Order::Reversed || at.others.is_empty() && gap > params.seen_gap() {
                 continue;
             }
         }

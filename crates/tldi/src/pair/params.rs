@@ -37,7 +37,8 @@ pub struct Params {
     pub merge_gap: f32,
     /// Thickness of a surface, in metres. Layers of neighbouring pixels continue each other if
     /// their depths differ by no more than this. A body that is no deeper than this in a surface
-    /// touches it. Two balls of radius r̄ overlap in depth up to 2 r̄.
+    /// touches it. Two balls of radius r̄ overlap in depth up to 2 r̄. Surfaces that are no farther apart are seen,
+    /// whatever the prediction.
     pub thickness: f32,
     /// Contacts with a gap up to this are reported, in metres (rapier's prediction distance). At most 2¹⁷ thicknesses.
     pub prediction: f32,
@@ -83,6 +84,12 @@ impl Params {
         } else {
             Variant::Oriented
         }
+    }
+
+    /// Gap up to which surfaces are seen, in metres. What lies beyond [`prediction`](Self::prediction) is no contact, but
+    /// tells the shape of contacts beside it: of a ball that comes near, the pixels within the prediction are few.
+    pub(crate) fn seen_gap(&self) -> f32 {
+        self.prediction.max(self.thickness)
     }
 
     /// The same parameters with another prediction distance in metres.

@@ -138,8 +138,8 @@ impl PairPlan {
 /// that are inclined by 60° come nearer there, each by as much as it rises over this pixel.
 pub(crate) fn column_reach(params: &Params) -> f32 {
     let rise = STEEPEST * params.pixel_size;
-    let inclined = 2.0 * (params.prediction - rise);
-    params.thickness.max(params.prediction).max(inclined)
+    let inclined = 2.0 * (params.seen_gap() - rise);
+    params.seen_gap().max(inclined)
 }
 
 /// Whether the bounds are within `reach` metres of each other in the frames of both surfaces.
