@@ -311,7 +311,8 @@ fn contact_pixels(
         if gap > (*look).params.prediction {
             atomicMax(&found[pair * PAIR_WORDS + GAP], ordered(-gap));
             // It is no contact, but tells other views how deep theirs can be.
-            if is_other_side || ((*look).other_count == 0u && gap > (*look).params.thickness) {
+            let seen = min((*look).params.thickness, 2.0 * (*look).params.prediction);
+            if is_other_side || ((*look).other_count == 0u && gap > seen) {
                 continue;
             }
         }

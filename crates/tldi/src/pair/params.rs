@@ -37,8 +37,7 @@ pub struct Params {
     pub merge_gap: f32,
     /// Thickness of a surface, in metres. Layers of neighbouring pixels continue each other if
     /// their depths differ by no more than this. A body that is no deeper than this in a surface
-    /// touches it. Two balls of radius r̄ overlap in depth up to 2 r̄. Surfaces that are no farther apart are seen,
-    /// whatever the prediction.
+    /// touches it. Two balls of radius r̄ overlap in depth up to 2 r̄.
     pub thickness: f32,
     /// Contacts with a gap up to this are reported, in metres (rapier's prediction distance). At most 2¹⁷ thicknesses.
     pub prediction: f32,
@@ -87,9 +86,11 @@ impl Params {
     }
 
     /// Gap up to which surfaces are seen, in metres. What lies beyond [`prediction`](Self::prediction) is no contact, but
-    /// tells the shape of contacts beside it: of a ball that comes near, the pixels within the prediction are few.
+    /// tells the shape of contacts beside it: of a ball that comes near, the pixels within the prediction are few. Twice as
+    /// far, up to a thickness: always a thickness, bodies with narrow feet sink into coarse clouds.
     pub(crate) fn seen_gap(&self) -> f32 {
-        self.prediction.max(self.thickness)
+        self.prediction
+            .max(self.thickness.min(2.0 * self.prediction))
     }
 
     /// The same parameters with another prediction distance in metres.

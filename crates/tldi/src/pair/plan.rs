@@ -139,7 +139,7 @@ impl PairPlan {
 pub(crate) fn column_reach(params: &Params) -> f32 {
     let rise = STEEPEST * params.pixel_size;
     let inclined = 2.0 * (params.seen_gap() - rise);
-    params.seen_gap().max(inclined)
+    params.thickness.max(params.seen_gap()).max(inclined)
 }
 
 /// Whether the bounds are within `reach` metres of each other in the frames of both surfaces.
