@@ -8,6 +8,10 @@ use rapier3d::parry::shape::{Shape, ShapeType};
 use tldi::plan::{first_is_smaller, largest_pixel, least_pixel};
 use tldi::{PairQuery, PairResult, Params, PointCloud, Surface, Variant, View};
 
+/// Contacts are searched up to this many standard deviations of given noise. So the fit at a light
+/// contact has points around it on all sides. Half or twice: no row of any suite changes.
+const FITTED: f32 = 3.0;
+
 /// The cloud of a shape that is one.
 pub(crate) fn cloud_of(shape: &dyn Shape) -> Option<&PointCloudShape> {
     shape.as_shape::<PointCloudShape>()
@@ -227,13 +231,15 @@ impl TldiConfig {
             Variant::Paper => Params::paper(coarsest),
             Variant::Oriented => Params::for_radius(coarsest),
         };
+        let noise = |part| cloud_of(part).map_or(0.0, |shape| shape.cloud().noise());
+        let fitted = FITTED * parts.into_iter().map(noise).fold(0.0, f32::max);
         let least = |part| cloud_of(part).map_or(0.0, |shape| least_pixel(shape.cloud()));
         let least = parts.into_iter().map(least).fold(0.0, f32::max);
         let pixel_size = self.resolution.pixel_size(coarsest).min(to_resolve);
         Some(
             params
                 .with_pixel_size(pixel_size.max(least))
-                .with_prediction(prediction),
+                .with_prediction(prediction.max(fitted)),
         )
     }
 }

@@ -70,8 +70,9 @@ impl PatchScratch {
     /// normals told inside from outside, and fills the patches, deepest first.
     ///
     /// The contact pixels may come in any order. Those beyond the prediction tell the shape of patches, and are dropped then.
-    /// Afterwards they are ordered by view, row and column; of one pixel, the greatest gap comes first. Where `result` has several axes, they are those of the pixels' views. Cost: linear in their
-    /// number, except for sorting the groups, and the pixels if needed.
+    /// Afterwards they are ordered by view, row and column; of one pixel, the greatest gap comes first. Where `result` has
+    /// several axes, they are those of the pixels' views. Cost: linear in their number, except for sorting the groups, and the
+    /// pixels if needed.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         let _stage = stage!("patches");
         self.link(result, params);
