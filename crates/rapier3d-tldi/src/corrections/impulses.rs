@@ -13,8 +13,8 @@ const ROUNDS: usize = 10;
 /// A point in which bodies have to separate.
 pub(crate) struct PushedPoint {
     pub(crate) bodies: [Option<RigidBodyHandle>; 2],
-    /// In world space, metres.
-    pub(crate) point: Vector,
+    /// From the centre of mass of each body to the point, in world space, metres.
+    pub(crate) arms: [Vector; 2],
     /// Unit normal from the first body towards the second.
     pub(crate) normal: Vector,
     /// Speed at which the bodies have to separate there, m/s.
@@ -44,32 +44,21 @@ fn movable(
     [0, 1].map(|k| pair[k].filter(|_| moves(k)))
 }
 
-/// Velocity that a unit of impulse along `normal` at `point` gives to a body that moves.
+/// Velocity that a unit of impulse along `normal` at the end of `arm` gives to a body that moves.
 fn velocity_per_impulse(
     bodies: &RigidBodySet,
     body: Option<RigidBodyHandle>,
-    point: Vector,
+    arm: Vector,
     normal: Vector,
 ) -> RigidBodyVelocity<f32> {
     let Some(body) = body.and_then(|body| bodies.get(body)) else {
         return RigidBodyVelocity::zero();
     };
     let mass = body.mass_properties();
-    let arm = point - body.center_of_mass();
     RigidBodyVelocity {
         linvel: mass.effective_inv_mass * normal,
         angvel: mass.effective_world_inv_inertia * arm.cross(normal),
     }
-}
-
-/// Velocity of a body at `point`, m/s.
-pub(crate) fn velocity_at(
-    bodies: &RigidBodySet,
-    body: Option<RigidBodyHandle>,
-    point: Vector,
-) -> Vector {
-    let body = body.and_then(|body| bodies.get(body));
-    body.map_or(Vector::ZERO, |body| body.velocity_at_point(point))
 }
 
 /// Gives the bodies of all points the velocities that separate them there, where nothing else does.
@@ -82,21 +71,48 @@ pub(crate) fn separate(points: &mut [PushedPoint], bodies: &mut RigidBodySet) {
 }
 
 impl PushedPoint {
+    /// A point in world space, in metres, where nothing has pushed yet.
+    pub(crate) fn at(
+        point: Vector,
+        normal: Vector,
+        speed: f32,
+        of: [Option<RigidBodyHandle>; 2],
+        bodies: &RigidBodySet,
+    ) -> Self {
+        let arm = |body: Option<RigidBodyHandle>| {
+            let body = body.and_then(|body| bodies.get(body));
+            body.map_or(Vector::ZERO, |body| point - body.center_of_mass())
+        };
+        Self {
+            bodies: of,
+            arms: of.map(arm),
+            normal,
+            speed,
+            impulse: 0.0,
+        }
+    }
+
+    /// Speed at which the bodies separate there, m/s, by the velocity of each.
+    pub(crate) fn separating(
+        &self,
+        velocity_of: impl Fn(RigidBodyHandle) -> Option<RigidBodyVelocity<f32>>,
+    ) -> f32 {
+        let [first, second] = [0, 1].map(|k| {
+            let velocity = self.bodies[k].and_then(&velocity_of);
+            velocity.map_or(Vector::ZERO, |velocity| velocity_at(velocity, self.arms[k]))
+        });
+        (second - first).dot(self.normal)
+    }
+
     /// Raises the separation speed of the bodies to the required one, or withdraws an impulse that
     /// other points made unnecessary.
     fn solve(&mut self, bodies: &mut RigidBodySet) {
-        let [first, second] = self.bodies;
-        let separating = (velocity_at(bodies, second, self.point)
-            - velocity_at(bodies, first, self.point))
-        .dot(self.normal);
+        let separating = self.separating(|body| Some(*bodies.get(body)?.vels()));
         let movable = movable(bodies, self.bodies);
         let gained =
-            movable.map(|body| velocity_per_impulse(bodies, body, self.point, self.normal));
-        let mobility: f32 = (movable.iter().zip(&gained))
-            .filter_map(|(body, gained)| {
-                let com = bodies.get((*body)?)?.center_of_mass();
-                Some(gained.velocity_at_point(self.point, com).dot(self.normal))
-            })
+            [0, 1].map(|k| velocity_per_impulse(bodies, movable[k], self.arms[k], self.normal));
+        let mobility: f32 = (gained.iter().zip(self.arms))
+            .map(|(gained, arm)| velocity_at(*gained, arm).dot(self.normal))
             .sum();
         if mobility <= 0.0 {
             return;
@@ -111,9 +127,15 @@ impl PushedPoint {
             if let Some(body) = body.and_then(|body| bodies.get_mut(body)) {
                 let linvel = body.linvel() + sign * change * gained.linvel;
                 let angvel = body.angvel() + sign * change * gained.angvel;
-                body.set_linvel(linvel, true);
-                body.set_angvel(angvel, true);
+                let is_asleep = body.is_sleeping();
+                body.set_linvel(linvel, is_asleep);
+                body.set_angvel(angvel, is_asleep);
             }
         }
     }
+}
+
+/// Velocity at the end of an arm from the centre of mass, m/s.
+fn velocity_at(velocity: RigidBodyVelocity<f32>, arm: Vector) -> Vector {
+    velocity.linvel + velocity.angvel.cross(arm)
 }

@@ -6,7 +6,7 @@
 //! step, a body that such a surface is about to penetrate gets the surface's velocity along the
 //! normal, as in an inelastic impact.
 
-use crate::corrections::impulses::{PushedPoint, may_separate, separate, velocity_at};
+use crate::corrections::impulses::{PushedPoint, may_separate, separate};
 use crate::corrections::surface_motion::SurfaceMotions;
 use crate::narrow_phase::parts::PartPair;
 use crate::step::candidates::pose_of;
@@ -72,16 +72,11 @@ pub(crate) fn push(
             };
             let point = on_surface[0].midpoint(on_surface[1]);
             let speed = (velocity(0) - velocity(1)).dot(normal);
-            let closing =
-                (velocity_at(bodies, of[0], point) - velocity_at(bodies, of[1], point)).dot(normal);
+            let undone = (-gap).max(0.0) / (UNDONE_IN * integration.dt);
+            let point = PushedPoint::at(point, normal, speed + undone, of, bodies);
+            let closing = -point.separating(|body| Some(*bodies.get(body)?.vels()));
             if speed > motions.least_push && gap < (speed + closing) * integration.dt {
-                points.push(PushedPoint {
-                    bodies: of,
-                    point,
-                    normal,
-                    speed: speed + (-gap).max(0.0) / (UNDONE_IN * integration.dt),
-                    impulse: 0.0,
-                });
+                points.push(point);
             }
         }
     }

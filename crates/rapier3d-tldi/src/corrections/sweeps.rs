@@ -121,15 +121,12 @@ impl Batch {
             let Blocked { point, normal } = locked(&pair.blocked).take()?;
             let [collider1, collider2] = pair.colliders.map(|handle| colliders.get(handle));
             let colliders = [collider1?, collider2?];
-            may_separate(colliders[0], colliders[1]).then(|| PushedPoint {
-                bodies: colliders.map(Collider::parent),
-                point,
-                normal,
-                speed: 0.0,
-                impulse: 0.0,
-            })
+            let of = colliders.map(Collider::parent);
+            may_separate(colliders[0], colliders[1])
+                .then(|| PushedPoint::at(point, normal, 0.0, of, bodies))
         });
-        separate(&mut blocked.collect::<Vec<_>>(), bodies);
+        let mut blocked: Vec<_> = blocked.collect();
+        separate(&mut blocked, bodies);
     }
 }
 

@@ -203,6 +203,7 @@ impl TldiPipeline {
             batch.clear();
         } else {
             batch.expire();
+            batch.note_velocities(bodies);
             move_to_mid_step(&mut batch, bodies, colliders, integration.dt);
             self.changed.clear();
         }
@@ -254,9 +255,11 @@ impl TldiPipeline {
             integration,
             hooks,
         );
+        self.shared.batch_mut().note_velocities(bodies);
     }
 
-    /// Closes a step: what it did, and what failed inside it. Give it the sets of the step. Fast bodies
+    /// Closes a step: what it did, and what failed inside it. Give it the sets of the step. Bodies that rebound do so at all
+    /// their contact points at once. Fast bodies
     /// that are deep in contact, and that a sweep (CCD) held at a surface which no contact faces, lose the
     /// velocity into it.
     ///
@@ -297,6 +300,7 @@ impl TldiPipeline {
         };
         {
             let mut batch = self.shared.batch_mut();
+            batch.rebound(bodies, narrow_phase, colliders);
             batch.stop_blocked(bodies, colliders);
             (report.pairs_batched, report.pairs_kept) = batch.counts();
             report.contact_pixels += batch.contact_pixels();

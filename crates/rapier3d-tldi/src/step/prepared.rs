@@ -6,7 +6,7 @@ use crate::narrow_phase::parts::{
 };
 use crate::step::measured::{Measured, rolls};
 use crate::{TldiConfig, TldiError};
-use rapier3d::dynamics::RigidBodyHandle;
+use rapier3d::dynamics::{RigidBodyHandle, RigidBodyVelocity};
 use rapier3d::geometry::{ColliderHandle, SharedShape};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::shape::{Ball, Shape};
@@ -143,6 +143,8 @@ pub(crate) struct Batch {
     pub(crate) parts: Vec<PartPair>,
     /// The result of query `k` is `results[k]`; there may be left-over ones behind.
     pub(crate) results: Vec<PairResult>,
+    /// Of the bodies before the step.
+    pub(crate) velocities: HashMap<RigidBodyHandle, RigidBodyVelocity<f32>>,
 }
 
 impl Batch {

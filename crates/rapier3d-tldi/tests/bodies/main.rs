@@ -7,6 +7,7 @@ mod ccd;
 mod changes;
 mod hooks;
 mod pipeline;
+mod rebounds;
 mod refusals;
 mod resting;
 mod rolling;
