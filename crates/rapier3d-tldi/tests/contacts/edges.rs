@@ -43,3 +43,44 @@ fn boxes_at_the_edge_of_a_table_are_not_pushed_off() {
     }
     assert!(pushed <= 4, "{pushed}");
 }
+
+/// The contacts of a box on a floor are under its edges, to within half a pixel or a little more on average (a pixel is a
+/// radius). Farther inside it would tip and turn too easily.
+#[test]
+fn contacts_reach_the_edges_of_boxes() {
+    let half = Vector::new(6.0, 5.0, 4.0) * SPACING;
+    let floor = box_of(Vector::new(25.0, 2.0, 25.0) * SPACING);
+    let exact = ColliderBuilder::cuboid(half.x, half.y, half.z);
+    for (kind, body) in [exact, cloud_collider(PointCloudShape::new(box_of(half)))]
+        .into_iter()
+        .enumerate()
+    {
+        let mut rng = Rng::with_seed(8);
+        let (mut inside, mut count) = (Vector::ZERO, 0.0);
+        for _ in 0..40 {
+            let mut world = PhysicsWorld::default();
+            let mut tldi =
+                TldiPipeline::new(TldiConfig::default()).expect("the settings are valid");
+            tldi.attach(&mut world);
+            let below = RigidBodyBuilder::fixed().translation(-2.0 * SPACING * Vector::Y);
+            world.insert(below, tldi.collider(floor.clone()));
+            let place = Vector::new(rng.f32() * SPACING, half.y, rng.f32() * SPACING);
+            let on_it = RigidBodyBuilder::dynamic()
+                .translation(place)
+                .rotation(Vector::Y * rng.f32());
+            let (on_it, _) = world.insert(on_it, body.clone());
+            tldi.step(&mut world).expect("nothing fails");
+            let pose = *world.bodies[on_it].position();
+            for contact in tldi.contacts(&world.narrow_phase, &world.colliders) {
+                inside += half - (pose.inverse() * contact.point).abs();
+                count += 1.0;
+            }
+        }
+        let inside = inside / (count * SPACING);
+        assert_eq!(count, 160.0);
+        assert!(
+            inside.x.abs() < 0.7 && inside.z.abs() < 0.7,
+            "box {kind}: {inside}"
+        );
+    }
+}

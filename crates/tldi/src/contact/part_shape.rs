@@ -72,6 +72,8 @@ pub(crate) struct Pixels<'a> {
     pub(crate) contacts: &'a [ContactPixel],
     pub(crate) smooth: &'a [Smooth],
     pub(crate) links: &'a Links,
+    /// Whether faces end at the discs around a cloud's points, and not at an exact edge.
+    pub(crate) end_in_discs: bool,
 }
 
 /// Memory of [`Shape::patch`], kept from call to call.
@@ -282,9 +284,9 @@ impl Part<'_> {
         let scatter = if rises { 0.0 } else { roughness };
         let off_plane = OFF_PLANE * self.pixel_size;
         let scatter = scatter + supports.flatness * (off_plane - scatter).max(0.0);
-        // A pixel at the rim of a face stands out beyond the points of the face, by half a pixel on average. The mean of it
+        // A pixel at the rim of a cloud's face stands out beyond its points, by half a pixel on average. The mean of it
         // and its linked neighbours is as far inwards, at a corner, too, and does not move pixels within.
-        let inwards = if points.len() < LEAST_PLANE {
+        let inwards = if !self.pixels.end_in_discs || points.len() < LEAST_PLANE {
             0.0
         } else if rises {
             supports.flatness

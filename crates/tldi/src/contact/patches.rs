@@ -13,8 +13,9 @@ use crate::contact::part_shape::{Pixels, Shape, ShapeScratch};
 use crate::contact::smooth::{Smooth, smooth};
 use crate::contact::way_out::WayOut;
 use crate::cpu::sweep::SAME_FACE;
+use crate::plan::first_is_smaller;
 use crate::stage::stage;
-use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params};
+use crate::{ContactPatch, ContactPixel, PATCH_POINTS, PairQuery, PairResult, Params, Surface};
 use arrayvec::ArrayVec;
 use glamx::Vec3;
 use std::cmp::Ordering;
@@ -55,6 +56,8 @@ pub struct PatchScratch {
     patch: Vec<u32>,
     spot: Vec<u32>,
     shape: ShapeScratch,
+    /// Of the pair: see [`Pixels`].
+    end_in_discs: bool,
 }
 
 /// Some of the members, and what decides which patch they belong to.
@@ -75,6 +78,7 @@ impl PatchScratch {
     /// pixels if needed.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         let _stage = stage!("patches");
+        self.end_in_discs = true;
         self.link(result, params);
         self.reduce_linked(result, params, None);
     }
@@ -126,6 +130,7 @@ impl PatchScratch {
 
     /// Reduces linked contact pixels by what is known of both surfaces. `least_proof`: see [`Links::confirm`].
     fn finish(&mut self, result: &mut PairResult, query: &PairQuery, least_proof: f32) {
+        self.end_in_discs = !smaller_is_exact(query);
         let tells_inside = query.a.is_oriented() || query.b.is_oriented();
         let least_proof = (!tells_inside).then_some(least_proof);
         self.reduce_linked(result, &query.params, least_proof);
@@ -259,6 +264,7 @@ impl PatchScratch {
             contacts,
             smooth: &self.smooth,
             links: &self.links,
+            end_in_discs: self.end_in_discs,
         };
         shape.patch(members, &pixels, &mut self.shape, params)
     }
@@ -270,6 +276,14 @@ impl PatchScratch {
         let pairs = self.links.pairs.iter().copied().filter(alike);
         find_roots(self.smooth.len(), pairs, &mut self.group);
     }
+}
+
+/// Whether the smaller surface, which is taken to end first, is exact.
+fn smaller_is_exact(query: &PairQuery) -> bool {
+    let sides = [query.a, query.b];
+    let extents = sides.map(|side| side.bounds().max - side.bounds().min);
+    let smaller = sides[usize::from(!first_is_smaller(extents))];
+    matches!(smaller, Surface::Exact(_))
 }
 
 /// Drops contact pixels of faces that do not face each other, if another view sees one of the faces
