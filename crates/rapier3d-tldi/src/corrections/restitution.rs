@@ -3,9 +3,9 @@
 //! At the end of a step rapier gives each contact point of an impact the speed of its rebound, one
 //! after the other, once. Each changes the speed of those before it. So a box that lands flat leaves
 //! spinning, with an energy that depends on where its contact points are. Four points at 0.8 of the
-//! way to its corners, as a pixel leaves them, give it 28 % more than it had; rapier's own boxes
-//! gain up to 40 % where they land turning. Here the same points are given the same speeds again,
-//! in rounds, until each has its own or leaves faster without an impulse.
+//! way to its corners give it 28 % more than it had; rapier's own boxes gain up to 40 % where they
+//! land turning. Here the same points are given the same speeds again, in rounds, until each has its
+//! own or leaves faster without an impulse.
 //!
 //! Links of multibodies, whose velocities are those of their joints, are left to rapier.
 
