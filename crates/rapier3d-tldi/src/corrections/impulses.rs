@@ -127,6 +127,7 @@ impl PushedPoint {
             if let Some(body) = body.and_then(|body| bodies.get_mut(body)) {
                 let linvel = body.linvel() + sign * change * gained.linvel;
                 let angvel = body.angvel() + sign * change * gained.angvel;
+                // What is awake may still come to rest.
                 let is_asleep = body.is_sleeping();
                 body.set_linvel(linvel, is_asleep);
                 body.set_angvel(angvel, is_asleep);

@@ -18,7 +18,7 @@ use rapier3d::geometry::{
 };
 
 impl Batch {
-    /// Notes how fast the bodies of all pairs are, but for links of multibodies. The last note before the step counts.
+    /// Before the step: notes how fast the bodies of all pairs are, but for links of multibodies.
     pub(crate) fn note_velocities(&mut self, bodies: &RigidBodySet) {
         self.velocities.clear();
         let without_links = self.pairs.iter().filter(|pair| !pair.has_link);
@@ -50,7 +50,7 @@ impl Batch {
         bodies: &RigidBodySet,
     ) -> impl Iterator<Item = PushedPoint> {
         let data = &manifold.data;
-        // A body that is not dynamic is as fast as in the step.
+        // One that is moved to its next position gets its velocity in the step.
         let velocity_before = |handle: RigidBodyHandle| -> Option<RigidBodyVelocity<f32>> {
             let body = bodies.get(handle).filter(|body| !body.is_dynamic());
             (body.map(|body| *body.vels())).or_else(|| self.velocities.get(&handle).copied())

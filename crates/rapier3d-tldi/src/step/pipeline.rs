@@ -255,7 +255,6 @@ impl TldiPipeline {
             integration,
             hooks,
         );
-        self.shared.batch_mut().note_velocities(bodies);
     }
 
     /// Closes a step: what it did, and what failed inside it. Give it the sets of the step. Bodies that rebound do so at all

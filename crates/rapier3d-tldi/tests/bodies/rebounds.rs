@@ -164,6 +164,25 @@ fn moving_floors_add_their_velocity() -> TestResult {
     Ok(())
 }
 
+/// A floor that is moved in the very step in which it hits a box throws it as a whole.
+#[test]
+fn floors_that_start_to_move_throw() -> TestResult {
+    for (kind, collider) in boxes().into_iter().enumerate() {
+        let mut arrival = Arrival::new(collider, 1.0, 0.0);
+        arrival.body().set_linvel(Vector::ZERO, true);
+        arrival.body().set_translation(HALF * Vector::Y, true);
+        let floor = &mut arrival.world.bodies[arrival.floor];
+        floor.set_body_type(RigidBodyType::KinematicPositionBased, true);
+        floor.set_next_kinematic_translation(SPEED / 60.0 * Vector::Y);
+        arrival.tldi.step(&mut arrival.world)?;
+        let (velocity, turn) = (arrival.body().linvel(), arrival.body().angvel());
+        let off = velocity - 2.0 * SPEED * Vector::Y;
+        assert!(off.length() < 0.01 * SPEED, "box {kind}: {velocity}");
+        assert!(turn.length() < 0.15, "box {kind}: {turn}");
+    }
+    Ok(())
+}
+
 /// A contact of the step before does not rebound.
 #[test]
 fn what_rests_stays() -> TestResult {

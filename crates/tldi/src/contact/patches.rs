@@ -281,7 +281,7 @@ impl PatchScratch {
 /// Whether the smaller surface, which is taken to end first, is exact.
 fn smaller_is_exact(query: &PairQuery) -> bool {
     let sides = [query.a, query.b];
-    let extents = sides.map(|side| side.bounds().max - side.bounds().min);
+    let extents = sides.map(|side| side.bounds().extents());
     let smaller = sides[usize::from(!first_is_smaller(extents))];
     matches!(smaller, Surface::Exact(_))
 }

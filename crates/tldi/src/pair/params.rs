@@ -87,7 +87,7 @@ impl Params {
 
     /// Gap up to which surfaces are seen, in metres. What lies beyond [`prediction`](Self::prediction) is no contact, but
     /// tells the shape of contacts beside it: of a ball that comes near, the pixels within the prediction are few. Twice as
-    /// far, up to a thickness: always a thickness, bodies with narrow feet sink into coarse clouds.
+    /// far, up to a thickness. If it were a thickness always, bodies with narrow feet would sink into coarse clouds.
     pub(crate) fn seen_gap(&self) -> f32 {
         self.prediction
             .max(self.thickness.min(2.0 * self.prediction))
