@@ -13,7 +13,7 @@ use crate::sources::Sources;
 use crate::{Gpu, GpuError};
 use std::ops::Range;
 use tldi::plan::PairPlan;
-use tldi::{Aabb, BLOCK, PairQuery, Surface};
+use tldi::{Aabb, BLOCK, PairQuery, Surface, View};
 
 /// The uploads of one batch, kept from batch to batch.
 #[derive(Debug, Default)]
@@ -137,8 +137,11 @@ impl Upload {
                 let Some(facts) = CloudFacts::of(surface) else {
                     continue;
                 };
-                let side =
-                    SideData::new(&facts, &plan.sides[k], &query.params, &place, self.cells)?;
+                let params = match query.view {
+                    View::Fixed(_) => query.params,
+                    View::Aim { .. } => query.params.of_surface(surface.mean_radius()),
+                };
+                let side = SideData::new(&facts, &plan.sides[k], &params, &place, self.cells)?;
                 self.cells += side.cells();
                 data.sides[k] = side;
             }

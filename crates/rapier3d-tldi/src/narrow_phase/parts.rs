@@ -5,7 +5,7 @@ use crate::{PointCloudShape, TldiConfig};
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::bounding_volume::{Aabb, BoundingVolume};
 use rapier3d::parry::shape::{Shape, ShapeType};
-use tldi::plan::{first_is_smaller, largest_pixel, least_pixel};
+use tldi::plan::{DepthScale, first_is_smaller, largest_pixel, least_pixel};
 use tldi::{PairQuery, PairResult, Params, PointCloud, Surface, Variant, View};
 
 /// Contacts are searched up to this many standard deviations of given noise. So the fit at a light
@@ -227,19 +227,24 @@ impl TldiConfig {
         let smaller = usize::from(!first_is_smaller(extents));
         let own_radius = cloud_of(parts[smaller]).map_or(0.0, |shape| shape.cloud().mean_radius());
         let to_resolve = largest_pixel(extents[smaller], own_radius);
-        let params = match self.variant {
-            Variant::Paper => Params::paper(coarsest),
-            Variant::Oriented => Params::for_radius(coarsest),
-        };
         let noise = |part| cloud_of(part).map_or(0.0, |shape| shape.cloud().noise());
         let fitted = FITTED * parts.into_iter().map(noise).fold(0.0, f32::max);
+        let prediction = prediction.max(fitted);
+        // A body that is smaller than the points beside it is modelled at its own scale, as long as depths up to the
+        // prediction can be told apart.
+        let told_apart = 2.0 * prediction / DepthScale::reach(&Params::for_radius(1.0));
+        let scale = coarsest.min(to_resolve.max(told_apart));
+        let params = match self.variant {
+            Variant::Paper => Params::paper(scale),
+            Variant::Oriented => Params::for_radius(scale),
+        };
         let least = |part| cloud_of(part).map_or(0.0, |shape| least_pixel(shape.cloud()));
         let least = parts.into_iter().map(least).fold(0.0, f32::max);
         let pixel_size = self.resolution.pixel_size(coarsest).min(to_resolve);
         Some(
             params
                 .with_pixel_size(pixel_size.max(least))
-                .with_prediction(prediction.max(fitted)),
+                .with_prediction(prediction),
         )
     }
 }

@@ -183,19 +183,36 @@ fn floors_that_start_to_move_throw() -> TestResult {
     Ok(())
 }
 
-/// A contact of the step before does not rebound.
+/// Contacts that carried something in the step before do not rebound. (A box on four feet may leave one of them idle. That
+/// one is new to rapier.)
 #[test]
 fn what_rests_stays() -> TestResult {
-    for collider in boxes() {
+    let mut carried = 0;
+    for (collider, turn) in boxes()
+        .into_iter()
+        .flat_map(|b| [0.0, 0.2, 0.4, 0.6].map(|t| (b.clone(), t)))
+    {
         let mut arrival = Arrival::new(collider, 0.5, 0.5);
         arrival.world.gravity = -9.81 * Vector::Y;
+        arrival
+            .body()
+            .set_rotation(Rotation::from_rotation_y(turn), true);
         for _ in 0..30 {
             arrival.step()?;
         }
+        let carries = |pair: &ContactPair| {
+            let mut points = pair.manifolds().iter().flat_map(|m| &m.points);
+            points.all(|point| point.data.impulse > 0.0)
+        };
+        if !arrival.world.narrow_phase.contact_pairs().all(carries) {
+            continue;
+        }
+        carried += 1;
         arrival.body().set_linvel(-Vector::Y, true);
         arrival.tldi.step(&mut arrival.world)?;
         let velocity = arrival.body().linvel();
-        assert!(velocity.length() < 0.1, "{velocity}");
+        assert!(velocity.length() < 0.1, "{turn}: {velocity}");
     }
+    assert!(carried >= 4, "{carried}");
     Ok(())
 }

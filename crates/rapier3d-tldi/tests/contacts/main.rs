@@ -10,5 +10,6 @@ mod manifolds;
 mod resolution;
 mod shallow;
 mod shared_shapes;
+mod small_bodies;
 mod thin_shapes;
 mod uneven;

@@ -140,10 +140,10 @@ impl Ring {
 /// How coarse two surfaces are where they are near each other.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalScale {
-    /// How many times as large as the parameters say pixels are there, and with them the thickness.
+    /// How many times as large as the parameters say pixels are there, and with them the thickness and the merge gap.
     pub(crate) coarser: f32,
-    /// How many times as large the merge gap of each surface is.
-    merging: [f32; 2],
+    /// Mean radii of the near points of both, metres.
+    near: [f32; 2],
 }
 
 impl Default for LocalScale {
@@ -156,12 +156,12 @@ impl LocalScale {
     /// That of the parameters.
     pub(crate) const AS_TOLD: Self = Self {
         coarser: 1.0,
-        merging: [1.0; 2],
+        near: [0.0; 2],
     };
 
     /// From the mean radii in metres of the points of both that are near; 0 of an exact surface.
     /// Pixels follow the coarser side, as far as they resolve the smaller surface. Each side's
-    /// merge gap follows its own points.
+    /// merge gap follows its own points, too.
     pub(crate) fn new(params: &Params, surfaces: [&Surface; 2], near: [f32; 2]) -> Self {
         let [a, b] = surfaces;
         let [near_a, near_b] = near;
@@ -172,27 +172,22 @@ impl LocalScale {
         let coarser = coarsening(near_a.max(near_b), expected.max(params.pixel_size))
             .min(resolving / params.pixel_size)
             .max(1.0);
-        Self {
-            coarser,
-            merging: near.map(|near| coarsening(near, expected).max(coarser)),
-        }
+        Self { coarser, near }
     }
 
-    /// The parameters there, but for the merge gap.
+    /// The parameters there.
     pub(crate) fn params(&self, params: &Params) -> Params {
         Params {
             pixel_size: self.coarser * params.pixel_size,
             thickness: self.coarser * params.thickness,
+            merge_gap: self.coarser * params.merge_gap,
             ..*params
         }
     }
 
-    /// These parameters with the merge gap of each surface.
+    /// These parameters for each surface.
     pub(crate) fn of_sides(&self, params: &Params) -> [Params; 2] {
-        self.merging.map(|factor| Params {
-            merge_gap: factor * params.merge_gap,
-            ..*params
-        })
+        self.near.map(|near| params.of_surface(near))
     }
 }
 

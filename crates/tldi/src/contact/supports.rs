@@ -59,10 +59,10 @@ const UNBENT: [f32; 2] = [0.3, 0.5];
 /// may be one. Both halved or doubled: no change in any suite.
 const SMOOTH: [f32; 2] = [0.5, 1.0];
 
-/// Which of `points`, on one plane with the unit normal `normal`, a body would rest on. Of four directions at right
-/// angles to each other, along which the points reach out farthest, each gives the point that is farthest out and
-/// lowest: one standard deviation of extent counts as much as √2 of roughness, which is at least `least_roughness`
-/// metres.
+/// Which of `points`, on one plane with the unit normal `normal`, a body would rest on. Each of four directions gives
+/// the point that is farthest out and lowest: one standard deviation of extent counts as much as √2 of roughness,
+/// which is at least `least_roughness` metres. The directions lead to the corners: they are those in which the points
+/// reach out farthest if their extents along both main axes are made equal.
 ///
 /// Heights are measured from the plane that fits the gaps. So the choice does not depend on the
 /// tilt of the body, and a lifted edge remains. Cost: linear in points.
@@ -107,7 +107,8 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         let low = -above_plane(height) / roughness.max(least);
         (height.0, low.min((1.0 - flatness) * LOWEST))
     });
-    let indices = farthest_out(lows);
+    let stretch = (axes.sigma.x / axes.sigma.y).sqrt();
+    let indices = farthest_out(lows, Vec2::new(stretch, stretch.recip()));
     let [longest, across] = axes.axes;
     let slopes = main_plane.slopes() / axes.sigma;
     let known_across = if axes.sigma.y > LEAST_KNOWN_WIDTH * axes.sigma.x {
@@ -139,12 +140,15 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
     }
 }
 
-/// Indices of the places that are farthest out in one of four directions at right angles. How low a place is counts, too.
+/// Indices of the places that are farthest out in one of four directions. How low a place is counts, too. Places are in
+/// standard deviations along both axes; `extents` are these, their product being 1. How far out a place is goes by
+/// metres: a pixel that is missing at the corner of a rod must not cost many pixels of its length.
 fn farthest_out(
     lows: impl ExactSizeIterator<Item = (Vec2, f32)> + Clone,
+    extents: Vec2,
 ) -> ArrayVec<usize, PATCH_POINTS> {
     let corner = SQRT_2 * Vec2::from_angle(corner_angle(lows.clone().map(|(place, _)| place)));
-    let corners = [corner, corner.perp(), -corner, -corner.perp()];
+    let corners = [corner, corner.perp(), -corner, -corner.perp()].map(|c| c * extents);
     let count = lows.len();
     let mut best = [(f32::NEG_INFINITY, 0); PATCH_POINTS];
     for (k, (place, low)) in lows.enumerate() {

@@ -1,6 +1,10 @@
 //! The one definition of every tuning parameter, shared by all backends.
 
+use crate::cloud::reach::coarsening;
 use bytemuck::{Pod, Zeroable};
+
+/// The merge gap in mean radii of a surface's points. Points of rough or bent surfaces differ in depth by about a radius.
+const MERGED: f32 = 1.2;
 
 /// Which construction of the layers and which comparison a pair uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
@@ -17,7 +21,8 @@ pub enum Variant {
 /// Parameters of one pair, as plain bytes with the same layout in Rust and in WGSL.
 ///
 /// Lengths are in metres (more exactly, in the unit of the coordinates); "radius" means the mean
-/// point radius r̄ of the pair's coarser cloud.
+/// point radius r̄ of the pair's coarser cloud. A pair with a body that is smaller than that is modelled at the scale of
+/// [`largest_pixel`](crate::plan::largest_pixel), as if this were r̄.
 ///
 /// ```
 /// use tldi::Params;
@@ -58,7 +63,7 @@ impl Params {
     pub fn for_radius(radius: f32) -> Self {
         Self {
             pixel_size: radius,
-            merge_gap: 1.2 * radius,
+            merge_gap: MERGED * radius,
             thickness: 2.0 * radius,
             prediction: 2.0 * radius,
             slope_damping: 0.7,
@@ -96,6 +101,20 @@ impl Params {
     /// The same parameters with another prediction distance in metres.
     pub fn with_prediction(self, prediction: f32) -> Self {
         Self { prediction, ..self }
+    }
+
+    /// The same parameters for one surface of a pair, whose points have this mean radius, metres. Fragments of a surface
+    /// that is coarser than the pair is modelled at are farther apart in depth, so they merge farther, by whole octaves.
+    ///
+    /// ```
+    /// use tldi::Params;
+    /// let params = Params::for_radius(0.01);
+    /// assert_eq!(params.of_surface(0.001), params);
+    /// assert_eq!(params.of_surface(0.08).merge_gap, 8.0 * params.merge_gap);
+    /// ```
+    pub fn of_surface(self, mean_radius: f32) -> Self {
+        let merge_gap = coarsening(MERGED * mean_radius, self.merge_gap) * self.merge_gap;
+        Self { merge_gap, ..self }
     }
 
     /// The same parameters with another pixel edge in metres.

@@ -49,11 +49,13 @@ impl Scratch {
         if !self.reaches_exact(query, reach) {
             return None;
         }
+        let [params_a, params_b] =
+            [query.a, query.b].map(|surface| query.params.of_surface(surface.mean_radius()));
         let look = Look {
             surfaces: [query.a, query.b],
             a_from_b: &query.a_from_b,
             camera: &camera,
-            params: [&query.params; 2],
+            params: [&params_a, &params_b],
             sharpens: false,
         };
         // The rim of an exact surface that moves is not that of the cloud.
