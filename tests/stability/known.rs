@@ -107,31 +107,10 @@ const fn known(
 /// All of them.
 pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
-        "rest",
-        "bunny, new samples",
-        (2, 120, Tries::Rows),
-        "new samples bring new gaps in every frame, which push although nothing moved.",
-        &[("rms_speed_m_s", 0.01..=0.015)],
-    ),
-    known(
-        "roll-spin",
-        "rod at",
-        (21, 500, Tries::Rows),
-        "the rod turns 5.0 to 6.2 % farther than the primitive's.",
-        &[("angle_rad", 0.99..=1.01)],
-    ),
-    known(
-        "stack",
-        "10 boxes, bare",
-        (2, 600, Tries::Rows),
-        "these drift by 1.1 r̄ with rapier's default of 4 solver iterations, in which its own cuboids lean by 0.5 r̄.",
-        &[("top_drift_mean_radii", 1.0..=1.6)],
-    ),
-    known(
         "tunnelling",
         "scan",
-        (1, 52_056, Tries::Hits),
-        "of a small spinning body that is deep in a rough scan without normals a further view takes the wrong side.",
+        (3, 52_321, Tries::Hits),
+        "of a small spinning body that is deep in a rough scan without normals a view takes the wrong side.",
         &[("passed_share", 0.0..=0.03)],
     ),
     known(
@@ -144,7 +123,7 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "tunnelling",
         "waves",
-        (15, 48_735, Tries::Hits),
+        (6, 48_877, Tries::Hits),
         "of small bodies in troughs hardly wider than they are, where a wave rises faster than rapier undoes \
          penetrations, or their first contacts push to both sides.",
         &[("passed_share", 0.0..=0.04)],
@@ -159,9 +138,9 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "grazing",
         "ball in a groove, bare",
-        (1, 840, Tries::Rows),
+        (2, 3_780, Tries::Rows),
         "one of the two contacts takes pixels of the other sheet.",
-        &[("worst_pushing_normal_error_deg", 5.0..=11.0)],
+        &[("worst_pushing_normal_error_deg", 5.0..=12.0)],
     ),
 ];
 
