@@ -123,7 +123,7 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "tunnelling",
         "waves",
-        (6, 48_877, Tries::Hits),
+        (7, 48_877, Tries::Hits),
         "of small bodies in troughs hardly wider than they are, where a wave rises faster than rapier undoes \
          penetrations, or their first contacts push to both sides.",
         &[("passed_share", 0.0..=0.04)],
