@@ -3,6 +3,7 @@
 use tldi::glamx::{Pose3, Vec3};
 use tldi::{
     CameraPolicy, ContactPoint, PairQuery, PairResult, Params, PointCloud, Surface, View, Work,
+    plan,
 };
 use tldi_tests::{
     Samples, aimed_clouds, compare, compare_batch, compare_clouds, deepest_point, random_pose,
@@ -208,6 +209,34 @@ fn box_on_plane() {
                 }
             }
         }
+    }
+}
+
+/// A box that is smaller than the distance of the floor's points is modelled at its own scale, and the floor's layers merge
+/// at theirs: points that are a quarter of their distance higher and lower than their mean are one surface between. (Were it two, all gaps would be
+/// those of the upper one.)
+#[test]
+fn a_box_smaller_than_the_spacing_of_a_rough_floor() {
+    let mut rng = fastrand::Rng::with_seed(14);
+    let half = Vec3::splat(8.0 * R);
+    let spacing = 20.0 * R;
+    let boxed = sampled_box(half, R, &mut rng).bare_cloud(R);
+    let rough: Vec<Vec3> = (0..24 * 24)
+        .map(|k| (k / 24 - 12, k % 24 - 12))
+        .map(|(i, j)| {
+            let height = if (i + j) % 2 == 0 { 0.25 } else { -0.25 };
+            spacing * Vec3::new(i as f32, height, j as f32)
+        })
+        .collect();
+    let floor = PointCloud::builder(rough).radius(spacing).build();
+    let floor = floor.expect("valid points");
+    let params = Params::for_radius(plan::largest_pixel(boxed.bounds().extents(), R));
+    for _ in 0..20 {
+        let place = spacing * Vec3::new(rng.f32(), 0.0, rng.f32()) + half.y * Vec3::Y;
+        let pose = Pose3::new(place, Vec3::Y * rng.f32());
+        let (a, b) = (Surface::Cloud(&floor), Surface::Cloud(&boxed));
+        let gap = least_patch_gap(&compare(a, b, pose, params));
+        assert!(gap.abs() < 0.2 * spacing, "{place}: {}", gap / spacing);
     }
 }
 
