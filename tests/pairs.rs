@@ -213,8 +213,8 @@ fn box_on_plane() {
 }
 
 /// A box that is smaller than the distance of the floor's points is modelled at its own scale, and the floor's layers merge
-/// at theirs: points that are a quarter of their distance higher and lower than their mean are one surface between. (Were it two, all gaps would be
-/// those of the upper one.)
+/// at theirs: points that are a quarter of their distance higher and lower than their mean are one surface between. (Were
+/// it two, all gaps would be those of the upper one.)
 #[test]
 fn a_box_smaller_than_the_spacing_of_a_rough_floor() {
     let mut rng = fastrand::Rng::with_seed(14);
