@@ -155,7 +155,7 @@ pub(crate) fn known_cause(scene: &str, case: &str, verdict: &Verdict) -> Option<
 
 #[cfg(test)]
 mod tests {
-    use super::{KNOWN_FAILURES, chance_of_as_many, known_cause};
+    use super::{KNOWN_FAILURES, KnownFailure, Tries, chance_of_as_many, known, known_cause};
     use crate::suite::case::{Scale, Verdict};
     use crate::suite::row::Row;
     use crate::suite::scenes::SCENES;
@@ -177,24 +177,21 @@ mod tests {
 
     #[test]
     fn what_is_worse_than_declared_is_another_failure() {
-        let cause = |speed: f64| {
+        let groove = "ball in a groove, bare, about y";
+        let cause = |case: &str, error_deg: f64| {
             let mut verdict = Verdict::default();
-            verdict.at_most("rms_speed_m_s", speed, 0.01);
-            known_cause("rest", "bunny, new samples each frame", &verdict)
+            verdict.at_most("worst_pushing_normal_error_deg", error_deg, 5.0);
+            known_cause("grazing", case, &verdict)
         };
-        assert!(cause(0.012).is_some());
-        assert_eq!(cause(0.5), None);
+        assert!(cause(groove, 11.0).is_some());
+        assert_eq!(cause(groove, 40.0), None);
         // What passed has no cause.
-        assert_eq!(cause(0.005), None);
+        assert_eq!(cause(groove, 3.0), None);
         // A number that is none.
-        assert_eq!(cause(f64::NAN), None);
+        assert_eq!(cause(groove, f64::NAN), None);
         // An error or a panic measures nothing.
-        let nothing = Verdict::default();
-        let bunny = "bunny, new samples each frame";
-        assert_eq!(known_cause("rest", bunny, &nothing), None);
-        let mut verdict = Verdict::default();
-        verdict.at_most("rms_speed_m_s", 0.012, 0.01);
-        assert_eq!(known_cause("rest", "box, oriented plane", &verdict), None);
+        assert_eq!(known_cause("grazing", groove, &Verdict::default()), None);
+        assert_eq!(cause("ball in a groove, oriented, about y", 11.0), None);
     }
 
     /// Of the throws of dice.
@@ -214,8 +211,7 @@ mod tests {
     /// One body of a run passes through a scan by chance, one of each row does not.
     #[test]
     fn what_fails_more_often_than_declared_is_another_failure() {
-        let scan =
-            |known: &&super::KnownFailure| known.is_about("tunnelling", "scan, small bodies");
+        let scan = |known: &&KnownFailure| known.is_about("tunnelling", "scan, small bodies");
         let scan = KNOWN_FAILURES.iter().find(scan).expect("it is declared");
         let row = |passed_through: f64| Row {
             scene: "tunnelling",
@@ -234,25 +230,39 @@ mod tests {
     /// A failure on the other side of the rule: the rod stops early.
     #[test]
     fn what_fails_the_other_way_is_another_failure() {
-        let rod = |angle: f64| {
+        const RODS: KnownFailure = known(
+            "roll-spin",
+            "rod at",
+            (1, 10, Tries::Rows),
+            "it turns too far.",
+            &[("angle_rad", 0.99..=1.01)],
+        );
+        let covers = |angle: f64| {
             let mut verdict = Verdict::default();
             verdict.near("angle_rad", angle, 0.9467, 0.0473);
-            known_cause("roll-spin", "rod at 10 rad/s", &verdict)
+            RODS.covers(&verdict)
         };
-        assert!(rod(0.995).is_some());
-        assert_eq!(rod(0.1), None);
+        assert!(covers(0.995));
+        assert!(!covers(0.1));
     }
 
     /// A declared failure does not excuse another one of the same row.
     #[test]
     fn every_broken_rule_is_declared() {
-        let stack = |height: f64| {
+        const STACKS: KnownFailure = known(
+            "stack",
+            "10 boxes",
+            (1, 10, Tries::Rows),
+            "they drift.",
+            &[("top_drift_mean_radii", 1.0..=1.6)],
+        );
+        let covers = |height: f64| {
             let mut verdict = Verdict::default();
             verdict.at_most("top_drift_mean_radii", 1.5, 1.0);
             verdict.near("top_height_error_mean_radii", height, 0.0, 10.0);
-            known_cause("stack", "10 boxes, bare", &verdict)
+            STACKS.covers(&verdict)
         };
-        assert!(stack(0.1).is_some());
-        assert_eq!(stack(-20.0), None);
+        assert!(covers(0.1));
+        assert!(!covers(-20.0));
     }
 }
