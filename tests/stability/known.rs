@@ -109,7 +109,7 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "tunnelling",
         "scan",
-        (3, 52_321, Tries::Hits),
+        (1, 52_157, Tries::Hits),
         "of a small spinning body that is deep in a rough scan without normals a view takes the wrong side.",
         &[("passed_share", 0.0..=0.03)],
     ),
