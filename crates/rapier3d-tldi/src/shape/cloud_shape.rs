@@ -43,7 +43,8 @@ fn next_revision() -> u64 {
 /// given its mass properties
 /// ([`ColliderBuilder::mass_properties`](rapier3d::prelude::ColliderBuilder::mass_properties)), or
 /// the density 0, never asks. The tree for rays and projections is built on first use after the
-/// points changed, O(points · log points).
+/// points changed, O(points · log points). A new shape of a cloud without normals [keeps](PointCloud::keep_normals) estimated
+/// ones, half a microsecond and 24 bytes a point, until its points change.
 ///
 /// ```
 /// use rapier3d::prelude::*;
@@ -109,6 +110,12 @@ fn made_once<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
     cell.get_or_init(|| made)
 }
 
+/// What is made into a shape is taken to stay as it is, until it gets other points.
+fn with_kept_normals(mut cloud: PointCloud<'static>) -> PointCloud<'static> {
+    cloud.keep_normals();
+    cloud
+}
+
 impl PointCloudShape {
     /// A shape over `cloud`, with the mass of the solid that it encloses.
     ///
@@ -120,7 +127,7 @@ impl PointCloudShape {
     /// ```
     pub fn new(cloud: PointCloud<'static>) -> Self {
         Self {
-            content: Arc::new(Content::new(cloud, MassModel::default())),
+            content: Arc::new(Content::new(with_kept_normals(cloud), MassModel::default())),
         }
     }
 
@@ -143,7 +150,7 @@ impl PointCloudShape {
     ) -> Result<Self, CloudError> {
         mass_model.check()?;
         Ok(Self {
-            content: Arc::new(Content::new(cloud, mass_model)),
+            content: Arc::new(Content::new(with_kept_normals(cloud), mass_model)),
         })
     }
 

@@ -214,12 +214,13 @@ fn sinking_floors_let_what_stands_on_them_down() -> TestResult {
 }
 
 /// A floor that rises faster than rapier undoes penetrations (3 m/s) takes along what stands on it,
-/// whether its points are known to be the same or not.
+/// whether its points are known to be the same or not. From 6 m/s on it passes half of the cube in two steps, and may leave
+/// it behind.
 #[test]
 fn fast_floors_push_what_stands_on_them() -> TestResult {
     for floor_first in [true, false] {
         for deforms in [true, false] {
-            let [behind, slower] = carried(Vector::Y * 6.0, floor_first, deforms)?;
+            let [behind, slower] = carried(Vector::Y * 5.0, floor_first, deforms)?;
             let case = format!("deforms {deforms}, floor first {floor_first}: {behind}, {slower}");
             // It is thrown a little, and gravity takes 0.16 m/s in a step.
             assert!(

@@ -293,6 +293,7 @@ impl<'a> CloudBuilder<'a> {
             recipe,
             order,
             content: next_content_id(),
+            kept_normals: None,
             spare: Spare::default(),
         })
     }

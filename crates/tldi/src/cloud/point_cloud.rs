@@ -6,6 +6,7 @@ use crate::cloud::morton::permuted;
 use crate::cloud::neighborhoods::Neighborhoods;
 use crate::cloud::point_normals::{fill_from_nearest, normalize, unit_or_zero};
 use crate::cloud::radii::{check_radii, mean_and_max};
+use crate::cpu::normals::kept::KeptNormals;
 use crate::stage::stage;
 use crate::{Aabb, CloudError, CloudRecipe, Radii, RadiusRule};
 use glamx::Vec3;
@@ -39,6 +40,8 @@ pub struct PointCloud<'a> {
     pub(crate) normals_oriented: bool,
     /// Whether they are the caller's.
     pub(crate) normals_given: bool,
+    /// Where the cloud has no normals and was told to [keep](Self::keep_normals) estimated ones.
+    pub(crate) kept_normals: Option<KeptNormals>,
     pub(crate) colors: Option<Cow<'a, [[u8; 4]]>>,
     pub(crate) bounds: Aabb,
     pub(crate) blocks: Vec<Aabb>,
@@ -395,6 +398,7 @@ impl<'a> PointCloud<'a> {
         self.colors.take_if(|_| !same_points);
         self.bounds = bounds;
         std::mem::swap(&mut self.dropped, &mut gathered.dropped);
+        self.kept_normals = None;
         self.content = next_content_id();
         Ok(())
     }
@@ -419,6 +423,7 @@ impl<'a> PointCloud<'a> {
             self.recipe.radii = RadiusRule::Global(radius);
         }
         self.radii = radii;
+        self.kept_normals = None;
         self.content = next_content_id();
         Ok(())
     }
@@ -436,6 +441,7 @@ impl<'a> PointCloud<'a> {
             normals: self.normals.map(|n| Cow::Owned(n.into_owned())),
             normals_oriented: self.normals_oriented,
             normals_given: self.normals_given,
+            kept_normals: self.kept_normals,
             colors: self.colors.map(|c| Cow::Owned(c.into_owned())),
             bounds: self.bounds,
             blocks: self.blocks,

@@ -116,15 +116,16 @@ impl Side {
         let step = self.near.len().div_ceil(AIM_SAMPLES) as u32;
         let index = &self.points.index;
         self.near_samples.clear();
-        if let Some(given) = cloud.normals() {
+        if let Some(known) = cloud.known_normals(false) {
             let rotation = Mat3::from_quat(frame_from_cloud.rotation);
+            let normal = |i: u32| known[index[i as usize] as usize];
             let sampled = self.near.iter().copied();
             let sampled = sampled.filter(|&i| is_aim_sample(index[i as usize], step));
             self.kept.clear();
-            self.kept.extend(sampled);
-            let normals = self.kept.iter().map(|&i| index[i as usize]);
-            (self.near_samples.normals)
-                .extend(normals.map(|index| rotation * given[index as usize]));
+            self.kept
+                .extend(sampled.filter(|&i| normal(i) != Vec3::ZERO));
+            let normals = self.kept.iter().map(|&i| rotation * normal(i));
+            self.near_samples.normals.extend(normals);
         } else {
             normals::estimate(
                 &self.near,
@@ -196,9 +197,9 @@ impl Side {
         }
     }
 
-    /// Radius in metres about a point in which others decide its normal; 0 where it is given.
+    /// Radius in metres about a point in which others decide its normal; 0 where it is known.
     pub(super) fn support_radius(&self, cloud: &PointCloud) -> f32 {
-        match cloud.normals() {
+        match cloud.known_normals(false) {
             Some(_) => 0.0,
             None => self.neighborhood(cloud).radius,
         }
@@ -332,14 +333,16 @@ impl Side {
     fn keep(&mut self, view: &CloudView, imaging: &Imaging, touching: Option<&Touching>) {
         let _stage = stage!("normals");
         let rotation = view.camera.view_from_frame.rotation;
-        if let Some(given) = view.cloud.normals() {
+        if let Some(known) = view.cloud.known_normals(view.sharpens) {
             match touching {
                 Some(touching) => self.columns.modelled(touching, &mut self.kept),
                 None => self.columns.in_view(&imaging.tiles, &mut self.kept),
             }
             let view_from_cloud = Mat3::from_quat(rotation * view.frame_from_cloud.rotation);
-            let index = |i: u32| self.points.index[i as usize] as usize;
-            let rotated = self.kept.iter().map(|&i| view_from_cloud * given[index(i)]);
+            let points = &self.points;
+            let normal = |i: u32| known[points.index[i as usize] as usize];
+            self.kept.retain(|&i| normal(i) != Vec3::ZERO);
+            let rotated = self.kept.iter().map(|&i| view_from_cloud * normal(i));
             self.kept_normals.clear();
             self.kept_normals.extend(rotated);
             return;

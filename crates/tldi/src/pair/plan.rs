@@ -150,14 +150,11 @@ fn within_reach(query: &PairQuery, reach: f32) -> bool {
 }
 
 /// How far beyond the touching region points are kept, metres. Splats reach a radius beyond their
-/// points, on both sides. Estimated normals need their neighbours, or they would err at the rim.
+/// points, on both sides. Estimated normals need their neighbours, or they would err at the rim. And where no outside is
+/// known, the places of the near points tell the side: all of them must be there, also on the side away from a body.
 pub(crate) fn ring(surface: &Surface, params: &Params) -> Ring {
-    let is_bare = match surface {
-        Surface::Cloud(cloud) => cloud.normals().is_none(),
-        Surface::Exact(_) => false,
-        Surface::Device(_) => true,
-    };
-    let support = if is_bare {
+    let is_exact = matches!(surface, Surface::Exact(_));
+    let support = if !is_exact && !surface.is_oriented() {
         normals::SUPPORT * (stride(surface.mean_radius(), params.pixel_size) as f32).sqrt()
     } else {
         0.0

@@ -39,7 +39,7 @@ impl Side {
         if self.near.is_empty() {
             return false;
         }
-        if cloud.normals().is_some() {
+        if cloud.known_normals(false).is_some() {
             self.sample_normals(cloud, frame_from_cloud);
         } else {
             let _stage = stage!("aim");

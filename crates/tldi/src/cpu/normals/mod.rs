@@ -2,6 +2,7 @@
 
 pub(crate) mod estimate;
 mod gathered;
+pub(crate) mod kept;
 pub(crate) mod planes;
 pub(crate) mod sharpen;
 pub(crate) mod sorted;
