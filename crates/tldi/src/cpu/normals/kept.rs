@@ -105,3 +105,32 @@ fn put(indices: &[u32], normals: &[Vec3], all: &mut [Vec3]) {
         all[i as usize] = *normal;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glamx::Quat;
+
+    /// On a slope of which one part is seven times as coarse as the other, all normals are those of the slope. With the mean
+    /// radius for all, many coarse points would have no two neighbours.
+    #[test]
+    fn coarse_parts_have_neighbors_of_their_own() {
+        let mut rng = fastrand::Rng::with_seed(6);
+        let turn = Quat::from_scaled_axis(Vec3::new(0.4, -1.1, 0.7));
+        let (mut points, mut radii) = (Vec::new(), Vec::new());
+        for (first, count, spacing) in [(-20, 20, 0.01), (0, 7, 0.07)] {
+            for k in 0..count * count {
+                let [i, j] = [first + k % count, k / count].map(|c| c as f32 + 0.6 * rng.f32());
+                points.push(turn * (spacing * Vec3::new(i, 0.0, j)));
+                radii.push(spacing);
+            }
+        }
+        let cloud = PointCloud::builder(points).radii(radii).build();
+        let cloud = cloud.expect("valid points");
+        assert!(cloud.is_uneven());
+        let kept = KeptNormals::of(&cloud);
+        for normal in kept.estimated.iter().chain(&kept.sharpened) {
+            assert!((turn.inverse() * *normal).y.abs() > 0.9999, "{normal}");
+        }
+    }
+}
