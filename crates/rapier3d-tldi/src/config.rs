@@ -24,8 +24,9 @@ pub struct TldiConfig {
     /// How much measured gaps vary from one comparison to the next, in mean radii of the pair's
     /// coarser cloud. This noise would keep bodies from coming to rest. So contacts stay fixed to
     /// their bodies until the pair has moved by this distance. Gaps and penetrations within the
-    /// contact's own roughness, at most twice this distance, count as touching. With 0, every step
-    /// measures anew and corrects every penetration.
+    /// contact's own roughness, at most twice this distance, count as touching. What is measured then
+    /// differs from what was measured before by the motion and by what slid into the contact: the rest
+    /// is an error, and left out. With 0, every step measures anew and corrects every penetration.
     pub scatter: f32,
 }
 

@@ -4,6 +4,7 @@ mod bounce;
 mod deep_start;
 mod density;
 mod grazing;
+mod heap;
 mod holes;
 mod moving_cloud;
 mod rest;
@@ -20,6 +21,7 @@ use super::case::Scene;
 pub(crate) const SCENES: &[Scene] = &[
     rest::SCENE,
     stack::SCENE,
+    heap::SCENE,
     slide::SCENE,
     roll_spin::SCENE,
     bounce::SCENE,

@@ -7,6 +7,7 @@
 
 use crate::narrow_phase::parts::{PartPair, ShapePair, part};
 use crate::narrow_phase::planes::share_planes;
+use crate::narrow_phase::steady_gaps::Before;
 use crate::step::measured::Measured;
 use rapier3d::geometry::{ContactData, ContactManifold, ContactManifoldData};
 use rapier3d::parry::query::details::{
@@ -19,7 +20,7 @@ use tldi::{ContactPatch, PairResult};
 /// A contact inherits the impulses of a near one of the step before if their normals agree within
 /// this angle's cosine (26°): what matters is that the impulse pushes the same way. Half or twice
 /// the angle: no row of any suite changes.
-const COS_SAME_NORMAL: f32 = 0.9;
+pub(super) const COS_SAME_NORMAL: f32 = 0.9;
 
 /// Most roughness of a contact that counts as scatter of its measurement, in scatters: rougher ones
 /// are not noisy but uneven. Half: 7 of 636 stability rows fail instead of 3, all new ones of new
@@ -55,11 +56,16 @@ pub(crate) fn keep(
     if !holds {
         return false;
     }
+    carry_over(manifolds, pair);
+    true
+}
+
+/// Moves contacts, which are fixed to their bodies, to the relative pose of `pair`.
+fn carry_over(manifolds: &mut [ContactManifold], pair: &ShapePair<'_>) {
     for manifold in manifolds {
         manifold.local_n2 = pair.pos12.rotation.inverse() * -manifold.local_n1;
         manifold.update_separations(&pair.pos12);
     }
-    true
 }
 
 /// Lets go of a pair that holds a cloud no longer. Rapier drops its workspace then, but keeps its manifolds: of several, it
@@ -78,7 +84,7 @@ pub(crate) fn leave(
     }
 }
 
-/// Replaces a pair's manifolds by those of `parts`, whose comparisons have the results `results`,
+/// Replaces a pair's manifolds by those of `parts`, whose comparisons have the results `results`, keeps their gaps from jumping,
 /// and carries the impulses and user data of the step before over to the contacts nearest by. `measured` tells
 /// for how long they hold.
 pub(crate) fn fill(
@@ -90,9 +96,13 @@ pub(crate) fn fill(
     workspace: &mut Option<ContactManifoldsWorkspace>,
 ) {
     let workspace = workspace_of(workspace);
-    workspace.measured = measured;
+    let last_measured = std::mem::replace(&mut workspace.measured, measured);
     let previous = &mut workspace.previous;
     std::mem::swap(manifolds, previous);
+    let last_measured = last_measured.filter(|last| last.is_of_same_points(pair));
+    if last_measured.is_some() {
+        carry_over(previous, pair);
+    }
     // `manifolds` now holds those of two steps ago, of use for their memory only.
     let mut filled = 0;
     let (mut match_distance, mut scatter) = (pair.prediction, 0.0);
@@ -118,6 +128,15 @@ pub(crate) fn fill(
         }
         for manifold in &mut manifolds[first..filled] {
             place(manifold, part_pair);
+            if let (Some(last), Some(comparison)) = (last_measured, &part_pair.comparison) {
+                let before = Before {
+                    manifolds: previous,
+                    turned: last.turned(pair),
+                    match_distance: comparison.match_distance(),
+                    pixel_size: comparison.pixel_size(),
+                };
+                before.steady(manifold, pair);
+            }
         }
     }
     manifolds.truncate(filled);
@@ -257,7 +276,7 @@ fn inherit_impulses(
 /// Which point of which old manifold is nearest to `point`, among those that are meant and within `match_distance`.
 /// A contact stays put on at least one of the two shapes (both at rest, one when sliding), so the nearer of the two
 /// distances counts.
-fn nearest(
+pub(super) fn nearest(
     point: &TrackedContact<ContactData>,
     previous: &[ContactManifold],
     match_distance: f32,

@@ -8,5 +8,6 @@ pub(crate) mod passing;
 pub(crate) mod planes;
 pub(crate) mod queries;
 pub(crate) mod shape_casts;
+mod steady_gaps;
 pub(crate) mod straight_way;
 pub(crate) mod turning;

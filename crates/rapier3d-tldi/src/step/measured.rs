@@ -69,10 +69,21 @@ impl Measured {
         })
     }
 
+    /// Whether the clouds of the pair have the points that were measured.
+    pub(crate) fn is_of_same_points(&self, pair: &ShapePair<'_>) -> bool {
+        self.revision == revision_of(pair)
+    }
+
+    /// How far one collider has turned beside the other since, radians. Of half a turn, 2.
+    pub(crate) fn turned(&self, pair: &ShapePair<'_>) -> f32 {
+        let turn = self.pos12.rotation.inverse() * pair.pos12.rotation;
+        2.0 * turn.xyz().length()
+    }
+
     /// Whether the contacts still hold for the pair where it is now.
     pub(crate) fn holds(&self, pair: &ShapePair<'_>) -> bool {
         let pos12 = &pair.pos12;
-        if pair.prediction != self.prediction || revision_of(pair) != self.revision {
+        if pair.prediction != self.prediction || !self.is_of_same_points(pair) {
             return false;
         }
         let (before, now) = if self.shape1_is_smaller {
