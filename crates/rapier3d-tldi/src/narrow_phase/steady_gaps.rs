@@ -14,8 +14,8 @@ use rapier3d::math::Vector;
 use rapier3d::parry::query::TrackedContact;
 
 /// How much a gap may change by itself for each metre that the surfaces slide: the tangent of the angle up to which contacts
-/// count as the same ([`COS_SAME_NORMAL`]). What is steeper has another normal. Half or twice: fewer bodies of a heap
-/// of concave ones without normals fall asleep.
+/// count as the same ([`COS_SAME_NORMAL`]). What is steeper has another normal. Of 288 concave bodies in heaps 126 sleep after
+/// 400 steps. Half: 202, but the gap of what slides over a slope lags behind; twice: 6.
 const STEEPEST: f32 = 0.484;
 
 /// The measurement before.
@@ -147,6 +147,11 @@ mod tests {
             match_distance: 0.5,
             pixel_size: 0.1,
         }
+    }
+
+    #[test]
+    fn the_steepest_slope_is_that_of_the_angle() {
+        assert!((STEEPEST - COS_SAME_NORMAL.acos().tan()).abs() < 1e-3);
     }
 
     /// The gaps that are left of `measured`, all at y = 0, where a pair that had contacts with `gaps` has moved.
