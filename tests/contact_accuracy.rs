@@ -3,8 +3,10 @@
 
 use std::sync::LazyLock;
 use tldi::CameraPolicy;
+use tldi::glamx::{Pose3, Quat, Vec3};
 use tldi_tests::{
-    AccuracyRow, ContactPair, DEEP_LIMIT, NORMAL_LIMIT, Regime, SHALLOW_LIMIT, measure_accuracy,
+    AccuracyRow, CONTACT_SPACING, ContactPair, DEEP_LIMIT, NORMAL_LIMIT, Regime, SHALLOW_LIMIT,
+    Samples, compare_clouds, deepest_contact, measure_accuracy, sampled_box, sampled_plane,
 };
 
 /// An odd number, so that the median is one of them.
@@ -78,5 +80,70 @@ fn sides() {
     for row in ROWS.iter() {
         let hint_tells = row.with_normals || row.angle_bin < 8;
         assert!(row.normal_max < 90.0 || !hint_tells, "{row}");
+    }
+}
+
+const R: f32 = CONTACT_SPACING;
+
+/// A box whose edges are rounded by `radius` metres.
+fn rounded_box(half: Vec3, radius: f32, rng: &mut fastrand::Rng) -> Samples {
+    let mut samples = sampled_box(half, R, rng);
+    let core = half - Vec3::splat(radius);
+    for (point, normal) in samples.points.iter_mut().zip(&mut samples.normals) {
+        let inner = point.clamp(-core, core);
+        *normal = (*point - inner).normalize();
+        *point = inner + radius * *normal;
+    }
+    samples
+}
+
+/// Edges as round as points are apart are neither sharp nor seen to be round: one measurement takes them for the one, the next,
+/// after a slide of less than a spacing, for the other. Measured, medians of 15 edges: up to 0.17 r̄ off, with a scatter of up
+/// to 0.21 r̄. Of so few, medians vary by half.
+#[test]
+fn rounded_edges() {
+    let half = Vec3::new(0.10, 0.08, 0.12);
+    let (poses, places) = (15, 6);
+    for with_normals in [true, false] {
+        for radius in [0.5 * R, R, 1.5 * R] {
+            let mut rng = fastrand::Rng::with_seed(2);
+            let cloud = |samples: Samples| match with_normals {
+                true => samples.cloud(R),
+                false => samples.bare_cloud(R),
+            };
+            let floor = cloud(sampled_plane(0.6, R, &mut rng));
+            let body = cloud(rounded_box(half, radius, &mut rng));
+            let (mut off, mut scatter) = (Vec::new(), Vec::new());
+            for _ in 0..poses {
+                let tilt = (20.0 + 50.0 * rng.f32()).to_radians();
+                let turn = Quat::from_axis_angle(Vec3::Y, std::f32::consts::TAU * rng.f32())
+                    * Quat::from_axis_angle(Vec3::X, tilt);
+                let reach = (turn.inverse() * Vec3::Y).abs();
+                let reach = reach.dot(half - Vec3::splat(radius)) + radius;
+                let depth = rng.f32() * R;
+                let errors: Vec<f32> = (0..places)
+                    .map(|_| {
+                        let aside = Vec3::new(rng.f32() - 0.5, 0.0, rng.f32() - 0.5) * 2.0 * R;
+                        let place = Vec3::Y * (reach - depth) + aside;
+                        let pose = Pose3::from_parts(place, turn);
+                        let result = compare_clouds(&floor, &body, pose, R);
+                        let (_, measured) = deepest_contact(&result).expect("they touch");
+                        (measured - depth) / R
+                    })
+                    .collect();
+                let mean = errors.iter().sum::<f32>() / places as f32;
+                let variance = errors.iter().map(|e| (e - mean).powi(2)).sum::<f32>();
+                scatter.push((variance / places as f32).sqrt());
+                off.push(mean.abs());
+            }
+            let [off, scatter] = [off, scatter].map(|mut values| {
+                values.sort_by(f32::total_cmp);
+                values[poses / 2]
+            });
+            assert!(
+                off < 0.25 && scatter < 0.3,
+                "radius {radius}, normals {with_normals}: {off} r̄ off, scatter {scatter} r̄"
+            );
+        }
     }
 }
