@@ -98,12 +98,12 @@ fn rounded_box(half: Vec3, radius: f32, rng: &mut fastrand::Rng) -> Samples {
 }
 
 /// Edges as round as points are apart are neither sharp nor seen to be round: one measurement takes them for the one, the next,
-/// after a slide of less than a spacing, for the other. Measured, medians of 15 edges: up to 0.17 r̄ off, with a scatter of up
-/// to 0.21 r̄. Of so few, medians vary by half.
+/// after a slide of less than a spacing, for the other. Measured: nine in ten of 30 edges are up to 0.29 r̄ off and scatter by
+/// up to 0.26 r̄; the limits are a fifth above.
 #[test]
 fn rounded_edges() {
     let half = Vec3::new(0.10, 0.08, 0.12);
-    let (poses, places) = (15, 6);
+    let (poses, places) = (30, 6);
     for with_normals in [true, false] {
         for radius in [0.5 * R, R, 1.5 * R] {
             let mut rng = fastrand::Rng::with_seed(2);
@@ -138,10 +138,10 @@ fn rounded_edges() {
             }
             let [off, scatter] = [off, scatter].map(|mut values| {
                 values.sort_by(f32::total_cmp);
-                values[poses / 2]
+                values[poses * 9 / 10]
             });
             assert!(
-                off < 0.25 && scatter < 0.3,
+                off < 0.35 && scatter < 0.31,
                 "radius {radius}, normals {with_normals}: {off} r̄ off, scatter {scatter} r̄"
             );
         }
