@@ -17,8 +17,8 @@ const CREASED: f32 = 0.9;
 
 /// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal and tell the faces at an edge. For the normal,
 /// half: 9 % worse; twice: 14 % better, no more stability rows fail, but depths of deep edges are twice as wrong. For the
-/// faces, half: bare edges rounded by r̄ are 0.26 r̄ off in place of 0.03; twice: corners rounded by r̄ scatter by up to 0.35 r̄
-/// in place of 0.29.
+/// faces, half: bare edges rounded by r̄ are 0.17 r̄ off in place of 0.03; twice: corners rounded by r̄ scatter by up to 0.32 r̄
+/// in place of 0.27.
 const NORMAL_BAND: f32 = 2.0;
 
 /// Band above the smallest gap whose pixels can be support points and decide where a part is split. Pixels that
