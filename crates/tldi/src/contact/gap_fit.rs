@@ -8,7 +8,7 @@ use crate::ContactPixel;
 use crate::contact::links::Links;
 use glamx::Vec3;
 
-/// Least cosine between a normal and the axis of a view: what is seen edge-on has a finite slope.
+/// Least cosine between a normal and the axis of a view: what is seen edge-on has a finite slope. Half or twice: no change.
 const LEAST_COSINE: f32 = 1e-3;
 
 /// The gaps of the contact pixels of a pair; kept from call to call.
@@ -22,8 +22,8 @@ pub(crate) struct GapFit {
 }
 
 impl GapFit {
-    /// Takes the gaps of `contacts`. `axes` are those of their views; a view without one looks along each contact's normal.
-    pub(crate) fn of(
+    /// Takes the gaps of `contacts`, and how much of their rises slopes tell. `axes` are those of their views; a view without one looks along each contact's normal.
+    pub(crate) fn fit(
         &mut self,
         contacts: &[ContactPixel],
         axes: &[Vec3],
@@ -51,7 +51,7 @@ impl GapFit {
         };
     }
 
-    /// The gap at contact pixel `k`, metres along its normal.
+    /// The gap at contact pixel `k`, metres along its normal. Its own gap has the weight of a neighbour that faces the view.
     pub(crate) fn gap(&self, k: u32, links: &Links) -> f32 {
         let at = &self.gaps[k as usize];
         let (mut sum, mut total) = (at.gap, 1.0);
@@ -143,7 +143,7 @@ mod tests {
         let middle = pixels.iter().position(|p| *p == [0, 0]);
         let middle = middle.expect("is among them") as u32;
         let mut fit = GapFit::default();
-        fit.of(&result.contacts, &result.axes, &links, params.pixel_size);
+        fit.fit(&result.contacts, &result.axes, &links, params.pixel_size);
         fit.gap(middle, &links) / result.contacts[middle as usize].normal().y
     }
 

@@ -154,7 +154,7 @@ impl PatchScratch {
         if contacts.is_empty() {
             return;
         }
-        (self.gap_fit).of(contacts, &result.axes, &self.links, params.pixel_size);
+        (self.gap_fit).fit(contacts, &result.axes, &self.links, params.pixel_size);
         smooth(contacts, &self.links, &self.gap_fit, &mut self.smooth);
         self.group();
         self.groups.sort(&self.group);

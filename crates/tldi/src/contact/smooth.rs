@@ -21,12 +21,12 @@ pub(crate) struct Smooth {
     pub(crate) normal: Vec3,
 }
 
-/// Appends each contact pixel with normals averaged over linked neighbours, and the gap that `gaps` fits. A third of a
+/// Appends each contact pixel with normals averaged over linked neighbours, and the gap that `gap_fit` tells. A third of a
 /// sensor's noise is left.
 pub(crate) fn smooth(
     contacts: &[ContactPixel],
     links: &Links,
-    gaps: &GapFit,
+    gap_fit: &GapFit,
     out: &mut Vec<Smooth>,
 ) {
     for (k, contact) in contacts.iter().enumerate() {
@@ -39,7 +39,7 @@ pub(crate) fn smooth(
         let count = 1.0 + neighbors.len() as f32;
         let (normal_a, normal_b) = (normal_a / count, normal_b / count);
         out.push(Smooth {
-            gap: gaps.gap(k as u32, links),
+            gap: gap_fit.gap(k as u32, links),
             normal_a,
             normal_b,
             normal: common_normal(normal_a, normal_b).unwrap_or_else(|| contact.normal()),
