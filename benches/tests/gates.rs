@@ -59,7 +59,7 @@ fn accuracy() {
 
 /// Means over all shapes and angles of the medians of 11 contacts each: of the normal in degrees, of the depth in radii
 /// where shallow, in parts of it where deep.
-const CONTACT_ERRORS: [f32; 3] = [0.032, 0.03, 0.007];
+const CONTACT_ERRORS: [f32; 3] = [0.04, 0.026, 0.0095];
 
 /// Errors of normals and depths against analytic truth.
 #[test]

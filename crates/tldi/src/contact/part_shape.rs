@@ -15,10 +15,8 @@ use glamx::Vec3;
 /// with 3 of 24 seeds instead of none.
 const CREASED: f32 = 0.9;
 
-/// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal and tell the faces at an edge. For the normal,
-/// half: 9 % worse; twice: 14 % better, no more stability rows fail, but depths of deep edges are twice as wrong. For the
-/// faces, half: bare edges rounded by r̄ are 0.17 r̄ off in place of 0.03; twice: corners rounded by r̄ scatter by up to 0.32 r̄
-/// in place of 0.27.
+/// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal. Half: normals 9 % worse; twice:
+/// normals 14 % better, no more stability rows fail, but depths of deep edges are twice as wrong.
 const NORMAL_BAND: f32 = 2.0;
 
 /// Band above the smallest gap whose pixels can be support points and decide where a part is split. Pixels that
@@ -214,7 +212,7 @@ impl Part<'_> {
         self.in_band().map(|(contact, _)| contact)
     }
 
-    /// How much lower than the lowest of the fitted points faces meet; negative: higher.
+    /// How much lower than the lowest of the fitted points faces meet.
     fn lower(&self, lowest: &ContactPoint, tangents: &mut Vec<Face>) -> f32 {
         let Shape {
             normal,
@@ -227,12 +225,7 @@ impl Part<'_> {
             axes: [longest, normal.cross(longest)],
             normal,
         };
-        let Pixels {
-            contacts, smooth, ..
-        } = *self.pixels;
-        let highest = self.shape.least_gap + NORMAL_BAND * self.pixel_size;
-        let members = (self.members.iter()).filter(|&&m| smooth[m as usize].gap <= highest);
-        let pixels = members.map(|&m| &contacts[m as usize]);
+        let pixels = self.contacts_in_band();
         lower_by(pixels, &frame, lowest, self.pixel_size, tangents)
     }
 
