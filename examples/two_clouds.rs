@@ -49,8 +49,8 @@ struct Args {
 /// Widths in metres of the generated clouds, and the distance of their points.
 const GENERATED_SIZES: [f32; 2] = [0.4, 0.3];
 const GENERATED_SPACING: f32 = 0.013;
-/// Pose of the second generated cloud: a star that lies on a ring, slanted.
-const GENERATED_POSE: &str = "0.1,0.12,0.02,12,25,-10";
+/// Pose of the second generated cloud: a star that lies on a ring.
+const GENERATED_POSE: &str = "0,0.1,0,0,25,0";
 /// Ratio of sizes from which two files are suspected to have different units.
 const UNLIKE_SIZES: f32 = 100.0;
 /// Pictures of a motion, and how long each is shown, in seconds.

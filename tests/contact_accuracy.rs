@@ -59,8 +59,7 @@ fn box_faces() {
 }
 
 /// Normals tell the faces of edges and corners, given ones better than estimated ones. A median of 21 contacts is up to
-/// twice that of many: with 101 all but 2 of 72 are within what is wanted of all shapes (0.11 r̄ in place of 0.1, and deep
-/// 5.1 % in place of 5 %). A corner's smallest face may have no pixel.
+/// twice that of many: with 101 all 72 are within what is wanted of all shapes. A corner's smallest face may have no pixel.
 #[test]
 fn edges_and_corners() {
     for (with_normals, pair, shallow, deep) in [
@@ -97,9 +96,9 @@ fn rounded_box(half: Vec3, radius: f32, rng: &mut fastrand::Rng) -> Samples {
     samples
 }
 
-/// Edges as round as points are apart are neither sharp nor seen to be round: one measurement takes them for the one, the next,
-/// after a slide of less than a spacing, for the other. Measured: nine in ten of 30 edges are up to 0.29 r̄ off and scatter by
-/// up to 0.26 r̄; the limits are a fifth above.
+/// Edges as round as points are apart are neither sharp nor seen to be round. Yet they are as deep after a slide of less than a
+/// spacing as before. Measured: nine in ten of 30 edges are up to 0.21 r̄ off, those of 0.5 r̄ because they count as sharp, and
+/// scatter by up to 0.09 r̄; the limits are a fifth above.
 #[test]
 fn rounded_edges() {
     let half = Vec3::new(0.10, 0.08, 0.12);
@@ -141,7 +140,7 @@ fn rounded_edges() {
                 values[poses * 9 / 10]
             });
             assert!(
-                off < 0.35 && scatter < 0.31,
+                off < 0.25 && scatter < 0.105,
                 "radius {radius}, normals {with_normals}: {off} r̄ off, scatter {scatter} r̄"
             );
         }

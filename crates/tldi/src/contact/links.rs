@@ -3,7 +3,6 @@
 use crate::contact::retain_by_index;
 use crate::counting_sort::sort_by_bin;
 use crate::{ContactPixel, PairResult, Params};
-use std::ops::Range;
 
 /// Neighbouring pixels are linked if their points on either surface are within this many pixels. Half: 13 of 636
 /// stability rows fail instead of 3, and normals are 29 % worse; twice: no change.
@@ -36,8 +35,6 @@ pub(crate) struct Links {
     /// Where the neighbours of each contact pixel start in `neighbors`, and their end.
     starts: Vec<u32>,
     neighbors: Vec<u32>,
-    /// How far each neighbour is, in pixels along columns and rows.
-    steps: Vec<[i8; 2]>,
 }
 
 impl Links {
@@ -119,7 +116,7 @@ impl Links {
                 self.keep_marked(&mut result.contacts);
             }
         }
-        self.index(&result.contacts);
+        self.index(result.contacts.len());
         let gaps = result.contacts.iter().map(|contact| contact.gap);
         result.gap = gaps.chain(result.gap).reduce(f32::min);
         // Solids that overlap by more than a layer's thickness intersect, even if their surfaces cross
@@ -181,31 +178,16 @@ impl Links {
 
     /// Contact pixels linked with `k`.
     pub(crate) fn neighbors(&self, k: u32) -> &[u32] {
-        &self.neighbors[self.range(k)]
-    }
-
-    /// The same, with how far they are in pixels along columns and rows.
-    pub(crate) fn placed_neighbors(&self, k: u32) -> impl Iterator<Item = (u32, [i8; 2])> {
-        let range = self.range(k);
-        let neighbors = self.neighbors[range.clone()].iter().copied();
-        neighbors.zip(self.steps[range].iter().copied())
-    }
-
-    fn range(&self, k: u32) -> Range<usize> {
         let k = k as usize;
-        self.starts[k] as usize..self.starts[k + 1] as usize
+        &self.neighbors[self.starts[k] as usize..self.starts[k + 1] as usize]
     }
 
     /// Fills what [`neighbors`](Self::neighbors) returns.
-    fn index(&mut self, contacts: &[ContactPixel]) {
+    fn index(&mut self, contacts: usize) {
         self.neighbors.resize(2 * self.pairs.len(), 0);
-        self.steps.resize(2 * self.pairs.len(), [0; 2]);
         let both = self.pairs.iter().flat_map(|&(k, l)| [(k, l), (l, k)]);
-        let ways = both.map(|(k, l)| (k, (k, l)));
-        sort_by_bin(ways, contacts.len(), &mut self.starts, |place, (k, l)| {
-            let [from, to] = [k, l].map(|m| contacts[m as usize].pixel);
+        sort_by_bin(both, contacts, &mut self.starts, |place, l| {
             self.neighbors[place] = l;
-            self.steps[place] = [0, 1].map(|axis| (to[axis] - from[axis]) as i8);
         });
     }
 }
@@ -310,13 +292,8 @@ mod tests {
         let least_proof = (!tells_inside).then_some(0.0);
         links.confirm(&mut result, &params, least_proof, &mut Vec::new());
         let count = result.contacts.len();
-        let pixel = |k: u32| result.contacts[k as usize].pixel;
         for (k, l) in &links.pairs {
             assert!(links.neighbors(*k).contains(l) && links.neighbors(*l).contains(k));
-            for (neighbor, step) in links.placed_neighbors(*k) {
-                let stepped = [0, 1].map(|axis| pixel(*k)[axis] + i32::from(step[axis]));
-                assert_eq!(pixel(neighbor), stepped);
-            }
             assert!((*k as usize) < count && (*l as usize) < count);
         }
         result

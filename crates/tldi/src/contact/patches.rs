@@ -4,6 +4,7 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
+use crate::contact::gap_fit::GapFit;
 use crate::contact::links::{Groups, Links, find_roots};
 use crate::contact::lone_points::LonePoints;
 use crate::contact::main_plane::LEAST_PLANE;
@@ -48,6 +49,7 @@ pub struct PatchScratch {
     links: Links,
     way_out: WayOut,
     pub(crate) lone_points: LonePoints,
+    gap_fit: GapFit,
     smooth: Vec<Smooth>,
     groups: Groups,
     stack: Vec<(usize, usize, u32)>,
@@ -152,7 +154,8 @@ impl PatchScratch {
         if contacts.is_empty() {
             return;
         }
-        smooth(contacts, &self.links, &mut self.smooth);
+        (self.gap_fit).fit(contacts, &result.axes, &self.links, params.pixel_size);
+        smooth(contacts, &self.links, &self.gap_fit, &mut self.smooth);
         self.group();
         self.groups.sort(&self.group);
         self.stack.clear();

@@ -21,10 +21,14 @@ pub(crate) struct Smooth {
     pub(crate) normal: Vec3,
 }
 
-/// Appends each contact pixel with normals averaged over linked neighbours, and the gap that fits theirs. A third of a
+/// Appends each contact pixel with normals averaged over linked neighbours, and the gap that `gap_fit` tells. A third of a
 /// sensor's noise is left.
-pub(crate) fn smooth(contacts: &[ContactPixel], links: &Links, out: &mut Vec<Smooth>) {
-    let mut fit = GapFit::default();
+pub(crate) fn smooth(
+    contacts: &[ContactPixel],
+    links: &Links,
+    gap_fit: &GapFit,
+    out: &mut Vec<Smooth>,
+) {
     for (k, contact) in contacts.iter().enumerate() {
         let (mut normal_a, mut normal_b) = (contact.normal_a, contact.normal_b);
         let neighbors = links.neighbors(k as u32);
@@ -35,7 +39,7 @@ pub(crate) fn smooth(contacts: &[ContactPixel], links: &Links, out: &mut Vec<Smo
         let count = 1.0 + neighbors.len() as f32;
         let (normal_a, normal_b) = (normal_a / count, normal_b / count);
         out.push(Smooth {
-            gap: fit.gap(k as u32, contacts, links),
+            gap: gap_fit.gap(k as u32, links),
             normal_a,
             normal_b,
             normal: common_normal(normal_a, normal_b).unwrap_or_else(|| contact.normal()),
