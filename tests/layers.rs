@@ -120,6 +120,45 @@ fn a_sphere_has_two_layers_at_the_analytic_depths() {
     }
 }
 
+/// A disc that a perspective camera sees aslant is where the rays of its pixels meet its plane. Seen with parallel rays, it
+/// would be up to a tenth of its radius off.
+#[test]
+fn rays_that_spread_meet_a_disc_in_its_plane() {
+    let mut rng = fastrand::Rng::with_seed(4);
+    let (radius, mut layers) = (0.1, 0);
+    let params = Params {
+        slope_damping: 1.0,
+        ..Params::for_radius(radius)
+    };
+    for _ in 0..40 {
+        let point = Vec3::new(0.4 * (rng.f32() - 0.5), 0.2 * (rng.f32() - 0.5), 1.0);
+        let normal = random_unit(&mut rng);
+        if normal.dot(point.normalize()).abs() < 0.3 {
+            continue;
+        }
+        let cloud = PointCloud::builder(vec![point]).radius(radius);
+        let cloud = cloud.normals(vec![normal]).build().expect("a valid point");
+        let camera =
+            VirtualCamera::perspective(Vec3::ZERO, Vec3::Z, Vec3::Y, 1.0, [320, 240], 0.1, 10.0);
+        let image = build(&cloud, &Pose3::IDENTITY, &camera, &params);
+        let pixels = (0..image.size[1]).flat_map(|j| (0..image.size[0]).map(move |i| [i, j]));
+        for [i, j] in pixels {
+            let [u, v] = [image.origin[0] + i as i32, image.origin[1] + j as i32];
+            // Of the plane that is a metre deep.
+            let ray = camera.point_at(u as f32 + 0.5, v as f32 + 0.5, 1.0);
+            let depth = normal.dot(point) / normal.dot(ray);
+            // Rises of more than a radius are cut off.
+            let is_cut = (depth - point.z).abs() > 0.9 * radius;
+            for layer in image.layers_at(i, j).iter().filter(|_| !is_cut) {
+                let off = layer.depth - depth;
+                assert!(off.abs() < 1e-4, "{off} in ({u}, {v}): {normal}");
+                layers += 1;
+            }
+        }
+    }
+    assert!(layers > 10_000, "{layers}");
+}
+
 /// Two sheets without normals, 1.5 radii apart, are two layers, where they are; told that so much is noise,
 /// they are one.
 #[test]

@@ -2,6 +2,7 @@
 
 use rapier3d::prelude::*;
 use rapier3d_tldi::prelude::*;
+use rayon::prelude::*;
 use tldi::glamx::{Quat, Vec3};
 use tldi_examples::depth::{RegisteredFrames, camera_up};
 use tldi_examples::load;
@@ -199,17 +200,20 @@ fn rests(frames: &RegisteredFrames, are_clouds: bool) -> Vec<Rest> {
 /// All of 3 bodies for each seed, as clouds and as rapier's own shapes.
 #[test]
 fn bodies_rest_within_two_seconds() {
-    let mut restless = Vec::new();
     let seeds = || WITH_BODIES.into_iter();
-    for (seed, frames) in seeds().map(plain).chain(seeds().step_by(2).map(empty)) {
-        for are_clouds in [true, false] {
-            for rest in rests(&frames, are_clouds) {
+    let scenes = seeds().map(plain).chain(seeds().step_by(2).map(empty));
+    let runs = scenes.flat_map(|scene| [true, false].map(|are_clouds| (scene.clone(), are_clouds)));
+    let runs: Vec<_> = runs.collect();
+    let restless = runs
+        .par_iter()
+        .flat_map_iter(|((seed, frames), are_clouds)| {
+            let rests = rests(frames, *are_clouds).into_iter();
+            let restless = rests.filter(move |rest| {
                 eprintln!("seed {seed}, clouds {are_clouds}: {rest:?}");
-                if !(rest.speed < MOST_SPEED && rest.moved < BODY_RADIUS && rest.depth < 3.0) {
-                    restless.push((seed, rest));
-                }
-            }
-        }
-    }
+                !(rest.speed < MOST_SPEED && rest.moved < BODY_RADIUS && rest.depth < 3.0)
+            });
+            restless.map(move |rest| (*seed, rest))
+        });
+    let restless: Vec<(u64, Rest)> = restless.collect();
     assert!(restless.is_empty(), "{restless:?}");
 }

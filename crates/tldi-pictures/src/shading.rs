@@ -3,7 +3,7 @@
 use crate::camera::toward_camera;
 use crate::front_layers::FrontLayers;
 use crate::scene::{Paint, Scene};
-use tldi::glamx::Vec3;
+use tldi::glamx::{Pose3, Vec3};
 use tldi::{Layer, Tldi, VirtualCamera};
 
 /// Direction from the scene to the sun: this much of up, the rest towards the camera's left.
@@ -34,7 +34,8 @@ pub(crate) struct Frame<'a> {
     /// Directions in the view frame.
     up: Vec3,
     sun: Vec3,
-    /// Image of each body from the sun, with its index.
+    /// From the scene into the view from the sun, and the image of each body there, with its index.
+    sun_from_scene: Pose3,
     shadows: Vec<(u16, Tldi)>,
     /// Heights along up, in metres, below which given shares of the scan's points lie: one for
     /// each of [`HEIGHT_COLORS`].
@@ -54,16 +55,14 @@ impl<'a> Frame<'a> {
             .reject_from(up)
             .normalize_or(Vec3::X);
         let sun = SUN_HEIGHT * up + (1.0 - SUN_HEIGHT * SUN_HEIGHT).sqrt() * aside;
-        let sun_in_scene = view_from_scene.inverse() * sun;
+        let from_sun =
+            |pixel_size| VirtualCamera::along(view_from_scene.inverse() * -sun, pixel_size);
         let shadows = (0u16..)
             .zip(&scene.items)
             .filter(|(_, item)| matches!(item.paint, Paint::Body(_)))
             .map(|(index, item)| {
                 let pixel_size = 1.5 * item.cloud.mean_radius();
-                (
-                    index,
-                    item.image(&VirtualCamera::along(-sun_in_scene, pixel_size)),
-                )
+                (index, item.image(&from_sun(pixel_size)))
             })
             .collect();
         let mut heights: Vec<f32> = scene
@@ -94,6 +93,7 @@ impl<'a> Frame<'a> {
             spirals: (0..SPIRALS).map(spiral).collect(),
             up,
             sun,
+            sun_from_scene: from_sun(1.0).view_from_frame,
             shadows,
             heights,
         }
@@ -192,11 +192,11 @@ impl<'a> Frame<'a> {
     /// Share of the sun that bodies leave to a point, 0 to 1, with soft rims.
     fn sunlight(&self, item: u16, scene_point: Vec3) -> f32 {
         let mut light: f32 = 1.0;
+        let seen = self.sun_from_scene * scene_point;
         for (body, image) in &self.shadows {
             if *body == item {
                 continue;
             }
-            let seen = image.camera.view_from_point(scene_point);
             let [u, v] = image.camera.pixel_from_view(seen);
             let [i, j] = [u - image.origin[0] as f32, v - image.origin[1] as f32];
             let [columns, rows] = image.size.map(|n| n as f32);

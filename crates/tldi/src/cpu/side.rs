@@ -291,7 +291,7 @@ impl Side {
         self.image
             .begin(imaging.camera, imaging.rect.origin, imaging.rect.size);
         for band in 0..self.fragments.begin(&points, imaging) {
-            self.fragments.splat_band(band, &points, imaging);
+            self.fragments.splat_band(band, imaging);
             sweep::sweep(
                 &mut self.fragments,
                 points.oriented,

@@ -165,7 +165,7 @@ pub(crate) struct Splat {
     /// Pixel coordinates of the point.
     pub(crate) centre: [f32; 2],
     radius: f32,
-    /// Rise of the depth per pixel along columns and rows.
+    /// Rise of the depth per pixel along columns and rows, at the centre.
     slope: [f32; 2],
     /// Depth of the point, in depth steps.
     depth: f32,
@@ -215,7 +215,7 @@ impl Fragments {
     }
 
     /// `mark`, `alloc`, `splat` over the rows of one band.
-    pub(crate) fn splat_band(&mut self, band: u32, points: &SplatPoints, imaging: &Imaging) {
+    pub(crate) fn splat_band(&mut self, band: u32, imaging: &Imaging) {
         let _stage = stage!("splat");
         let Rect { origin, size } = imaging.rect;
         let top = band * BAND_ROWS;
@@ -251,17 +251,9 @@ impl Fragments {
             first_splat: members.start as u32,
         };
         match imaging.camera.projection {
-            Projection::Orthographic { .. } => {
-                fill_orthographic(splats, &rows, out);
-            }
-            Projection::Perspective { .. } => {
-                fill(splats, &rows, out, |splat, [u, v], _| {
-                    let k = splat.kept as usize;
-                    let (view, n) = (points.view(k), points.normals[k]);
-                    let ray = imaging.camera.view_at(u, v, 1.0);
-                    let rise = n.dot(view) / n.dot(ray) - view.z;
-                    rise / imaging.camera.pixel_size_at(view.z)
-                });
+            Projection::Orthographic { .. } => fill_orthographic(splats, &rows, out),
+            Projection::Perspective { focal_px, .. } => {
+                fill_perspective(splats, &rows, out, 1.0 / focal_px);
             }
         }
     }
@@ -275,13 +267,6 @@ impl Fragments {
     pub(crate) fn of_pixel(&mut self, pixel: usize) -> (&mut [Fragment], &[Splat]) {
         let range = self.offsets[pixel] as usize..self.ends[pixel] as usize;
         (&mut self.fragments[range], &self.splats)
-    }
-}
-
-impl SplatPoints<'_> {
-    /// The k-th kept point, in the view frame.
-    fn view(&self, k: usize) -> Vec3 {
-        self.columns.view(self.kept[k] as usize)
     }
 }
 
@@ -340,19 +325,20 @@ impl Splat {
             ..
         } = imaging;
         let pixel_size = camera.pixel_size_at(view.z);
-        let direction = match camera.projection {
+        // Through the point, one metre deep.
+        let ray = match camera.projection {
             Projection::Orthographic { .. } => Vec3::Z,
-            Projection::Perspective { .. } => view.normalize_or(Vec3::Z),
+            Projection::Perspective { .. } => view / view.z,
         };
-        let along = normal.dot(direction);
+        let along = normal.dot(ray) / ray.length();
         let is_edge_on = along.abs() < EDGE_ON;
         let class = if is_edge_on {
             2
         } else {
             u32::from(!oriented || along > 0.0)
         };
-        let inv_z = -1.0 / normal.z;
-        let slope = [normal.x * inv_z, normal.y * inv_z];
+        let per_depth = -1.0 / normal.dot(ray);
+        let slope = [normal.x * per_depth, normal.y * per_depth];
         let centre = camera.pixel_from_view(view);
         let radius = splat_radius(radius, pixel_size) / pixel_size;
         let (first_column, last_column) = covered(centre[0], radius, rect.origin[0], rect.size[0]);
@@ -429,35 +415,47 @@ const LANES: usize = 2 * LANE_COLUMNS;
 
 multiversioned! {
 fn fill_orthographic(splats: &[Splat], rows: &Rect, out: Out) {
-    fill(splats, rows, out, |splat, _, [dx, dy]| splat.slope[0] * dx + splat.slope[1] * dy);
+    fill(splats, rows, out, |rise| rise);
 }
 }
 
-/// Writes the fragments of `splats`. `rise(splat, [u, v], [dx, dy])` is the rise of a splat's tangent plane, in pixels,
-/// from its centre to the pixel coordinates (u, v), which are (dx, dy) away.
+multiversioned! {
+/// Rays spread: one that is `d` pixels aside at the depth of the centre is `d · rise / focal_px` farther aside where it meets
+/// the plane. That adds to the rise by the slope, and so on: a geometric series.
+fn fill_perspective(splats: &[Splat], rows: &Rect, out: Out, inv_focal_px: f32) {
+    fill(splats, rows, out, |rise| rise / (1.0 - rise * inv_focal_px));
+}
+}
+
+/// Writes the fragments of `splats`. `met` tells the rise of a tangent plane from its centre to where the ray of a pixel meets
+/// it, from the rise to where a parallel to the centre's ray would; both in pixels.
 #[inline(always)]
-fn fill(splats: &[Splat], rows: &Rect, out: Out, rise: impl Fn(&Splat, [f32; 2], [f32; 2]) -> f32) {
+fn fill(splats: &[Splat], rows: &Rect, out: Out, met: impl Fn(f32) -> f32) {
     let width = rows.size[0] as usize;
     let own = |d: f32| (d > -0.5) & (d <= 0.5);
+    // Columns and rows from the first of the lanes.
+    let places: [_; LANES] =
+        std::array::from_fn(|l| [l % LANE_COLUMNS, l / LANE_COLUMNS].map(|k| k as f32));
     for (splat, k) in splats.iter().zip(out.first_splat..) {
         let inv_radius_squared = 1.0 / (splat.radius * splat.radius);
         let range = splat.rows(rows);
-        let last_row = *range.end();
+        let last = [splat.last[0], *range.end()].map(|k| k as f32 + 0.5);
         for j in range.step_by(LANES / LANE_COLUMNS) {
             for i in (splat.first[0]..=splat.last[0]).step_by(LANE_COLUMNS) {
                 let (mut keys, mut weights) = ([0; LANES], [0; LANES]);
                 let mut covered = [0; LANES];
+                let first = [i, j].map(|k| k as f32 + 0.5);
                 for l in 0..LANES {
-                    let (i, j) = (i + (l % LANE_COLUMNS) as i32, j + (l / LANE_COLUMNS) as i32);
-                    let [u, v] = [i as f32 + 0.5, j as f32 + 0.5];
+                    let (u, v) = (first[0] + places[l][0], first[1] + places[l][1]);
                     let (dx, dy) = (u - splat.centre[0], v - splat.centre[1]);
-                    let rise = splat.limited(rise(splat, [u, v], [dx, dy]));
+                    let rise = splat.slope[0] * dx + splat.slope[1] * dy;
+                    let rise = splat.limited(met(rise));
                     let share = 1.0 - (dx * dx + dy * dy + rise * rise) * inv_radius_squared;
                     let depth = truncated(splat.depth + splat.steps * rise, MAX_DEPTH);
                     keys[l] = splat.class | depth & !1;
                     let share_seen = share.max(0.0) * splat.facing;
                     weights[l] = truncated(1.0 + (MAX_WEIGHT - 1.0) * share_seen, MAX_WEIGHT);
-                    let inside = (i <= splat.last[0]) & (j <= last_row);
+                    let inside = (u <= last[0]) & (v <= last[1]);
                     let hit = inside & ((share > 0.0) | (own(dx) & own(dy)));
                     covered[l] = u32::from(hit) << l;
                 }
