@@ -25,25 +25,22 @@ const NEAR_FACE: f32 = 0.3;
 const OF_FACE: f32 = 0.15;
 
 /// Least share of the pixels that a face needs. And the share of the pixels of all faces at which faces begin to explain the
-/// contact, and at which they fully do. Noise has normals of all kinds. `LEAST_SHARE`: none: bodies in corners of a tray have
-/// contacts that are 2 to 10 r̄ too deep; twice: bare sharp corners are 0.05 r̄ off in place of 0.02. `OF_FACES`: halved: corners rounded by r̄ scatter by 0.34 r̄ in place of 0.20, bare sharp ones are 28 % better; doubled:
-/// depths of edges 2 to 10 times as wrong.
+/// contact, and at which they fully do. Noise has normals of all kinds. `LEAST_SHARE`: none: bodies in corners of a tray
+/// have contacts that are 2 to 10 r̄ too deep; twice: bare sharp corners are 0.05 r̄ off in place of 0.02. `OF_FACES`:
+/// halved: corners rounded by r̄ scatter by 0.34 r̄ in place of 0.20, bare sharp ones are 28 % better; doubled: depths of
+/// edges 2 to 10 times as wrong.
 const LEAST_SHARE: f32 = 0.025;
 const OF_FACES: [f32; 2] = [0.4, 0.6];
 
 /// Height in pixels of the lowest pixel above all faces at which faces begin to fail as an
-/// explanation, and at which they do fail. A round surface is above its tangents. Both halved or doubled: no change
-/// in any suite.
+/// explanation, and at which they do fail. A round surface is above its tangents. Both halved or doubled: no change in any
+/// suite; none: a rim that pierces a plate is told to be 3 r̄ too deep.
 const ROUND: [f32; 2] = [0.1, 0.25];
 
 /// Distance in pixels from where faces meet to the nearest pixel at which faces begin to fail as an explanation, and at which
 /// they do fail: half the diagonal of a pixel, and half more. Faces that meet where the surfaces do not are those of noise.
 /// Half: bare sharp corners are 0.16 r̄ off in place of 0.02; twice: a cast meets the edge of a turning bar 0.7 r̄ early.
 const BESIDE: [f32; 2] = [0.71, 1.06];
-
-/// Largest distance in pixels at which faces may meet below or above the lowest pixel: discs reach by a pixel beyond the edge of
-/// a face. A bound for odd normals. Half, twice or none: no change of contact accuracy, concave bodies or deep starts.
-const FARTHEST: f32 = 1.0;
 
 /// The gap over a face, in metres, at a place on the plane of a contact: `at_origin + slope · place`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -118,9 +115,8 @@ pub(crate) fn lower_by<'a>(
     let Some(vertex) = Vertex::of(&faces, place, slope) else {
         return 0.0;
     };
-    let lowest = frame.gap(lowest);
     let faces_there = vertex.faces.iter().map(|face| face.at(place));
-    let above = lowest - faces_there.fold(f32::NEG_INFINITY, f32::max);
+    let above = frame.gap(lowest) - faces_there.fold(f32::NEG_INFINITY, f32::max);
     let beside = |contact: &ContactPixel| frame.place(contact.middle()).distance(vertex.place);
     let (count, beside) = pixels.fold((0.0, f32::INFINITY), |(count, nearest), contact| {
         (count + 1.0, beside(contact).min(nearest))
@@ -130,11 +126,7 @@ pub(crate) fn lower_by<'a>(
         * ramp(of_faces / count, OF_FACES)
         * (1.0 - ramp(above / pixel_size, ROUND))
         * (1.0 - ramp(beside / pixel_size, BESIDE));
-    let gap = (vertex.gap).clamp(
-        lowest - FARTHEST * pixel_size,
-        lowest + FARTHEST * pixel_size,
-    );
-    sure * (deepest_gap - gap)
+    sure * (deepest_gap - vertex.gap)
 }
 
 /// The faces that meet, by slopes that are as far apart as there are.
