@@ -97,16 +97,30 @@ pub enum TldiError {
         "the shape of collider {0:?} is not a PointCloudShape: give the cloud a collider of its own (not a part of a compound)"
     )]
     NotACloud(ColliderHandle),
-    /// A setting is outside its range.
+    /// A setting is outside its range. Nothing was done.
     #[error("{setting} is {value}: {expected}")]
     BadConfig {
-        /// Name of the field of [`TldiConfig`](crate::TldiConfig).
+        /// Name of the field of [`TldiConfig`](crate::TldiConfig), or `dt`, the seconds of a step.
         setting: &'static str,
         /// The value given.
         value: f32,
         /// What is allowed.
         expected: &'static str,
     },
+}
+
+impl TldiError {
+    /// An error unless a step can take `dt` seconds.
+    pub(crate) fn check_dt(dt: f32) -> Result<(), Self> {
+        match dt.is_finite() && dt >= 0.0 {
+            true => Ok(()),
+            false => Err(Self::BadConfig {
+                setting: "dt",
+                value: dt,
+                expected: "the seconds of a step must be finite and not negative",
+            }),
+        }
+    }
 }
 
 /// Why a collider passes through clouds.

@@ -136,8 +136,8 @@ impl TldiPipeline {
     /// fail no step.
     ///
     /// # Errors
-    /// [`TldiError::Pair`] or [`TldiError::Batch`] where the backend fails; the step should not be
-    /// taken then.
+    /// [`TldiError::BadConfig`] where the time step is no time, and [`TldiError::Pair`] or [`TldiError::Batch`] where the
+    /// backend fails; the step should not be taken then.
     ///
     /// ```
     #[doc = example_world!()]
@@ -161,6 +161,7 @@ impl TldiPipeline {
         impulse_joints: &ImpulseJointSet,
         multibody_joints: &MultibodyJointSet,
     ) -> Result<(), TldiError> {
+        TldiError::check_dt(integration.dt)?;
         let start = Instant::now();
         let shared = Arc::clone(&self.shared);
         shared.take_spot_counts();

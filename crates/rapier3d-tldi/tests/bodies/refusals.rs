@@ -102,6 +102,29 @@ fn detached_world_is_refused() -> TestResult {
     Ok(())
 }
 
+/// A step of no known time would make all places NaN.
+#[test]
+fn bad_time_steps_are_refused() -> TestResult {
+    let (mut world, mut tldi) = attached_with(TldiConfig::default());
+    let floor = insert_floor(&mut world, 0.4);
+    let (body, _) = world.insert(dynamic_at(1.0), ColliderBuilder::ball(0.1));
+    let before = *world.bodies[body].position();
+    for dt in [f32::NAN, f32::INFINITY, -0.01] {
+        world.integration_parameters.dt = dt;
+        let step = tldi.step(&mut world).map(|_| ());
+        let deform = tldi.deform(&mut world, floor, &[], None);
+        for result in [step, deform] {
+            let is_refused = matches!(result, Err(TldiError::BadConfig { setting: "dt", .. }));
+            assert!(is_refused, "{dt}: {result:?}");
+        }
+        assert_eq!(*world.bodies[body].position(), before, "{dt}");
+    }
+    world.integration_parameters.dt = 0.0;
+    tldi.step(&mut world)?;
+    assert_eq!(*world.bodies[body].position(), before);
+    Ok(())
+}
+
 #[test]
 fn bad_settings_are_refused() {
     let with_drift = |scatter| TldiConfig {

@@ -170,7 +170,7 @@ impl TldiPipeline {
     /// `set_points`: for each contact, a pass over the points in the blocks around it.
     ///
     /// # Errors
-    /// Those of `set_points`, and [`TldiError::OtherPoints`] if there are not as many points as the
+    /// Those of `set_points`, [`TldiError::BadConfig`] if the time step is no time, and [`TldiError::OtherPoints`] if there are not as many points as the
     /// cloud was given before. Points that are not finite count: they are dropped, and have no velocity when they
     /// come back.
     ///
@@ -230,6 +230,7 @@ impl TldiPipeline {
         normals: Option<&[Vector]>,
         dt: f32,
     ) -> Result<(), TldiError> {
+        TldiError::check_dt(dt)?;
         let cloud = cloud_of(colliders, collider)?.cloud();
         let expected = cloud.len() + cloud.dropped();
         if expected != points.len() {
