@@ -136,8 +136,8 @@ impl TldiPipeline {
     /// fail no step.
     ///
     /// # Errors
-    /// [`TldiError::BadConfig`] where the time step is no time, and [`TldiError::Pair`] or [`TldiError::Batch`] where the
-    /// backend fails; the step should not be taken then.
+    /// [`TldiError::BadConfig`] if the time step is negative or not finite, and [`TldiError::Pair`] or
+    /// [`TldiError::Batch`] if the backend fails; the step should not be taken then.
     ///
     /// ```
     #[doc = example_world!()]

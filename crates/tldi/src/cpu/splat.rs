@@ -427,8 +427,8 @@ fn fill_perspective(splats: &[Splat], rows: &Rect, out: Out, inv_focal_px: f32) 
 }
 }
 
-/// Writes the fragments of `splats`. `met` tells the rise of a tangent plane from its centre to where the ray of a pixel meets
-/// it, from the rise to where a parallel to the centre's ray would; both in pixels.
+/// Writes the fragments of `splats`. `met` gets how far a tangent plane rises from the centre of its disc to a pixel along
+/// parallel rays, and tells how far it rises to where the pixel's own ray meets it; both in pixels.
 #[inline(always)]
 fn fill(splats: &[Splat], rows: &Rect, out: Out, met: impl Fn(f32) -> f32) {
     let width = rows.size[0] as usize;

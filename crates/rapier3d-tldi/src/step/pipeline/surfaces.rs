@@ -170,9 +170,9 @@ impl TldiPipeline {
     /// `set_points`: for each contact, a pass over the points in the blocks around it.
     ///
     /// # Errors
-    /// Those of `set_points`, [`TldiError::BadConfig`] if the time step is no time, and [`TldiError::OtherPoints`] if there are not as many points as the
-    /// cloud was given before. Points that are not finite count: they are dropped, and have no velocity when they
-    /// come back.
+    /// Those of `set_points`, [`TldiError::BadConfig`] if the time step is negative or not finite, and
+    /// [`TldiError::OtherPoints`] if there are not as many points as the cloud was given before. Points that are not finite
+    /// count: they are dropped, and have no velocity when they come back.
     ///
     /// ```
     /// use rapier3d::prelude::*;
