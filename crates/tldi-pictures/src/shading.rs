@@ -34,8 +34,9 @@ pub(crate) struct Frame<'a> {
     /// Directions in the view frame.
     up: Vec3,
     sun: Vec3,
-    /// From the scene into the view from the sun, and the image of each body there, with its index.
+    /// Into the view from the sun.
     sun_from_scene: Pose3,
+    /// Image of each body from the sun, with its index.
     shadows: Vec<(u16, Tldi)>,
     /// Heights along up, in metres, below which given shares of the scan's points lie: one for
     /// each of [`HEIGHT_COLORS`].
