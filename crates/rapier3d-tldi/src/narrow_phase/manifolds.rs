@@ -5,8 +5,8 @@
 //! (`OUTCOME_FULL_COMPOSITE` in rapier3d's `narrow_phase/pair_update.rs`); without one, replacing
 //! or removing manifolds corrupts the solver. So every call here leaves a [`ManifoldWorkspace`].
 
-use crate::narrow_phase::parts::{PartPair, ShapePair, part};
-use crate::narrow_phase::planes::share_planes;
+use crate::narrow_phase::part_patch::{PartPatch, share_planes};
+use crate::narrow_phase::parts::{Comparison, PartPair, ShapePair, part};
 use crate::narrow_phase::steady_gaps::Before;
 use crate::step::measured::Measured;
 use rapier3d::geometry::{ContactData, ContactManifold, ContactManifoldData};
@@ -15,23 +15,20 @@ use rapier3d::parry::query::details::{
 };
 use rapier3d::parry::query::{DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
 use rapier3d::parry::shape::PackedFeatureId;
-use tldi::{ContactPatch, PairResult};
+use tldi::PairResult;
 
 /// A contact inherits the impulses of a near one of the step before if their normals agree within
 /// this angle's cosine (26°): what matters is that the impulse pushes the same way. Half or twice
 /// the angle: no row of any suite changes.
 pub(super) const COS_SAME_NORMAL: f32 = 0.9;
 
-/// Most roughness of a contact that counts as scatter of its measurement, in scatters: rougher ones
-/// are not noisy but uneven. Half: 7 of 636 stability rows fail instead of 3, all new ones of new
-/// samples each frame; twice: no change in any suite.
-const MOST_SCATTERS: f32 = 2.0;
-
 /// Manifolds of the step before and memory for the next, kept by rapier for each pair.
 #[derive(Clone, Default)]
 struct ManifoldWorkspace {
     previous: Vec<ContactManifold>,
     measured: Option<Measured>,
+    /// Scratch.
+    patches: Vec<PartPatch>,
 }
 
 impl WorkspaceData for ManifoldWorkspace {
@@ -97,51 +94,45 @@ pub(crate) fn fill(
 ) {
     let workspace = workspace_of(workspace);
     let last_measured = std::mem::replace(&mut workspace.measured, measured);
-    let previous = &mut workspace.previous;
+    let ManifoldWorkspace {
+        previous, patches, ..
+    } = workspace;
     std::mem::swap(manifolds, previous);
     let last_measured = last_measured.filter(|last| last.is_of_same_points(pair));
     if last_measured.is_some() {
         carry_over(previous, pair);
     }
-    // `manifolds` now holds those of two steps ago, of use for their memory only.
-    let mut filled = 0;
-    let (mut match_distance, mut scatter) = (pair.prediction, 0.0);
-    for part_pair in parts {
-        let first = filled;
-        match &part_pair.comparison {
+    patches.clear();
+    for part in parts {
+        match &part.comparison {
             Some(comparison) => {
-                for patch in &results[comparison.query].patches {
-                    if !patch.points.is_empty() {
-                        let manifold = emptied(manifolds, filled);
-                        write_patch(patch, part_pair, comparison.scatter, manifold);
-                        filled += 1;
-                    }
-                }
-                match_distance = f32::max(match_distance, comparison.match_distance());
-                scatter = f32::max(scatter, comparison.scatter);
+                let found = results[comparison.query].patches.iter();
+                let found = found.filter(|patch| !patch.points.is_empty());
+                patches.extend(found.map(|patch| PartPatch::of_clouds(part, comparison, patch)));
             }
-            None => {
-                manifolds.truncate(filled);
-                append_exact(pair, part_pair, manifolds);
-                filled = manifolds.len();
-            }
-        }
-        for manifold in &mut manifolds[first..filled] {
-            place(manifold, part_pair);
-            if let (Some(last), Some(comparison)) = (last_measured, &part_pair.comparison) {
-                let before = Before {
-                    manifolds: previous,
-                    turned: last.turned(pair),
-                    match_distance: comparison.match_distance(),
-                    pixel_size: comparison.pixel_size(),
-                };
-                before.steady(manifold, pair);
-            }
+            None => append_exact(pair, part, patches),
         }
     }
-    manifolds.truncate(filled);
     if parts.len() > 1 {
-        share_planes(pair, scatter, manifolds);
+        let scatters = comparisons(parts).map(|comparison| comparison.scatter);
+        share_planes(patches, scatters.fold(0.0, f32::max));
+    }
+    let match_distances = comparisons(parts).map(Comparison::match_distance);
+    let match_distance = match_distances.fold(pair.prediction, f32::max);
+    // `manifolds` now holds those of two steps ago, of use for their memory only.
+    manifolds.truncate(patches.len());
+    manifolds.resize_with(patches.len(), ContactManifold::new);
+    for (part_patch, manifold) in patches.iter().zip(&mut *manifolds) {
+        write(part_patch, pair, manifold);
+        if let (Some(last), Some(pixel_size)) = (last_measured, part_patch.pixel_size) {
+            let before = Before {
+                manifolds: previous,
+                turned: last.turned(pair),
+                match_distance,
+                pixel_size,
+            };
+            before.steady(manifold, pair);
+        }
     }
     inherit_user_data(manifolds, previous, match_distance);
     for manifold in manifolds {
@@ -149,21 +140,8 @@ pub(crate) fn fill(
     }
 }
 
-/// Moves a manifold from the frames of the parts to those of the colliders.
-fn place(manifold: &mut ContactManifold, parts: &PartPair) {
-    [manifold.subshape1, manifold.subshape2] = parts.indices;
-    if let Some(pose1) = parts.poses[0] {
-        manifold.local_n1 = pose1.rotation * manifold.local_n1;
-        for point in &mut manifold.points {
-            point.local_p1 = pose1 * point.local_p1;
-        }
-    }
-    if let Some(pose2) = parts.poses[1] {
-        manifold.local_n2 = pose2.rotation * manifold.local_n2;
-        for point in &mut manifold.points {
-            point.local_p2 = pose2 * point.local_p2;
-        }
-    }
+fn comparisons(parts: &[PartPair]) -> impl Iterator<Item = &Comparison> {
+    parts.iter().filter_map(|part| part.comparison.as_ref())
 }
 
 /// The pair's workspace; a new one where it has none of ours.
@@ -181,49 +159,32 @@ fn workspace_of(workspace: &mut Option<ContactManifoldsWorkspace>) -> &mut Manif
         .expect("replaced above unless it is one")
 }
 
-/// The manifold with this index, appended if there are just so many, without points and with data
-/// that refers to nothing; its memory is kept.
-fn emptied(manifolds: &mut Vec<ContactManifold>, index: usize) -> &mut ContactManifold {
-    if index == manifolds.len() {
-        manifolds.push(ContactManifold::new());
-    }
-    let manifold = &mut manifolds[index];
-    manifold.points.clear();
+/// Replaces `manifold` by that of a patch, with data that refers to nothing; its memory is kept.
+fn write(part_patch: &PartPatch, pair: &ShapePair<'_>, manifold: &mut ContactManifold) {
+    let PartPatch { indices, patch, .. } = part_patch;
     let mut solver_contacts = std::mem::take(&mut manifold.data.solver_contacts);
     solver_contacts.clear();
     manifold.data = ContactManifoldData::default();
     manifold.data.solver_contacts = solver_contacts;
-    manifold
-}
-
-/// Writes the points of `patch`. A gap within the patch's roughness, and within `scatter` metres,
-/// counts as touching.
-fn write_patch(
-    patch: &ContactPatch,
-    pair: &PartPair,
-    scatter: f32,
-    manifold: &mut ContactManifold,
-) {
-    let b_from_a = pair.a_from_b.inverse();
-    let scatter = (MOST_SCATTERS * scatter).min(patch.roughness);
+    [manifold.subshape1, manifold.subshape2] = *indices;
+    let pos21 = pair.pos12.inverse();
     manifold.local_n1 = patch.normal;
-    manifold.local_n2 = b_from_a.rotation * -patch.normal;
+    manifold.local_n2 = pos21.rotation * -patch.normal;
+    manifold.points.clear();
     manifold.points.extend(patch.points.iter().map(|point| {
-        let gap = (point.gap - scatter).max(0.0) + (point.gap + scatter).min(0.0);
-        let apart = 0.5 * (gap - point.gap) * patch.normal;
         TrackedContact::new(
-            point.point_a - apart,
-            b_from_a * (point.point_b + apart),
+            point.point_a,
+            pos21 * point.point_b,
             PackedFeatureId::UNKNOWN, // points of a cloud are no features
             PackedFeatureId::UNKNOWN,
-            gap,
+            point.gap,
         )
     }));
 }
 
-/// Appends rapier's own manifolds for two parts of which none is a cloud. Its dispatcher knows all
+/// Appends the contacts of two parts of which none is a cloud. Rapier's dispatcher knows all
 /// such pairs of single shapes, and says so for those it does not, in which case there is none.
-fn append_exact(pair: &ShapePair<'_>, parts: &PartPair, manifolds: &mut Vec<ContactManifold>) {
+fn append_exact(pair: &ShapePair<'_>, parts: &PartPair, patches: &mut Vec<PartPatch>) {
     let mut found: Vec<ContactManifold> = Vec::new();
     let answer = DefaultQueryDispatcher.contact_manifolds(
         &parts.a_from_b,
@@ -234,7 +195,8 @@ fn append_exact(pair: &ShapePair<'_>, parts: &PartPair, manifolds: &mut Vec<Cont
         &mut None,
     );
     if answer.is_ok() {
-        manifolds.extend(found.into_iter().filter(|m| !m.points.is_empty()));
+        let found = found.iter().filter(|manifold| !manifold.points.is_empty());
+        patches.extend(found.map(|manifold| PartPatch::of_exact(parts, manifold)));
     }
 }
 

@@ -3,9 +3,9 @@
 pub(crate) mod dispatcher;
 pub(crate) mod manifolds;
 pub(crate) mod moving;
+mod part_patch;
 pub(crate) mod parts;
 pub(crate) mod passing;
-pub(crate) mod planes;
 pub(crate) mod queries;
 pub(crate) mod shape_casts;
 mod steady_gaps;

@@ -64,23 +64,23 @@ const ALIKE_RADII: f32 = 2.0;
 
 /// The lowest point of a bowl.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lowest {
+pub(crate) struct Lowest {
     /// The point, and the gap there.
-    pub point: ContactPoint,
+    pub(crate) point: ContactPoint,
     /// Displacement of the lowest point along each main axis, metres, for each metre of error in the slope: the gap over one
     /// standard deviation of the places.
-    pub aside: [Vec3; 2],
+    pub(crate) aside: [Vec3; 2],
     /// Along the same axes, vectors as long as the bowl's radii of curvature, metres.
-    pub radii: [Vec3; 2],
+    pub(crate) radii: [Vec3; 2],
 }
 
 /// The floor of a valley.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Floor {
+pub(crate) struct Floor {
     /// Its ends, and the gaps there.
-    pub ends: [ContactPoint; 2],
+    pub(crate) ends: [ContactPoint; 2],
     /// Across it, a vector as long as its radius of curvature, metres.
-    pub radius: Vec3,
+    pub(crate) radius: Vec3,
 }
 
 /// Where gaps around the contact of a cylinder are lowest.

@@ -1,6 +1,7 @@
 //! Contact pixels, points and patches.
 
-use glamx::Vec3;
+use arrayvec::ArrayVec;
+use glamx::{Pose3, Vec3};
 
 /// A pixel in which both surfaces are close or penetrate. Vectors are in the frame of the first
 /// surface.
@@ -73,7 +74,7 @@ pub struct ContactPatch {
     /// Unit normal from the first surface towards the second, in the frame of the first.
     pub normal: Vec3,
     /// One to [`PATCH_POINTS`] points.
-    pub points: arrayvec::ArrayVec<ContactPoint, PATCH_POINTS>,
+    pub points: ArrayVec<ContactPoint, PATCH_POINTS>,
     /// Set if the gaps form a bowl, so that the contact rolls. There is one vector along each main
     /// axis, as long as the relative radius of curvature of the surfaces, 1 / (1 / R_a + 1 / R_b),
     /// metres. The bowl's lowest point moves by that length for each radian of turn. The lowest
@@ -87,6 +88,31 @@ pub struct ContactPatch {
 }
 
 impl ContactPatch {
+    /// The same patch in another frame, by the pose of its frame there.
+    ///
+    /// ```
+    /// use tldi::{ContactPatch, ContactPoint, glamx::{Pose3, Vec3}};
+    /// let point = ContactPoint { point_a: Vec3::ZERO, point_b: Vec3::Y, gap: 1.0 };
+    /// let points = [point].into_iter().collect();
+    /// let patch = ContactPatch { normal: Vec3::Y, points, ..ContactPatch::default() };
+    /// let moved = patch.transformed(&Pose3::from_translation(Vec3::X));
+    /// assert_eq!(moved.points[0].point_b, Vec3::new(1.0, 1.0, 0.0));
+    /// ```
+    pub fn transformed(&self, pose: &Pose3) -> Self {
+        let moved = |point: &ContactPoint| ContactPoint {
+            point_a: pose.transform_point(point.point_a),
+            point_b: pose.transform_point(point.point_b),
+            gap: point.gap,
+        };
+        Self {
+            normal: pose.rotation * self.normal,
+            points: self.points.iter().map(moved).collect(),
+            relative_radii: (self.relative_radii)
+                .map(|radii| radii.map(|radius| pose.rotation * radius)),
+            roughness: self.roughness,
+        }
+    }
+
     /// Whether the surfaces touch in one round spot, or along a line, and so roll.
     pub fn is_round(&self) -> bool {
         self.relative_radii.is_some()

@@ -4,35 +4,35 @@ use crate::contact::bowl::{Bowl, Floor, Lowest};
 use crate::contact::main_plane::GapPlane;
 use crate::contact::point_axes::MainAxes;
 use crate::contact::ramp::ramp;
-use crate::{ContactPoint, PATCH_POINTS};
+use crate::{ContactPatch, ContactPoint, PATCH_POINTS};
 use arrayvec::ArrayVec;
 use glamx::{Vec2, Vec3};
 use std::f32::consts::SQRT_2;
 
 /// Points on which a body would rest.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Supports {
+pub(crate) struct Supports {
     /// Indices of up to [`PATCH_POINTS`] of the points.
-    pub indices: ArrayVec<usize, PATCH_POINTS>,
+    pub(crate) indices: ArrayVec<usize, PATCH_POINTS>,
     /// Their gaps, in metres, about the plane that fits all gaps best. The flatter the gaps are,
     /// the more it is the plane on which most of them lie.
-    pub above_plane: ArrayVec<f32, PATCH_POINTS>,
+    pub(crate) above_plane: ArrayVec<f32, PATCH_POINTS>,
     /// How steeply the gaps of that plane rise along the surface, metres per metre; 0 across points in a row.
-    pub slope: Vec3,
+    pub(crate) slope: Vec3,
     /// 1 if so many gaps lie on one plane that the others count as errors, as at the rim of a face
     /// with estimated normals. 0 if the gaps bend, or too few are on any plane.
-    pub flatness: f32,
+    pub(crate) flatness: f32,
     /// Standard deviation, in metres, of the gaps about the plane that fits them best.
-    pub roughness: f32,
+    pub(crate) roughness: f32,
     /// Standard deviation, in metres, of the gaps about the bowl that fits them best: a paraboloid
     /// that widens along the main axes, or does not bend. What is left of the roughness where the
     /// surfaces are round.
-    pub roughness_about_bowl: f32,
+    pub(crate) roughness_about_bowl: f32,
     /// The lowest point of that bowl. It is set if the gaps bend in both directions, the point is
     /// among the points, and the bowl explains most of the roughness.
-    pub lowest_of_bowl: Option<Lowest>,
+    pub(crate) lowest_of_bowl: Option<Lowest>,
     /// The floor of that bowl, if it is a valley: bent along one axis only.
-    pub floor_of_valley: Option<Floor>,
+    pub(crate) floor_of_valley: Option<Floor>,
 }
 
 /// Limit of how much depth counts, in units of the roughness. A still lower point is an outlier, and would otherwise be
@@ -66,19 +66,7 @@ const SMOOTH: [f32; 2] = [0.5, 1.0];
 ///
 /// Heights are measured from the plane that fits the gaps. So the choice does not depend on the
 /// tilt of the body, and a lifted edge remains. Cost: linear in points.
-///
-/// ```
-/// use tldi::{ContactPoint, supports, glamx::Vec3};
-/// // A 3 × 3 grid, flat: the corners.
-/// let points: Vec<ContactPoint> = (0..9)
-///     .map(|k| Vec3::new((k % 3) as f32, 0.0, (k / 3) as f32))
-///     .map(|p| ContactPoint { point_a: p, point_b: p, gap: 0.0 })
-///     .collect();
-/// let mut corners = supports(&points, Vec3::Y, 0.01).indices;
-/// corners.sort();
-/// assert_eq!(corners[..], [0, 2, 6, 8]);
-/// ```
-pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> Supports {
+pub(crate) fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> Supports {
     let axes = MainAxes::of(points, normal);
     let count = points.len() as f32;
     let heights = || points.iter().map(|p| (axes.place(p), p.gap));
@@ -138,6 +126,50 @@ pub fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> 
         }),
         floor_of_valley: (bowl.valley(slope)).and_then(|valley| axes.floor(valley, slope, points)),
     }
+}
+
+impl ContactPatch {
+    /// The patch of `points` with one unit normal: of more than [`PATCH_POINTS`] those on which a body would rest, and the
+    /// deepest, unless it is deeper by less than `scatter` metres. Cost: linear in points.
+    ///
+    /// ```
+    /// use tldi::{ContactPatch, ContactPoint, glamx::Vec3};
+    /// // A 3 × 3 grid, flat: the corners.
+    /// let points: Vec<ContactPoint> = (0..9)
+    ///     .map(|k| Vec3::new((k % 3) as f32, 0.0, (k / 3) as f32))
+    ///     .map(|p| ContactPoint { point_a: p, point_b: p, gap: 0.0 })
+    ///     .collect();
+    /// let corners = ContactPatch::bearing(Vec3::Y, &points, 0.01).points;
+    /// assert_eq!(corners.len(), 4);
+    /// assert!([0, 2, 6, 8].into_iter().all(|k| corners.contains(&points[k])));
+    /// ```
+    pub fn bearing(normal: Vec3, points: &[ContactPoint], scatter: f32) -> Self {
+        let all = ArrayVec::try_from(points);
+        Self {
+            normal,
+            points: all.unwrap_or_else(|_| bearing(points, normal, scatter)),
+            relative_radii: None,
+            roughness: scatter,
+        }
+    }
+}
+
+/// Those of many `points` on which a body would rest, lowest first, and the deepest, unless it is deeper by less than `scatter`.
+fn bearing(
+    points: &[ContactPoint],
+    normal: Vec3,
+    scatter: f32,
+) -> ArrayVec<ContactPoint, PATCH_POINTS> {
+    let by_gap = |p: &ContactPoint, q: &ContactPoint| p.gap.total_cmp(&q.gap);
+    let supports = supports(points, normal, scatter).indices;
+    let mut kept: ArrayVec<_, PATCH_POINTS> = supports.into_iter().map(|k| points[k]).collect();
+    kept.sort_by(by_gap);
+    let deepest = points.iter().copied().min_by(by_gap);
+    if let Some(deepest) = deepest.filter(|deepest| deepest.gap < kept[0].gap - scatter) {
+        kept.truncate(PATCH_POINTS - 1);
+        kept.push(deepest);
+    }
+    kept
 }
 
 /// Indices of the places that are farthest out in one of four directions. How low a place is counts, too. Places are in
