@@ -59,12 +59,12 @@ impl MassModel {
 /// cancel on a closed surface, add up to less than this part of the area. A sphere without a cap
 /// of 26° (5 % of its area) is still closed, and a cube without 29 % of one side. Half or twice: no test of masses
 /// fails.
-const OPEN: f64 = 0.05;
+const LEAST_OPEN: f64 = 0.05;
 
 /// A plate of thickness t has a volume of t / 2 for each m² of its two sides. If that is less than
 /// this many mean radii, the cloud is a sheet, and only its noise has two sides. Half or twice: no test of masses
 /// fails.
-const FLAT: f64 = 0.1;
+const SHEET: f64 = 0.1;
 
 /// Mass properties of `cloud` at a density of 1 kg/m³, in the cloud's own frame.
 ///
@@ -221,7 +221,8 @@ fn solid(surfels: &[Surfel], mean_radius: f64) -> Option<Moments> {
             second.col_mut(j)[i] += product;
         }
     }
-    let closed = vector_area.length() < OPEN * area && moments.volume > FLAT * mean_radius * area;
+    let closed =
+        vector_area.length() < LEAST_OPEN * area && moments.volume > SHEET * mean_radius * area;
     // A few points can pass for closed; a solid has an extent along every axis.
     let extents = DSymmetricEigen3::new(moments.central()).eigenvalues;
     (closed && extents.min_element() > 0.0).then_some(moments)

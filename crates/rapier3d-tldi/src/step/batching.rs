@@ -14,7 +14,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, Once};
 
 /// All that a batch is made from.
-pub(crate) struct Frame<'a> {
+pub(crate) struct BatchSource<'a> {
     pub(crate) gravity: Vector,
     pub(crate) integration: &'a IntegrationParameters,
     pub(crate) bodies: &'a RigidBodySet,
@@ -25,7 +25,7 @@ pub(crate) struct Frame<'a> {
     pub(crate) changed: &'a [ColliderHandle],
 }
 
-impl<'a> Frame<'a> {
+impl<'a> BatchSource<'a> {
     /// Appends a candidate to the batch if its colliders are within reach of each other, or are kept apart.
     pub(crate) fn push_pair(
         &self,

@@ -9,7 +9,7 @@ use crate::corrections::surface_push;
 use crate::narrow_phase::parts::append_queries;
 use crate::narrow_phase::passing::Told;
 use crate::shape::exact::ExactShape;
-use crate::step::batching::Frame;
+use crate::step::batching::BatchSource;
 use crate::step::candidates::{CandidateSearch, Joints};
 use crate::step::pair_memory::PairMemory;
 use crate::step::prepared::Shared;
@@ -179,7 +179,7 @@ impl TldiPipeline {
         let candidates = (self.search).find(bodies, colliders, &joints, integration, &self.changed);
         self.told.look_for_passing(candidates, colliders);
         let config = shared.config();
-        let frame = Frame {
+        let source = BatchSource {
             gravity,
             integration,
             bodies,
@@ -190,7 +190,7 @@ impl TldiPipeline {
         };
         let mut sides = emptied(std::mem::take(&mut self.sides));
         for candidate in candidates.iter().filter(|candidate| !candidate.asleep) {
-            frame.push_pair(candidate, &mut batch, &mut sides);
+            source.push_pair(candidate, &mut batch, &mut sides);
         }
 
         let mut queries = emptied(std::mem::take(&mut self.queries));

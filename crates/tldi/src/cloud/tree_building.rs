@@ -12,7 +12,7 @@ const LEAF: usize = 16;
 const PARALLEL: usize = 4096;
 /// A distinct position while the tree is built, with its rank in the sorted sequence.
 #[derive(Clone, Copy)]
-struct Entry {
+struct TreeEntry {
     position: [f32; 3],
     rank: u32,
 }
@@ -43,7 +43,7 @@ impl KdTree {
         for (start, key) in keys.iter().enumerate() {
             if start == 0 || keys[start - 1] >> 32 != key >> 32 {
                 let i = *key as u32 as usize;
-                entries.push(Entry {
+                entries.push(TreeEntry {
                     position: points[i].to_array(),
                     rank: entries.len() as u32,
                 });
@@ -80,7 +80,7 @@ impl KdTree {
 
 /// Sorts `entries` into `leaves` leaves, the first of which has the number `first_leaf`.
 fn build(
-    entries: &mut [Entry],
+    entries: &mut [TreeEntry],
     splits: &mut [Split],
     first_leaf: usize,
     leaves: usize,
@@ -112,7 +112,7 @@ fn build(
 }
 
 /// The axis along which the positions extend farthest.
-fn widest_axis(entries: &[Entry]) -> usize {
+fn widest_axis(entries: &[TreeEntry]) -> usize {
     let mut min = Vec3::INFINITY;
     let mut max = Vec3::NEG_INFINITY;
     for entry in entries {

@@ -1,62 +1,48 @@
 //! The bowl that gaps form around the contact of a round surface: where it is lowest, and how
 //! certain that is.
 
-use crate::contact::ramp::ramp;
 use crate::{ContactPixel, ContactPoint};
 use glamx::{Vec2, Vec3};
 
-/// Largest share of the roughness that a bowl may leave. A small flat face whose rim is bent by estimated normals is no
-/// bowl. Neither is a crease. Half: a ball of restitution 1 fails with each of 6 seeds instead of none; twice: no
-/// change.
-const UNEXPLAINED: f32 = 0.1;
+/// Largest share of the roughness that a bowl may leave: noise of a quarter of a radius leaves a third of a ball's. Half: a
+/// ball on new samples each frame fails with each of 6 seeds instead of none; twice: depths of boxes on ramps, exact now,
+/// are 0.02 mean radii off.
+const UNEXPLAINED: f32 = 0.5;
 
-/// The same of at least [`MANY`] points: noise of a quarter of a radius leaves a third of a ball's. Half: a ball on
-/// new samples each frame fails with each of 6 seeds instead of none; twice: depths of boxes on ramps, exact now, are
-/// 0.02 mean radii off.
-const UNEXPLAINED_OF_MANY: f32 = 0.5;
+/// The same of less than [`MANY`] points: a small flat face whose rim is bent by estimated normals is no bowl, nor is a
+/// crease. Half: a ball of restitution 1 fails with each of 6 seeds instead of none; twice: no change.
+const UNEXPLAINED_OF_FEW: f32 = 0.1;
 
-/// Number of points from which noise can be told from a rim or a crease. Half: no change; twice: a ball on new samples
-/// each frame fails with each of 6 seeds instead of none.
+/// Number of points from which noise can be told from a rim or a crease. 12: a ball on new samples each frame rolls up to
+/// 1.6 times as fast; twice: it fails with each of 6 seeds instead of none.
 const MANY: f32 = 30.0;
 
 /// Largest distance of a bowl's lowest point from the middle of the points, in standard deviations along each main
 /// axis. The rim of a disc is at 2. Half or twice: no change.
-const LOWEST: f32 = 1.5;
+const OUTERMOST: f32 = 1.5;
 
 /// Least ratio between the widening of a bowl along its two main axes, in standard deviations of its points. In these
 /// units, a whole bowl widens equally, however oblong it is. Along an edge, only noise widens. Half: no row changes;
 /// twice: a ball on new samples each frame fails with 2 of 6 seeds instead of none.
 const LEAST_ALIKE: f32 = 0.3;
 
-/// Fewest points of a bowl. It has five unknowns, so a bowl fits any five points, with its lowest point anywhere. Half
-/// or twice: no change.
-const LEAST_POINTS: f32 = 6.0;
+/// Fewest contact pixels that tell a shape. A bowl has five unknowns, so one fits any five points, with its lowest point
+/// anywhere. Fewer are not split either, and their support points are not moved inwards. Half or twice: no change.
+pub(crate) const LEAST_PIXELS: usize = 6;
 
 /// Least spread of the squares of places, as a share of that in a disc, and least part of it that the axes do not have
 /// in common. If places differ less, rounding decides the bend. Half or twice: no change.
-const LEAST_SPREAD: f32 = 0.02;
+const KNOWN_BEND: f32 = 0.02;
 
-/// Pixels that share their errors because they see the same points. Measured: the lowest points of a ball on a noisy
-/// plane vary 1.5 times as much as with independent pixels. Half: a ball on new samples each frame fails with 4 of 6
-/// seeds instead of none; twice: no change.
-const ALIKE: f32 = 2.4;
-
-/// Standard errors within which the lowest point of a bowl is taken to be. Half: a ball on new samples each frame fails
-/// with each of 6 seeds instead of none; twice: no change.
-const DOUBT: f32 = 2.0;
+/// Error of the slope of the gaps, for each metre by which they scatter about the means with their neighbours, over the root of
+/// their number: two standard errors; pixels that see the same points share theirs (the lowest points of a ball on a noisy plane
+/// vary 1.5 times as much as with independent pixels); and a gap is part of the mean. Half: a ball on new samples each frame
+/// fails with each of 6 seeds instead of none; twice: no change.
+const DOUBT: f32 = 3.3;
 
 /// Error of a bowl's lowest gap, for each metre of error in its slope: in a disc the root of 4, 1 for the mean and 3
 /// for the bend. Half: a ball on new samples each frame fails with 3 of 6 seeds instead of none; twice: no change.
 pub(crate) const GAP_PER_SLOPE: f32 = 2.0;
-
-/// Scatter of gaps about the means with their neighbours, in standard deviations of the errors of gaps: √(8 / 9), for a mean of
-/// nine. Half: no change; twice: a ball on new samples each frame fails with each of 6 seeds instead of none.
-const OFF_FIT: f32 = 0.94;
-
-/// Errors of gaps, in pixels, at which they begin to count as noise, and at which they fully do.
-/// Those of smooth surfaces are 0.01 to 0.04, those of samples with noise of a quarter of a radius
-/// 0.12 to 0.2. Both halved or doubled: no change in any suite.
-const NOISE: [f32; 2] = [0.04, 0.06];
 
 /// Largest ratio between the radii that normals and gaps tell. Beyond it, the normals are not those of the surface.
 /// Half or twice: no change.
@@ -118,9 +104,9 @@ impl Bowl {
             moment += height * bend;
         }
         let determinant = squares.x * squares.y - mixed * mixed;
-        let is_known = count >= LEAST_POINTS
-            && squares.min_element() > LEAST_SPREAD * count
-            && determinant > LEAST_SPREAD * squares.x * squares.y;
+        let is_known = count >= LEAST_PIXELS as f32
+            && squares.min_element() > KNOWN_BEND * count
+            && determinant > KNOWN_BEND * squares.x * squares.y;
         let widening = if is_known {
             let widening = Vec2::new(
                 moment.x * squares.y - moment.y * mixed,
@@ -138,19 +124,20 @@ impl Bowl {
         }
     }
 
+    /// Whether it explains most of the `roughness` about the plane.
+    pub(crate) fn explains_most(&self, roughness: f32) -> bool {
+        self.left < UNEXPLAINED * roughness
+    }
+
     /// The place of the lowest point, above a plane that rises by `slope` in a standard deviation of each place, and
     /// its height above the middle of the plane. `None` unless it is a bowl in both directions, lowest among its
     /// points, and most of the `roughness` about the plane.
     pub(crate) fn lowest(&self, slope: Vec2, roughness: f32) -> Option<(Vec2, f32)> {
         let place = -0.5 * slope / self.widening;
-        let unexplained = if self.count < MANY {
-            UNEXPLAINED
-        } else {
-            UNEXPLAINED_OF_MANY
-        };
-        let is_bowl = self.left < unexplained * roughness
+        let is_bowl = self.explains_most(roughness)
+            && (self.count >= MANY || self.left < UNEXPLAINED_OF_FEW * roughness)
             && self.widening.min_element() >= LEAST_ALIKE * self.widening.max_element()
-            && place.abs().max_element() <= LOWEST;
+            && place.abs().max_element() <= OUTERMOST;
         let above = slope.dot(place) + self.widening.dot(place * place - Vec2::ONE);
         is_bowl.then_some((place, above))
     }
@@ -162,7 +149,7 @@ impl Bowl {
         let place = -0.5 * slope[across] / bend;
         let is_valley = self.count >= MANY
             && self.widening[1 - across] < LEAST_ALIKE * bend
-            && place.abs() <= LOWEST;
+            && place.abs() <= OUTERMOST;
         is_valley.then_some(Valley {
             across,
             place,
@@ -177,14 +164,15 @@ impl Bowl {
 }
 
 /// Error of the slope of the gaps, metres over a standard deviation of the places. `off` says how far each gap is off
-/// the fit through its neighbours, metres. 0 where that is no noise, or too few gaps tell.
-pub(crate) fn slope_error(off: impl Iterator<Item = f32>, pixel_size: f32) -> f32 {
+/// the fit through its neighbours, metres; smooth surfaces are off by less than `smooth`. 0 where that is no noise, or too
+/// few gaps tell.
+pub(crate) fn slope_error(off: impl Iterator<Item = f32>, smooth: f32) -> f32 {
     let (squares, count) = off.fold((0.0, 0.0), |(sum, n), off| (sum + off * off, n + 1.0));
     if count < MANY {
         return 0.0;
     }
-    let noise = (squares / count).sqrt() / OFF_FIT;
-    DOUBT * ramp(noise / pixel_size, NOISE) * noise * (ALIKE / count).sqrt()
+    let variance = (squares / count - smooth * smooth).max(0.0);
+    DOUBT * (variance / count).sqrt()
 }
 
 /// Relative radius of curvature along `radius`, from how the normals turn: a vector, metres. Second: share (0 to 1) of the
@@ -311,12 +299,10 @@ mod tests {
         let mut off = |sigma: f32, count: usize| -> Vec<f32> {
             (0..count).map(|_| sigma * normal(&mut rng)).collect()
         };
-        assert_eq!(slope_error(off(0.03, 60).into_iter(), 1.0), 0.0);
-        assert_eq!(slope_error(off(0.2, 20).into_iter(), 1.0), 0.0);
-        let error = slope_error(off(0.2, 60).into_iter(), 1.0);
-        let expected = DOUBT * 0.2 / OFF_FIT * (ALIKE / 60.0).sqrt();
+        assert_eq!(slope_error(off(0.03, 60).into_iter(), 0.05), 0.0);
+        assert_eq!(slope_error(off(0.2, 20).into_iter(), 0.05), 0.0);
+        let error = slope_error(off(0.2, 60).into_iter(), 0.05);
+        let expected = DOUBT * 0.2 / 60.0_f32.sqrt();
         assert!((error / expected - 1.0).abs() < 0.3, "{error} {expected}");
-        let scaled = slope_error(off(0.002, 60).into_iter(), 0.01);
-        assert!((100.0 * scaled / expected - 1.0).abs() < 0.3, "{scaled}");
     }
 }

@@ -25,11 +25,11 @@ const NEAR_FACE: f32 = 0.3;
 const OF_FACE: f32 = 0.15;
 
 /// Least share of the pixels that a face needs. And the share of the pixels of all faces at which faces begin to explain the
-/// contact, and at which they fully do. Noise has normals of all kinds. `LEAST_SHARE`: none: bodies in corners of a tray
+/// contact, and at which they fully do. Noise has normals of all kinds. `LEAST_FACE`: none: bodies in corners of a tray
 /// have contacts that are 2 to 10 r̄ too deep; twice: bare sharp corners are 0.05 r̄ off in place of 0.02. `OF_FACES`:
 /// halved: corners rounded by r̄ scatter by 0.34 r̄ in place of 0.20, bare sharp ones are 28 % better; doubled: depths of
 /// edges 2 to 10 times as wrong.
-const LEAST_SHARE: f32 = 0.025;
+const LEAST_FACE: f32 = 0.025;
 const OF_FACES: [f32; 2] = [0.4, 0.6];
 
 /// Height in pixels of the lowest pixel above all faces at which faces begin to fail as an
@@ -40,7 +40,7 @@ const ROUND: [f32; 2] = [0.1, 0.25];
 /// Distance in pixels from where faces meet to the nearest pixel at which faces begin to fail as an explanation, and at which
 /// they do fail: half the diagonal of a pixel, and half more. Faces that meet where the surfaces do not are those of noise.
 /// Half: bare sharp corners are 0.16 r̄ off in place of 0.02; twice: a cast meets the edge of a turning bar 0.7 r̄ early.
-const BESIDE: [f32; 2] = [0.71, 1.06];
+const OFF_VERTEX: [f32; 2] = [0.71, 1.06];
 
 /// The gap over a face, in metres, at a place on the plane of a contact: `at_origin + slope · place`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -57,14 +57,14 @@ impl Face {
 }
 
 /// The plane of a contact.
-pub(crate) struct Frame {
+pub(crate) struct ContactPlane {
     pub(crate) origin: Vec3,
     /// Unit vectors.
     pub(crate) axes: [Vec3; 2],
     pub(crate) normal: Vec3,
 }
 
-impl Frame {
+impl ContactPlane {
     fn place(&self, point: Vec3) -> Vec2 {
         let off = point - self.origin;
         Vec2::new(off.dot(self.axes[0]), off.dot(self.axes[1]))
@@ -98,26 +98,26 @@ impl Frame {
 /// negative: above. `tangents` is overwritten.
 pub(crate) fn lower_by<'a>(
     pixels: impl Iterator<Item = &'a ContactPixel> + Clone,
-    frame: &Frame,
+    plane: &ContactPlane,
     deepest_gap: f32,
     pixel_size: f32,
     tangents: &mut Vec<Face>,
 ) -> f32 {
     tangents.clear();
-    let all = pixels.clone().map(|contact| frame.face(contact));
+    let all = pixels.clone().map(|contact| plane.face(contact));
     tangents.extend(all.filter(|face| face.slope.is_finite()));
     let faces = faces(tangents);
-    let gap = |contact: &&ContactPixel| frame.gap(contact);
+    let gap = |contact: &&ContactPixel| plane.gap(contact);
     let Some(lowest) = pixels.clone().min_by(|m, n| gap(m).total_cmp(&gap(n))) else {
         return 0.0;
     };
-    let (place, slope) = (frame.place(lowest.middle()), frame.face(lowest).slope);
+    let (place, slope) = (plane.place(lowest.middle()), plane.face(lowest).slope);
     let Some(vertex) = Vertex::of(&faces, place, slope) else {
         return 0.0;
     };
     let faces_there = vertex.faces.iter().map(|face| face.at(place));
-    let above = frame.gap(lowest) - faces_there.fold(f32::NEG_INFINITY, f32::max);
-    let beside = |contact: &ContactPixel| frame.place(contact.middle()).distance(vertex.place);
+    let above = plane.gap(lowest) - faces_there.fold(f32::NEG_INFINITY, f32::max);
+    let beside = |contact: &ContactPixel| plane.place(contact.middle()).distance(vertex.place);
     let (count, beside) = pixels.fold((0.0, f32::INFINITY), |(count, nearest), contact| {
         (count + 1.0, beside(contact).min(nearest))
     });
@@ -125,7 +125,7 @@ pub(crate) fn lower_by<'a>(
     let sure = ramp(vertex.apart, APART)
         * ramp(of_faces / count, OF_FACES)
         * (1.0 - ramp(above / pixel_size, ROUND))
-        * (1.0 - ramp(beside / pixel_size, BESIDE));
+        * (1.0 - ramp(beside / pixel_size, OFF_VERTEX));
     sure * (deepest_gap - vertex.gap)
 }
 
@@ -175,7 +175,7 @@ fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_FACES> {
         let near = around(around(seed, NEAR_FACE).slope, NEAR_FACE);
         let face = around(near.slope, OF_FACE);
         let is_new = |known: &Face| known.slope.distance(face.slope) >= APART[0];
-        if face.pixels > LEAST_SHARE * count && faces.iter().all(is_new) {
+        if face.pixels > LEAST_FACE * count && faces.iter().all(is_new) {
             faces.push(face);
         }
     }
@@ -271,12 +271,12 @@ mod tests {
         let lowest = |m: &&ContactPixel, n: &&ContactPixel| m.point_b.y.total_cmp(&n.point_b.y);
         let lowest = pixels.iter().min_by(lowest).expect("there are some");
         let deepest_gap = lowest.point_b.y + 0.3;
-        let frame = Frame {
+        let plane = ContactPlane {
             origin: Vec3::new(0.2, 0.0, -0.1),
             axes: [Vec3::X, -Vec3::Z],
             normal: Vec3::Y,
         };
-        deepest_gap - lower_by(pixels.iter(), &frame, deepest_gap, 1.0, &mut vec![])
+        deepest_gap - lower_by(pixels.iter(), &plane, deepest_gap, 1.0, &mut vec![])
     }
 
     /// The highest of planes through one place, and its slope.

@@ -1,9 +1,10 @@
 //! A part of a contact: its normal, its main direction, and the few points that stand for it.
 
-use crate::contact::bowl::{Floor, GAP_PER_SLOPE, Lowest, relative_radius, slope_error};
-use crate::contact::crease::{Face, Frame, lower_by};
+use crate::contact::bowl::{
+    Floor, GAP_PER_SLOPE, LEAST_PIXELS, Lowest, relative_radius, slope_error,
+};
+use crate::contact::crease::{ContactPlane, Face, lower_by};
 use crate::contact::links::Links;
-use crate::contact::main_plane::LEAST_PLANE;
 use crate::contact::point_axes::longest_axis;
 use crate::contact::smooth::{Smooth, common_normal};
 use crate::contact::supports::{Supports, supports};
@@ -13,7 +14,7 @@ use glamx::Vec3;
 /// A surface's normal averaged over linked neighbours that is shorter than this (a spread of 26°) is a mean over a
 /// crease, which says nothing of a bend. Half or twice the rest to 1: no change. Without it, a ball in a groove fails
 /// with 3 of 24 seeds instead of none.
-const CREASED: f32 = 0.9;
+const OVER_CREASE: f32 = 0.9;
 
 /// Band above the smallest gap, in pixels (r̄), whose pixels shape the normal and tell the faces at an edge. For the normal,
 /// half: 9 % worse; twice: 14 % better, no more stability rows fail, but depths of deep edges are twice as wrong. For the
@@ -26,21 +27,18 @@ const NORMAL_BAND: f32 = 2.0;
 /// Half: 27 of 636 stability rows fail instead of 3, most of balls; twice: depths 20 % worse.
 const SUPPORT_BAND: f32 = 1.0;
 
-/// The gaps of a patch are taken to be at least this rough, in pixels: below, extent alone chooses the support points.
-/// Half: no change; twice: depths 14 % worse, and a bunny on new samples each frame fails with each of 6 seeds instead
-/// of one.
+/// What gaps of smooth surfaces scatter by at most, in pixels. Less is neither a bend nor noise, and the deepest point is a mean
+/// over as much. Half: no change; twice: depths 14 % worse, and a bunny on new samples each frame fails with each of 6
+/// seeds instead of one.
 const LEAST_ROUGHNESS: f32 = 0.05;
 
-/// Band above the smallest gap, in pixels, over which the deepest point is a mean. Half or twice: no change. With the
-/// lowest pixel instead, a bunny on new samples each frame fails with 3 of 24 seeds more.
-const DEEPEST_BAND: f32 = 0.1;
-
-/// How much deeper than the support points that point must be to count, in units of the roughness. On flat faces the
-/// difference is noise, and four corners carry more than three. Half: no change; twice: a ball in a groove fails with
-/// each of 6 seeds instead of none.
+/// How much deeper than the support points the deepest point must be to count, in units of the roughness and, below a flat
+/// contact, in pixels as well. By so much are support points moved onto the plane of a flat contact: normals that were
+/// estimated bend the rims of faces as far, and four corners carry more than three. Half: a box on new samples each frame
+/// fails with each of 6 seeds instead of none; twice: a ball in a groove fails with each of 6 seeds instead of none.
 const DEEPER: f32 = 0.4;
 
-/// Roughness above which a bend of the surfaces counts, as a share of the band of gaps that is seen: [`SUPPORT_BAND`], or
+/// Roughness up to which a contact counts as flat, as a share of the band of gaps that is seen: [`SUPPORT_BAND`], or
 /// what of it is no farther apart than surfaces are seen; at least [`LEAST_ROUGHNESS`]. Gaps that rise through all of it,
 /// as around a ball's contact, deviate from a plane by 0.29; those of a small face whose rim is blurred by estimated
 /// normals by 0.1.
@@ -50,11 +48,6 @@ const LEAST_RISE: f32 = 0.15;
 /// Share of the variance of normals across a valley that a steady turn explains at least. Measured: 0.98 and more of
 /// cylinders, 0.52 to 0.97 of two faces that meet at an edge. Half or twice the rest to 1: no row changes.
 const STEADY: f32 = 0.9;
-
-/// Largest distance from its plane, in pixels, at which a point of a flat contact is moved onto it: what estimated
-/// normals make of the rims of two faces. A lower point is a bump under the face. Half: a box on new samples each frame
-/// fails with each of 6 seeds instead of none; twice: no change.
-const OFF_PLANE: f32 = 0.4;
 
 /// Normal and main direction of a part.
 pub(crate) struct Shape {
@@ -156,26 +149,27 @@ impl Shape {
         let in_band = part.in_band();
         points.clear();
         points.extend(in_band.map(|(contact, smooth)| self.point(contact.middle(), smooth.gap)));
-        let noise = LEAST_ROUGHNESS * params.pixel_size;
-        let supports = supports(points, self.normal, noise);
         let band = SUPPORT_BAND * params.pixel_size;
         let seen = (params.seen_gap().max(band) - self.least_gap).clamp(0.0, band);
-        let rises = supports.roughness >= noise.max(LEAST_RISE * seen);
+        let smooth = LEAST_ROUGHNESS * params.pixel_size;
+        let supports = supports(points, self.normal, smooth);
+        if supports.roughness < smooth.max(LEAST_RISE * seen) {
+            return part.on_supports(supports, false, points, tangents);
+        }
         let roughness = supports.roughness_about_bowl;
-        if rises && let Some(lowest) = &supports.lowest_of_bowl {
+        if let Some(lowest) = &supports.lowest_of_bowl {
             return part.on_bowl(lowest, roughness, tangents);
         }
-        let valley = supports.floor_of_valley.filter(|_| rises);
-        valley
-            .and_then(|floor| part.on_valley(floor, roughness))
-            .unwrap_or_else(|| part.on_supports(supports, rises, points, tangents))
+        let valley = supports.floor_of_valley;
+        let on_valley = valley.and_then(|floor| part.on_valley(floor, roughness));
+        on_valley.unwrap_or_else(|| part.on_supports(supports, true, points, tangents))
     }
 
     /// Mean of the points with the smallest gaps.
     fn deepest(&self, points: &[ContactPoint], pixel_size: f32) -> ContactPoint {
         let (mut middle, mut gap, mut total) = (Vec3::ZERO, 0.0, 0.0);
         for point in points {
-            let w = falloff(point.gap - self.least_gap, DEEPEST_BAND * pixel_size);
+            let w = falloff(point.gap - self.least_gap, LEAST_ROUGHNESS * pixel_size);
             middle += w * point.middle();
             gap += w * point.gap;
             total += w;
@@ -222,7 +216,7 @@ impl Part<'_> {
             longest,
             ..
         } = *self.shape;
-        let frame = Frame {
+        let plane = ContactPlane {
             origin: centre,
             axes: [longest, normal.cross(longest)],
             normal,
@@ -233,7 +227,7 @@ impl Part<'_> {
         let highest = self.shape.least_gap + NORMAL_BAND * self.pixel_size;
         let members = (self.members.iter()).filter(|&&m| smooth[m as usize].gap <= highest);
         let pixels = members.map(|&m| &contacts[m as usize]);
-        lower_by(pixels, &frame, lowest_gap, self.pixel_size, tangents)
+        lower_by(pixels, &plane, lowest_gap, self.pixel_size, tangents)
     }
 
     /// The lowest point of a bowl. Around it the surfaces have other normals: points there would stop what rolls. Where noise
@@ -246,7 +240,7 @@ impl Part<'_> {
             radii,
         } = lowest;
         let off_fit = (self.in_band()).map(|(contact, smooth)| contact.gap - smooth.gap);
-        let slope_error = slope_error(off_fit, self.pixel_size);
+        let slope_error = slope_error(off_fit, LEAST_ROUGHNESS * self.pixel_size);
         let relative = |radius| relative_radius(radius, shape.centre, self.contacts_in_band()).0;
         let relative_radii = radii.map(relative);
         let point = shape.point(point.middle(), point.gap - self.lower(point.gap, tangents));
@@ -286,25 +280,21 @@ impl Part<'_> {
     ) -> ContactPatch {
         let shape = self.shape;
         let roughness = supports.roughness_about_bowl;
-        // Chosen for being low, they are lower than the plane of a flat contact by what its gaps scatter by.
-        // What bends, or is rougher than that, is as low as it is, but for the rim of a flat contact.
+        // Where the gaps do not rise, or but for the rim of a face, contacts lie on a plane: chosen for being low, the points
+        // are lower by what gaps scatter by, or by what rims are bent.
+        let flatness = if rises { supports.flatness } else { 1.0 };
         let scatter = if rises { 0.0 } else { roughness };
-        let off_plane = OFF_PLANE * self.pixel_size;
-        let scatter = scatter + supports.flatness * (off_plane - scatter).max(0.0);
+        let bent = DEEPER * self.pixel_size;
+        let off_plane = scatter.max(supports.flatness * bent);
         // A pixel at the rim of a cloud's face stands out beyond its points, by half a pixel on average. The mean of it
         // and its linked neighbours is as far inwards, at a corner, too, and does not move pixels within.
-        let inwards = if !self.pixels.end_in_discs || points.len() < LEAST_PLANE {
-            0.0
-        } else if rises {
-            supports.flatness
-        } else {
-            1.0
-        };
+        let is_face = self.pixels.end_in_discs && points.len() >= LEAST_PIXELS;
+        let inwards = if is_face { flatness } else { 0.0 };
         let in_plane = |(k, above): (usize, f32)| {
             let point = points[k];
             let off = self.mean_around(k, point.middle()) - point.middle();
             let aside = inwards * off.reject_from_normalized(shape.normal);
-            let gap = point.gap - above.clamp(-scatter, scatter) + supports.slope.dot(aside);
+            let gap = point.gap - above.clamp(-off_plane, off_plane);
             shape.point(point.middle() + aside, gap)
         };
         let chosen = supports.indices.into_iter().zip(supports.above_plane);
@@ -316,9 +306,7 @@ impl Part<'_> {
         };
         patch.points.sort_by(|p, q| p.gap.total_cmp(&q.gap));
         let deepest = shape.deepest(points, self.pixel_size);
-        // Where the gaps do not rise only a bump under the face counts.
-        let of_rims = if rises { supports.flatness } else { 1.0 } * off_plane;
-        let deeper = DEEPER * supports.roughness + of_rims;
+        let deeper = DEEPER * supports.roughness + flatness * bent;
         if deepest.gap < patch.points[0].gap - deeper {
             patch.points.truncate(PATCH_POINTS - 1);
             patch.points.insert(0, deepest);
@@ -358,7 +346,7 @@ fn normal_length(members: &[u32], smooth: &[Smooth]) -> f32 {
     let (sum, count) = members
         .iter()
         .map(|&m| &smooth[m as usize])
-        .filter(|s| s.normal_a.length().min(s.normal_b.length()) >= CREASED)
+        .filter(|s| s.normal_a.length().min(s.normal_b.length()) >= OVER_CREASE)
         .fold((Vec3::ZERO, 0), |(sum, n), s| (sum + s.normal, n + 1));
     match count {
         0 => 1.0,

@@ -4,10 +4,10 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
+use crate::contact::bowl::LEAST_PIXELS;
 use crate::contact::gap_fit::GapFit;
 use crate::contact::links::{Groups, Links, find_roots};
 use crate::contact::lone_points::LonePoints;
-use crate::contact::main_plane::LEAST_PLANE;
 use crate::contact::neighbors::Culled;
 use crate::contact::noise::allow_for_noise;
 use crate::contact::part_shape::{Pixels, Shape, ShapeScratch};
@@ -30,7 +30,7 @@ const SAME_GROUP: f32 = 0.866;
 
 /// A part whose pixels' unit normals have a mean shorter than this (a spread of about 14°) is split. Half or twice the
 /// rest to 1: no change.
-const FLAT: f32 = 0.97;
+const SPLIT_BELOW: f32 = 0.97;
 
 /// Splits in a row: at most eight parts a group. Half or twice: no change.
 const MAX_SPLITS: u32 = 3;
@@ -53,7 +53,7 @@ pub struct PatchScratch {
     smooth: Vec<Smooth>,
     groups: Groups,
     stack: Vec<(usize, usize, u32)>,
-    parts: Vec<Part>,
+    parts: Vec<GroupPart>,
     /// Members of the parts of one patch, and of one of its groups.
     patch: Vec<u32>,
     spot: Vec<u32>,
@@ -64,7 +64,7 @@ pub struct PatchScratch {
 
 /// Some of the members, and what decides which patch they belong to.
 #[derive(Debug)]
-struct Part {
+struct GroupPart {
     members: Range<usize>,
     normal: Vec3,
     least_gap: f32,
@@ -169,7 +169,10 @@ impl PatchScratch {
         while let Some((start, end, splits)) = self.stack.pop() {
             let members = &mut self.groups.members[start..end];
             let shape = Shape::of(members, contacts, &self.smooth, params);
-            if splits < MAX_SPLITS && members.len() >= LEAST_PLANE && shape.normal_length < FLAT {
+            if splits < MAX_SPLITS
+                && members.len() >= LEAST_PIXELS
+                && shape.normal_length < SPLIT_BELOW
+            {
                 let middle = shape.split(members, contacts);
                 if middle > 0 && middle < members.len() {
                     self.stack.push((start, start + middle, splits + 1));
@@ -180,7 +183,7 @@ impl PatchScratch {
             if !members.iter().any(|&m| is_reported(&contacts[m as usize])) {
                 continue;
             }
-            self.parts.push(Part {
+            self.parts.push(GroupPart {
                 members: start..end,
                 normal: shape.normal,
                 least_gap: shape.least_gap,

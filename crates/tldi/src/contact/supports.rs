@@ -17,8 +17,6 @@ pub(crate) struct Supports {
     /// Their gaps, in metres, about the plane that fits all gaps best. The flatter the gaps are,
     /// the more it is the plane on which most of them lie.
     pub(crate) above_plane: ArrayVec<f32, PATCH_POINTS>,
-    /// How steeply the gaps of that plane rise along the surface, metres per metre; 0 across points in a row.
-    pub(crate) slope: Vec3,
     /// 1 if so many gaps lie on one plane that the others count as errors, as at the rim of a face
     /// with estimated normals. 0 if the gaps bend, or too few are on any plane.
     pub(crate) flatness: f32,
@@ -39,11 +37,7 @@ pub(crate) struct Supports {
 /// chosen in all directions. On a flat face it does not count: a low point in the middle of an edge would take the
 /// place of both corners, and the body tip over the third. Half: a bunny on new samples each frame fails with 5 of 6
 /// seeds instead of one; twice: no change.
-const LOWEST: f32 = 2.5;
-
-/// Least extent across, as a share of that along, of points that tell how steeply their gaps rise across. Half or
-/// twice: no change.
-const LEAST_KNOWN_WIDTH: f32 = 0.1;
+const MOST_LOW: f32 = 2.5;
 
 /// Share of points on one plane at which gaps begin to count as flat, and at which they fully do.
 /// Measured: faces of 10 × 10 points have 0.6 on a plane and 0.43 on each other, where their rims
@@ -51,22 +45,14 @@ const LEAST_KNOWN_WIDTH: f32 = 0.1;
 /// are 0.02 mean radii off.
 const FLAT: [f32; 2] = [0.35, 0.5];
 
-/// The same for the share of the roughness that a bowl leaves. The gaps of a slightly bent surface
-/// are all near a plane, too. Both halved or doubled: no change in any suite.
-const UNBENT: [f32; 2] = [0.3, 0.5];
-
-/// Roughness, in units of the least roughness, up to which there is no bend, and from which there
-/// may be one. Both halved or doubled: no change in any suite.
-const SMOOTH: [f32; 2] = [0.5, 1.0];
-
 /// Which of `points`, on one plane with the unit normal `normal`, a body would rest on. Each of four directions gives
-/// the point that is farthest out and lowest: one standard deviation of extent counts as much as √2 of roughness,
-/// which is at least `least_roughness` metres. The directions lead to the corners: they are those in which the points
-/// reach out farthest if their extents along both main axes are made equal.
+/// the point that is farthest out and lowest: one standard deviation of extent counts as much as √2 of roughness, which
+/// is at least `smooth` metres. The directions lead to the
+/// corners: they are those in which the points reach out farthest if their extents along both main axes are made equal.
 ///
 /// Heights are measured from the plane that fits the gaps. So the choice does not depend on the
 /// tilt of the body, and a lifted edge remains. Cost: linear in points.
-pub(crate) fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f32) -> Supports {
+pub(crate) fn supports(points: &[ContactPoint], normal: Vec3, smooth: f32) -> Supports {
     let axes = MainAxes::of(points, normal);
     let count = points.len() as f32;
     let heights = || points.iter().map(|p| (axes.place(p), p.gap));
@@ -75,42 +61,29 @@ pub(crate) fn supports(points: &[ContactPoint], normal: Vec3, least_roughness: f
     let slope = heights().map(|(place, gap)| (gap - mean_gap) * place);
     let slope = slope.sum::<Vec2>() / count;
     let plane = GapPlane::new(mean_gap, slope);
-    let residuals = || heights().map(|(place, gap)| (place, plane.residual((place, gap))));
+    let residuals = || heights().map(|height| (height.0, plane.residual(height)));
     let squares = residuals().map(|(_, off)| off.powi(2)).sum::<f32>();
-    // A perfectly flat patch has none, by which nothing can be divided.
-    let least = least_roughness.max(f32::MIN_POSITIVE);
     let roughness = (squares / count).sqrt();
     let bowl = Bowl::fit(residuals(), count);
-    let unbent = ramp(bowl.left / roughness.max(least), UNBENT);
-    let unbent = unbent.max(1.0 - ramp(roughness / least, SMOOTH));
-    let (main_plane, flatness) = if unbent > 0.0 {
-        let (main_plane, share) = plane.of_most(heights(), roughness, least);
-        let flatness = unbent * ramp(share, FLAT);
-        (plane.lerp(main_plane, flatness), flatness)
-    } else {
-        (plane, 0.0)
-    };
+    // A perfectly flat patch has none, by which nothing can be divided.
+    let smooth = smooth.max(f32::MIN_POSITIVE);
+    let (main_plane, share) = plane.of_most(heights(), roughness, smooth);
+    let is_bent = roughness > smooth && bowl.explains_most(roughness);
+    let flatness = if is_bent { 0.0 } else { ramp(share, FLAT) };
+    let main_plane = plane.lerp(main_plane, flatness);
     let above_plane = |height| main_plane.residual(height);
-    let lows = heights().map(|height| {
-        let low = -above_plane(height) / roughness.max(least);
-        (height.0, low.min((1.0 - flatness) * LOWEST))
-    });
+    let most = (1.0 - flatness) * MOST_LOW;
+    let low = |height| (-above_plane(height) / roughness.max(smooth)).min(most);
+    let lows = heights().map(|height| (height.0, low(height)));
     let stretch = (axes.sigma.x / axes.sigma.y).sqrt();
     let indices = farthest_out(lows, Vec2::new(stretch, stretch.recip()));
     let [longest, across] = axes.axes;
-    let slopes = main_plane.slopes() / axes.sigma;
-    let known_across = if axes.sigma.y > LEAST_KNOWN_WIDTH * axes.sigma.x {
-        across
-    } else {
-        Vec3::ZERO
-    };
     Supports {
-        slope: slopes.x * longest + slopes.y * known_across,
         above_plane: (indices.iter())
             .map(|&k| above_plane((axes.place(&points[k]), points[k].gap)))
             .collect(),
-        flatness,
         indices,
+        flatness,
         roughness,
         roughness_about_bowl: bowl.left.min(roughness),
         lowest_of_bowl: bowl.lowest(slope, roughness).map(|(place, above)| {
@@ -308,19 +281,16 @@ mod tests {
     /// supports tell so; what bends is not flat, along one axis neither.
     #[test]
     fn faces_are_flat_in_spite_of_their_rims() {
-        let points_of = |gap: &dyn Fn(Vec2) -> f32| -> Vec<ContactPoint> {
-            (0..144)
-                .map(|k| Vec2::new((k % 12) as f32 - 5.5, (k / 12) as f32 - 5.5))
-                .map(|p| point(Vec3::new(p.x, 0.0, p.y), gap(p)))
-                .collect()
-        };
         let tilt = |p: Vec3| 0.02 * p.x - 0.01 * p.z;
-        let rim = |p: Vec2| match p {
-            _ if p.max_element() > 5.0 => 0.7,
-            _ if p.min_element() < -5.0 => -0.25,
+        let rim = |p: Vec3| match p.x.max(p.z) {
+            most if most > 5.0 => 0.7,
+            _ if p.x.min(p.z) < -5.0 => -0.25,
             _ => 0.0,
         };
-        let face = points_of(&|p| tilt(Vec3::new(p.x, 0.0, p.y)) + rim(p));
+        let face: Vec<ContactPoint> = (0..144)
+            .map(|k| Vec3::new((k % 12) as f32 - 5.5, 0.0, (k / 12) as f32 - 5.5))
+            .map(|p| point(p, tilt(p) + rim(p)))
+            .collect();
         let found = supports(&face, Vec3::Y, 0.05);
         assert_eq!(found.flatness, 1.0);
         for (&k, above) in found.indices.iter().zip(&found.above_plane) {
@@ -328,19 +298,32 @@ mod tests {
             let off = face[k].gap - above - tilt(face[k].middle());
             assert!(off.abs() < 0.05, "{off}");
         }
-        // Not even half as rough as what counts, whatever a bowl explains of it.
-        let faint = points_of(&|p| 0.02 * (p.x / 5.5).powi(2) - 0.02 * (p.y / 5.5).powi(4));
-        let found = supports(&faint, Vec3::Y, 0.05);
-        assert_eq!(found.flatness, 1.0);
-        for &k in &found.indices {
-            let middle = faint[k].middle().abs();
-            assert!(middle.x.min(middle.z) > 5.0, "{middle} is no corner");
-        }
         // So shallow that most of their gaps are within 0.1 of a plane.
-        let cylinder = |p: Vec2| (p.x / 12.0).powi(2);
-        let ball = |p: Vec2| (p / 12.0).length_squared();
-        for bent in [points_of(&cylinder), points_of(&ball)] {
+        let cylinder = |p: Vec3| (p.x / 12.0).powi(2);
+        let ball = |p: Vec3| (p / 12.0).length_squared();
+        for bend in [cylinder, ball] {
+            let bent = face.iter().map(ContactPoint::middle);
+            let bent: Vec<ContactPoint> = bent
+                .map(|p| p.with_y(0.0))
+                .map(|p| point(p, bend(p)))
+                .collect();
             assert_eq!(supports(&bent, Vec3::Y, 0.05).flatness, 0.0);
+        }
+    }
+
+    /// A face whose gaps bend by less than they may be rough stands on its corners.
+    #[test]
+    fn faint_bends_leave_the_corners() {
+        let points: Vec<ContactPoint> = (0..144)
+            .map(|k| Vec2::new((k % 12) as f32 - 5.5, (k / 12) as f32 - 5.5))
+            .map(|p| {
+                let gap = 0.02 * (p.x / 5.5).powi(2) - 0.02 * (p.y / 5.5).powi(4);
+                point(Vec3::new(p.x, 0.0, p.y), gap)
+            })
+            .collect();
+        for k in supports(&points, Vec3::Y, 0.05).indices {
+            let middle = points[k].middle().abs();
+            assert!(middle.x.min(middle.z) > 5.0, "{middle} is no corner");
         }
     }
 

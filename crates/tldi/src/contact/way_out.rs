@@ -12,7 +12,7 @@ use arrayvec::ArrayVec;
 /// The share of a contact's depth by which another view must see the surfaces overlap for the contact to count: along
 /// an axis 60° from the way out an overlap seems twice as deep as it is. Half: 5 of 300 overlaps are falsely deep
 /// instead of 4; twice: no row changes.
-const LEAST_SHARE: f32 = 0.5;
+const LEAST_ELSEWHERE: f32 = 0.5;
 
 /// Most places along a contact's ray that are looked up in another view, so that the cost does not grow with the depth.
 /// With 4, twice as many clouds with normals are told to be much too deep. Half or twice: no row changes.
@@ -84,7 +84,7 @@ fn is_less_elsewhere(
         there.into_iter().any(|c| {
             let [a, b] = [c.point_a, c.point_b].map(|p| camera.view_from_point(p).z);
             let reaches = a.min(b) - params.thickness..=a.max(b) + params.thickness;
-            c.gap > LEAST_SHARE * contact.gap && reaches.contains(&at.z)
+            c.gap > LEAST_ELSEWHERE * contact.gap && reaches.contains(&at.z)
         })
     })
 }

@@ -64,7 +64,7 @@ pub(crate) const CONSTANTS: [(&str, f64); 4] = [
 ];
 
 /// From a pixel to those around it.
-const NEIGHBORS: [[i32; 2]; 8] = [
+const AROUND: [[i32; 2]; 8] = [
     [-1, -1],
     [0, -1],
     [1, -1],
@@ -157,7 +157,7 @@ fn is_on_both_sides(
     };
     let beside = BESIDE * across.length();
     [across, -across].into_iter().all(|side| {
-        NEIGHBORS
+        AROUND
             .into_iter()
             .filter(|&[di, dj]| side.dot(Vec2::new(di as f32, dj as f32)) >= beside)
             .any(goes_on)

@@ -18,11 +18,11 @@ const DESCENT_STEPS: usize = 4;
 
 /// Sine of the angle between a disc and a surface below which they are taken to be parallel. Half or twice: no test
 /// of queries fails.
-const FLAT: f32 = 1e-3;
+const LEAST_SINE: f32 = 1e-3;
 
 /// Share of its radius by which a disc may seem to miss a surface without inside that it meets, by rounding. Half
 /// or twice: no test of queries fails.
-const ROUNDING: f32 = 1e-3;
+const RIM_ROUNDING: f32 = 1e-3;
 
 /// Points in which two surfaces are nearest to each other, in the frame of the target.
 #[derive(Clone, Copy, Debug)]
@@ -266,7 +266,7 @@ impl Target for ExactTarget<'_> {
         for _ in 0..DESCENT_STEPS {
             let uphill = normal - normal.dot(disc.normal) * disc.normal;
             let sine = uphill.length();
-            if distance <= 0.0 || sine < FLAT || disc.reach == 0.0 {
+            if distance <= 0.0 || sine < LEAST_SINE || disc.reach == 0.0 {
                 break;
             }
             // To where the tangent plane of the surface is met, or to the rim; a surface that bends
@@ -283,7 +283,7 @@ impl Target for ExactTarget<'_> {
             };
             (at, (distance, normal)) = (next, projection);
         }
-        if distance <= ROUNDING * disc.reach {
+        if distance <= RIM_ROUNDING * disc.reach {
             distance = 0.0;
         }
         Some(Nearest {

@@ -11,7 +11,7 @@ use tldi::RayHit;
 
 /// Part of a mesh's size by which boxes are grown against rounding in `f32`. Half or twice: no test of shapes or
 /// queries fails.
-const ROUNDING: f64 = 1e-6;
+const BOX_ROUNDING: f64 = 1e-6;
 
 /// Cosine of the angle between a face's normal and the way to a point beyond which the point is straight above the face:
 /// the rounding of an `f64` half a million times. A tenth of that, or ten times: no test of shapes fails.
@@ -22,7 +22,7 @@ const NOTHING: f64 = 1e-12;
 
 /// By how much boxes are grown for a mesh or height field with these bounds, metres.
 fn margin_of(bounds: &Aabb) -> f64 {
-    ROUNDING * f64::from(bounds.mins.abs().max(bounds.maxs.abs()).max_element())
+    BOX_ROUNDING * f64::from(bounds.mins.abs().max(bounds.maxs.abs()).max_element())
 }
 
 pub(super) fn cross_triangle(shape: &Triangle, line: &Line, hits: &mut Vec<RayHit>) {
@@ -93,7 +93,7 @@ pub(super) fn project_on_trimesh(mesh: &TriMesh, point: DVec3) -> Projection {
     if height.abs() > STRAIGHT * delta.length() && delta.length() > NOTHING * point.length() {
         return signed(point, foot, [normal]);
     }
-    let margin = ROUNDING * foot.abs().max_element();
+    let margin = BOX_ROUNDING * foot.abs().max_element();
     let touches = |node: &BvhNode| outside(&node.aabb(), foot).max_element() <= margin;
     let normals = mesh.bvh().leaves(touches).filter_map(|id| {
         let vertices = triangle::vertices(&mesh.triangle(id));

@@ -11,7 +11,7 @@ use tldi::RaySurface;
 
 /// Vector areas of a mesh without gaps sum up to nothing. Up to this part of its area counts as nothing:
 /// small holes do not open it. Half or twice: no row of `overlaps` changes.
-const OPEN: f64 = 0.01;
+const OPEN_MESH: f64 = 0.01;
 
 /// How far the box about a curved solid is from it, in parts of its size: far enough to tell directions.
 /// Half or twice: 3 of 300 overlaps are falsely deep instead of 4.
@@ -23,7 +23,7 @@ const INSIDE: f32 = 1e-6;
 
 /// Distance to another part of a compound, in parts of its size, that counts as none. Half: no test fails; twice:
 /// that of samples, which must be even and close the surface.
-const TOUCHING: f32 = 1e-5;
+const SAME_PLACE: f32 = 1e-5;
 
 /// A piece of a surface: the image of a triangle under a map that lengthens nothing.
 pub(super) struct Patch<'a> {
@@ -147,7 +147,7 @@ fn flat<'a>(
 fn outside(triangles: &[[Vec3; 3]]) -> f64 {
     let areas = || triangles.iter().map(vector_area);
     let area: f64 = areas().map(DVec3::length).sum();
-    if areas().sum::<DVec3>().length() > OPEN * area {
+    if areas().sum::<DVec3>().length() > OPEN_MESH * area {
         return 1.0;
     }
     let middle = triangles
@@ -215,7 +215,7 @@ pub(super) fn hidden_around(
         if !surface.is_closed() {
             continue;
         }
-        let touching = TOUCHING * part.compute_local_bounding_sphere().radius;
+        let touching = SAME_PLACE * part.compute_local_bounding_sphere().radius;
         let project = |place: Vec3| surface.project(pose.inverse_transform_point(place));
         let (distance, outward) = project(place);
         let is_inside = distance < -touching;

@@ -11,7 +11,7 @@ use crate::{Aabb, BLOCK};
 use glamx::{Mat3, Pose3, Vec3};
 
 /// Room for the points of one run behind fewer than as many of others.
-const ROOM: usize = 2 * BLOCK;
+const CAPACITY: usize = 2 * BLOCK;
 
 /// A region, and the points that may be in it.
 pub(super) struct Sieve<'a> {
@@ -19,13 +19,13 @@ pub(super) struct Sieve<'a> {
     /// Of the cloud, if its points do not reach equally far.
     uneven: Option<Uneven<'a>>,
     kernel: Kernel,
-    x: [f32; ROOM],
-    y: [f32; ROOM],
-    z: [f32; ROOM],
+    x: [f32; CAPACITY],
+    y: [f32; CAPACITY],
+    z: [f32; CAPACITY],
     /// Indices into the cloud.
-    index: [u32; ROOM],
+    index: [u32; CAPACITY],
     /// 1 or 0.
-    inside: [u8; ROOM],
+    inside: [u8; CAPACITY],
     count: usize,
 }
 
@@ -41,11 +41,11 @@ impl<'a> Sieve<'a> {
             region,
             uneven,
             kernel: Kernel::new(frame_from_points, &region.of_radius(largest)),
-            x: [0.0; ROOM],
-            y: [0.0; ROOM],
-            z: [0.0; ROOM],
-            index: [0; ROOM],
-            inside: [0; ROOM],
+            x: [0.0; CAPACITY],
+            y: [0.0; CAPACITY],
+            z: [0.0; CAPACITY],
+            index: [0; CAPACITY],
+            inside: [0; CAPACITY],
             count: 0,
         }
     }

@@ -1,7 +1,7 @@
 //! Stage `cells`: layers of large pixels from the sums of the points in them.
 //!
 //! A *cell* holds the points of one pixel at one depth: they follow each other in depth within
-//! [`MERGED`] of a pixel. It keeps their number, the sums of their coordinates and of their
+//! [`MERGED_IN_CELL`] of a pixel. It keeps their number, the sums of their coordinates and of their
 //! products. Sums of neighbouring cells add up, and the plane that fits them best gives the layer:
 //! no search for neighbours, no normals of points, no splats. Sums are integers: they do not depend
 //! on the order of the points.
@@ -19,7 +19,7 @@ use std::ops::Range;
 /// Points of a pixel whose depths follow each other by no more than this are in one cell, in
 /// pixels. Half of it tears surfaces apart that are seen at 45°. Twice as much merges the two sides
 /// of bodies thinner than a pixel.
-const MERGED: f32 = 0.6;
+const MERGED_IN_CELL: f32 = 0.6;
 
 /// Steps of a coordinate in a pixel. The rounding is then far smaller than the error of a cell's plane. Half or twice:
 /// no change.
@@ -27,11 +27,11 @@ const STEPS: f32 = 256.0;
 
 /// Standard deviation, in pixels, up to which a cell and its neighbours are on a plane. A sphere of a radius of 25
 /// pixels has 0.02. Half: normals of deep spheres a third worse; twice: no change.
-const ON_PLANE: f32 = 0.1;
+const ON_CELL_PLANE: f32 = 0.1;
 
 /// Standard deviation, in pixels, up to which a plane is one that neighbours adopt. Half: no change; twice: normals 10
 /// % worse, the worst three times as wrong.
-const FLAT: f32 = 0.05;
+const FLAT_CELL: f32 = 0.05;
 
 /// The points and cells of an image, kept from call to call.
 #[derive(Default)]
@@ -138,7 +138,7 @@ impl Cells {
     ) {
         let own = &self.cells[cell];
         let [width, height] = rect.size.map(|s| s as usize);
-        let merged = (MERGED * STEPS) as i32;
+        let merged = (MERGED_IN_CELL * STEPS) as i32;
         for y in j.saturating_sub(1)..(j + 2).min(height) {
             for x in i.saturating_sub(1)..(i + 2).min(width) {
                 if [x, y] == [i, j] {
@@ -179,7 +179,7 @@ impl Cells {
                     all.iter_mut().zip(moved).for_each(|(all, sum)| *all += sum);
                 });
                 let plane = CellPlane::of(&own.sums, &all);
-                if plane.variance > square(ON_PLANE) && plane.variance < f32::INFINITY {
+                if plane.variance > square(ON_CELL_PLANE) && plane.variance < f32::INFINITY {
                     self.rough.push((cell as u32, neighbors));
                 }
                 self.planes.push(plane);
@@ -194,14 +194,14 @@ impl Cells {
         for (cell, neighbors) in &self.rough {
             let own = &self.cells[*cell as usize];
             let [least, most] = [own.near, own.far].map(|depth| (depth - own.middle) as f32);
-            let reached = least - ON_PLANE * STEPS..=most + ON_PLANE * STEPS;
+            let reached = least - ON_CELL_PLANE * STEPS..=most + ON_CELL_PLANE * STEPS;
             let mut flattest: Option<CellPlane> = None;
             for (next, [x, y]) in neighbors {
                 let plane = self.planes[*next as usize];
                 let there = (self.cells[*next as usize].middle - own.middle) as f32 + plane.above;
                 let above = there - STEPS * (plane.slope[0] * x + plane.slope[1] * y);
                 let is_flatter = flattest.is_none_or(|best| plane.variance < best.variance);
-                if is_flatter && plane.variance <= square(FLAT) && reached.contains(&above) {
+                if is_flatter && plane.variance <= square(FLAT_CELL) && reached.contains(&above) {
                     flattest = Some(CellPlane { above, ..plane });
                 }
             }
@@ -237,7 +237,7 @@ impl Cells {
 
     /// Makes cells of the points of each pixel.
     fn gather(&mut self, imaging: &CellImaging) {
-        let merged = (MERGED * STEPS) as u32;
+        let merged = (MERGED_IN_CELL * STEPS) as u32;
         self.cells.clear();
         self.firsts.clear();
         for pixel in 0..imaging.rect.pixels() {

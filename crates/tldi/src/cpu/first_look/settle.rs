@@ -38,7 +38,7 @@ const THROUGH: f32 = 3.0;
 
 /// Points that are taken per large pixel of a surface seen face on: one pixel in fifty is left empty, with half as many
 /// points one in seven. Twice as many take twice the time.
-const POINTS_PER_PIXEL: f32 = 4.0;
+const POINTS_PER_LARGE_PIXEL: f32 = 4.0;
 
 /// Most windows that are drawn. In all measured frames, the first window proves a real crossing.
 /// The others are for large pixels that only seem to cross, where limbs are close.
@@ -167,7 +167,7 @@ impl Scratch {
         let query = &pair.query;
         let pixel = query.params.pixel_size;
         let strides = [query.a, query.b]
-            .map(|surface| stride_for(POINTS_PER_PIXEL, surface.mean_radius(), pixel));
+            .map(|surface| stride_for(POINTS_PER_LARGE_PIXEL, surface.mean_radius(), pixel));
         let thinned = PairPlan {
             zone_reach: plan.zone_reach * (strides[0].max(strides[1]) as f32).sqrt(),
             ..plan.clone()

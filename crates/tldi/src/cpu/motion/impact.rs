@@ -22,7 +22,7 @@ use glamx::{Pose3, Vec3};
 
 /// Normals are averaged over the pixels whose distance is within this many pixels of the least. Half or twice: no row
 /// changes.
-const NORMAL_BAND: f32 = 0.5;
+const IMPACT_BAND: f32 = 0.5;
 
 /// Least cosine between the normal of a penetration and the normal of the surface that it leaves from behind. Half or
 /// twice the angle: no change.
@@ -101,7 +101,7 @@ impl Scratch {
         motion.pass_lone_points(&mut self.meetings, &mut self.patches.lone_points);
         let first = self.meetings.first()?;
         // A single pixel's normal may be that of a rim.
-        let near = first.distance + NORMAL_BAND * query.params.pixel_size;
+        let near = first.distance + IMPACT_BAND * query.params.pixel_size;
         let normals = self.meetings.iter().filter(|m| m.distance <= near);
         let normal: Vec3 = normals.map(|m| m.normal).sum();
         let frame_from_view = camera.view_from_frame.rotation.inverse();

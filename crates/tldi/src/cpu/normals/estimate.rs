@@ -7,7 +7,7 @@
 
 use crate::cpu::fold::{SpaceFold, is_coarse};
 use crate::cpu::lanes::multiversioned;
-use crate::cpu::normals::gathered::Gathered;
+use crate::cpu::normals::near_values::NearValues;
 use crate::cpu::normals::planes::{Batch, LANES, Neighborhood, PartialMoments, Plane};
 use crate::cpu::normals::sorted::Sorted;
 use glamx::Vec3;
@@ -18,7 +18,7 @@ pub(crate) struct NormalScratch {
     fold: SpaceFold,
     pub(crate) sorted: Sorted,
     /// Coordinates of the points around a cell.
-    candidates: Gathered<3>,
+    candidates: NearValues<3>,
     batch: Batch,
     /// Of each sorted point the plane of its neighbourhood, where it was wanted.
     pub(crate) planes: Vec<Plane>,
@@ -107,7 +107,7 @@ pub(crate) fn estimate(
 multiversioned! {
 /// Of the candidates within the neighbourhood of `p`. `out` gets all lanes: if they were added up here, compilers would make
 /// scalars of them.
-fn moments(p: Vec3, radius_squared: f32, candidates: &Gathered<3>, out: &mut PartialMoments) {
+fn moments(p: Vec3, radius_squared: f32, candidates: &NearValues<3>, out: &mut PartialMoments) {
     let mut sums = [[0.0f32; LANES]; 10];
     let [x, y, z] = candidates.lanes();
     for ((x, y), z) in x.iter().zip(y).zip(z) {

@@ -1,8 +1,8 @@
 //! Unit normals of the points that are modelled: estimated, then sharpened beside edges.
 
 pub(crate) mod estimate;
-mod gathered;
 pub(crate) mod kept;
+mod near_values;
 pub(crate) mod planes;
 pub(crate) mod sharpen;
 pub(crate) mod sorted;

@@ -9,7 +9,7 @@
 use crate::contact::ramp::ramp;
 use crate::cpu::lanes::multiversioned;
 use crate::cpu::normals::estimate::NormalScratch;
-use crate::cpu::normals::gathered::Gathered;
+use crate::cpu::normals::near_values::NearValues;
 use crate::cpu::normals::planes::{LANES, Neighborhood, Plane, SUPPORT};
 use crate::cpu::normals::sorted::{RUN, Sorted};
 use glamx::Vec3;
@@ -19,17 +19,19 @@ use glamx::Vec3;
 const OFF_PLANE: f32 = 4.0;
 
 /// Deviation from a plane, in mean radii, at which it is not flat, or a point is not on it. Half or twice: no change.
-const FLAT: f32 = 0.05;
+const FLAT_PLANE: f32 = 0.05;
 
 /// For [`stage_constants`](crate::pair::plan::stage_constants).
-pub(crate) const CONSTANTS: [(&str, f64); 2] =
-    [("OFF_PLANE", OFF_PLANE as f64), ("FLAT_PLANE", FLAT as f64)];
+pub(crate) const CONSTANTS: [(&str, f64); 2] = [
+    ("OFF_PLANE", OFF_PLANE as f64),
+    ("FLAT_PLANE", FLAT_PLANE as f64),
+];
 
 /// Memory of the stage, kept from call to call.
 #[derive(Default)]
 pub(crate) struct SharpenScratch {
     flat: FlatPlanes,
-    flat_around: Gathered<VALUES>,
+    flat_around: NearValues<VALUES>,
     /// Sorted points that are not on their planes.
     rough: Vec<u32>,
     /// Those that adopt a plane, and which.
@@ -79,7 +81,7 @@ impl FlatPlanes {
     }
 
     /// Collects those around a cell.
-    fn gather(&self, sorted: &Sorted, cell: u32, around: &mut Gathered<VALUES>) {
+    fn gather(&self, sorted: &Sorted, cell: u32, around: &mut NearValues<VALUES>) {
         let rows = sorted.rows(cell as usize);
         let rows = rows.map(|row| self.before[row.start]..self.before[row.end]);
         around.gather(rows, &self.values, NO_PLANE);
@@ -102,7 +104,7 @@ pub(crate) fn sharpen(
         adopted,
     } = scratch;
     let (radius, on_plane) = (around.radius, around.on_plane());
-    let limits = [radius * radius, (FLAT / SUPPORT * radius).powi(2)];
+    let limits = [radius * radius, (FLAT_PLANE / SUPPORT * radius).powi(2)];
     let is_rough = |k: &u32, planes: &[Plane]| planes[*k as usize].variance > on_plane;
     rough.clear();
     rough.extend(sorted.wanted().filter(|k| is_rough(k, planes)));
@@ -143,7 +145,7 @@ fn mean(
     point: Vec3,
     own: &Plane,
     limits: [f32; 2],
-    flat: &Gathered<VALUES>,
+    flat: &NearValues<VALUES>,
 ) -> Option<(Plane, f32)> {
     let [weight, x, y, z, variance, height] = sums(point, own.normal, limits, flat);
     let normal = Vec3::new(x, y, z).try_normalize()?;
@@ -153,7 +155,7 @@ fn mean(
 
 multiversioned! {
 /// Sums of the weights of the planes, which fall from 1 where they fit, and of weighted normals, variances and heights.
-fn sums(p: Vec3, side: Vec3, [reach, most]: [f32; 2], flat: &Gathered<VALUES>) -> [f32; 6] {
+fn sums(p: Vec3, side: Vec3, [reach, most]: [f32; 2], flat: &NearValues<VALUES>) -> [f32; 6] {
     let per_misfit = 1.0 / most;
     let mut sums = [[0.0f32; LANES]; 6];
     let [x, y, z, nx, ny, nz, variance, height] = flat.lanes();

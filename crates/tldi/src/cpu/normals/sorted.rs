@@ -16,7 +16,7 @@ pub(crate) fn most_cells(points: usize) -> f32 {
 }
 
 /// Empty cells along each axis, one on either side.
-const RIM: f32 = 2.0;
+const RIM_CELLS: f32 = 2.0;
 
 /// Most candidates whose distances are looked at, for all points of a cell: five times what a
 /// surface has. Of more, an even selection represents them.
@@ -62,7 +62,7 @@ pub(crate) struct Grid {
 
 impl Grid {
     fn new(min: Vec3, max: Vec3, support: f32, points: usize) -> Self {
-        let (cell, dims) = cells_over(max - min, support, RIM, most_cells(points));
+        let (cell, dims) = cells_over(max - min, support, RIM_CELLS, most_cells(points));
         Self {
             min,
             inv_cell: 1.0 / cell,
@@ -91,7 +91,7 @@ impl Grid {
 
     #[inline(always)]
     fn cell_at(&self, [x, y, z]: [f32; 3]) -> u32 {
-        let most = self.dims.map(|d| d as f32 - (1.0 + RIM));
+        let most = self.dims.map(|d| d as f32 - (1.0 + RIM_CELLS));
         let [width, height] = [self.dims[0] as u32, self.dims[1] as u32];
         let x = 1 + truncated((x - self.min.x) * self.inv_cell, most[0]);
         let y = 1 + truncated((y - self.min.y) * self.inv_cell, most[1]);

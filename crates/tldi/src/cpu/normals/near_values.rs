@@ -5,14 +5,14 @@ use crate::cpu::normals::sorted::{MAX_CANDIDATES, RUN};
 use std::ops::Range;
 
 /// `N` values of each point.
-pub(super) struct Gathered<const N: usize> {
+pub(super) struct NearValues<const N: usize> {
     /// With room for a run of no meaning.
     values: [[f32; MAX_CANDIDATES + RUN]; N],
     /// A multiple of [`LANES`].
     count: usize,
 }
 
-impl<const N: usize> Default for Gathered<N> {
+impl<const N: usize> Default for NearValues<N> {
     fn default() -> Self {
         Self {
             values: [[0.0; MAX_CANDIDATES + RUN]; N],
@@ -21,7 +21,7 @@ impl<const N: usize> Default for Gathered<N> {
     }
 }
 
-impl<const N: usize> Gathered<N> {
+impl<const N: usize> NearValues<N> {
     /// Copies the `rows` of `from`, which ends with [`RUN`] values of no meaning: all, or of more than [`MAX_CANDIDATES`] an
     /// even selection. Lanes that are left get `nothing`.
     pub(super) fn gather(
