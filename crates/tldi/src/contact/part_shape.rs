@@ -1,10 +1,9 @@
 //! A part of a contact: its normal, its main direction, and the few points that stand for it.
 
-use crate::contact::bowl::{
-    Floor, GAP_PER_SLOPE, LEAST_PIXELS, Lowest, relative_radius, slope_error,
-};
+use crate::contact::bowl::{Floor, GAP_PER_SLOPE, Lowest, relative_radius, slope_error};
 use crate::contact::crease::{ContactPlane, Face, lower_by};
 use crate::contact::links::Links;
+use crate::contact::main_plane::LEAST_PLANE;
 use crate::contact::point_axes::longest_axis;
 use crate::contact::smooth::{Smooth, common_normal};
 use crate::contact::supports::{Supports, supports};
@@ -169,7 +168,10 @@ impl Shape {
     fn deepest(&self, points: &[ContactPoint], pixel_size: f32) -> ContactPoint {
         let (mut middle, mut gap, mut total) = (Vec3::ZERO, 0.0, 0.0);
         for point in points {
-            let w = falloff(point.gap - self.least_gap, LEAST_ROUGHNESS * pixel_size);
+            let w = falloff(
+                point.gap - self.least_gap,
+                2.0 * LEAST_ROUGHNESS * pixel_size,
+            );
             middle += w * point.middle();
             gap += w * point.gap;
             total += w;
@@ -288,7 +290,7 @@ impl Part<'_> {
         let off_plane = scatter.max(supports.flatness * bent);
         // A pixel at the rim of a cloud's face stands out beyond its points, by half a pixel on average. The mean of it
         // and its linked neighbours is as far inwards, at a corner, too, and does not move pixels within.
-        let is_face = self.pixels.end_in_discs && points.len() >= LEAST_PIXELS;
+        let is_face = self.pixels.end_in_discs && points.len() >= LEAST_PLANE;
         let inwards = if is_face { flatness } else { 0.0 };
         let in_plane = |(k, above): (usize, f32)| {
             let point = points[k];

@@ -4,10 +4,10 @@
 //! continuously: normals and the deepest point are weighted means, and the support points are
 //! chosen for extent first, so that near-ties in depth do not move them from frame to frame.
 
-use crate::contact::bowl::LEAST_PIXELS;
 use crate::contact::gap_fit::GapFit;
 use crate::contact::links::{Groups, Links, find_roots};
 use crate::contact::lone_points::LonePoints;
+use crate::contact::main_plane::LEAST_PLANE;
 use crate::contact::neighbors::Culled;
 use crate::contact::noise::allow_for_noise;
 use crate::contact::part_shape::{Pixels, Shape, ShapeScratch};
@@ -170,7 +170,7 @@ impl PatchScratch {
             let members = &mut self.groups.members[start..end];
             let shape = Shape::of(members, contacts, &self.smooth, params);
             if splits < MAX_SPLITS
-                && members.len() >= LEAST_PIXELS
+                && members.len() >= LEAST_PLANE
                 && shape.normal_length < SPLIT_BELOW
             {
                 let middle = shape.split(members, contacts);
