@@ -136,7 +136,7 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
         "1 % flying pixels",
         (12, 300, Tries::Rows),
         "several flying pixels near each other look like a surface.",
-        &[("worst_corner_local_radii", 1.0..=10.5)],
+        &[("worst_corner_local_radii", 1.0..=10.6)],
     ),
     known(
         "grazing",
