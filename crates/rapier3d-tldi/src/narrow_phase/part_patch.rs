@@ -91,3 +91,42 @@ pub(super) fn share_planes(patches: &mut Vec<PartPatch>, scatter: f32) {
         first += 1;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rapier3d::math::Vector;
+
+    /// Four points about `x` on a plane.
+    fn patch(part: u32, x: f32, normal: Vector) -> PartPatch {
+        let (u, v) = normal.any_orthonormal_pair();
+        let corners = [u + v, u - v, -u + v, -u - v].map(|corner| x * Vector::X + corner);
+        let points = corners.map(|corner| ContactPoint {
+            point_a: corner,
+            point_b: corner,
+            gap: 0.0,
+        });
+        PartPatch {
+            indices: [part, 0],
+            patch: ContactPatch::bearing(normal, &points, 0.0),
+            pixel_size: None,
+        }
+    }
+
+    /// Three legs of a table stand on one plane, and lean on a wall: the table rests on its outer corners.
+    #[test]
+    fn parts_on_one_plane_share_its_points() {
+        let legs = [-10.0, 0.0, 10.0].into_iter().zip(0..);
+        let mut patches: Vec<PartPatch> = legs.map(|(x, k)| patch(k, x, Vector::Y)).collect();
+        patches.insert(1, patch(3, 0.0, Vector::X));
+        share_planes(&mut patches, 0.01);
+        let names: Vec<[u32; 2]> = patches.iter().map(|patch| patch.indices).collect();
+        assert_eq!(names, [[0, 0], [3, 0]]);
+        let floor = &patches[0].patch.points;
+        assert_eq!((floor.len(), patches[1].patch.points.len()), (4, 4));
+        assert!(
+            floor.iter().all(|point| point.point_a.x.abs() == 11.0),
+            "{floor:?}"
+        );
+    }
+}

@@ -47,8 +47,8 @@ const FLAT: [f32; 2] = [0.35, 0.5];
 
 /// Which of `points`, on one plane with the unit normal `normal`, a body would rest on. Each of four directions gives
 /// the point that is farthest out and lowest: one standard deviation of extent counts as much as √2 of roughness, which
-/// is at least `smooth` metres. The directions lead to the
-/// corners: they are those in which the points reach out farthest if their extents along both main axes are made equal.
+/// is at least `smooth` metres. The directions lead to the corners: they are those in which the points reach out
+/// farthest if their extents along both main axes are made equal.
 ///
 /// Heights are measured from the plane that fits the gaps. So the choice does not depend on the
 /// tilt of the body, and a lifted edge remains. Cost: linear in points.
@@ -67,10 +67,14 @@ pub(crate) fn supports(points: &[ContactPoint], normal: Vec3, smooth: f32) -> Su
     let bowl = Bowl::fit(residuals(), count);
     // A perfectly flat patch has none, by which nothing can be divided.
     let smooth = smooth.max(f32::MIN_POSITIVE);
-    let (main_plane, share) = plane.of_most(heights(), roughness, smooth);
     let is_bent = roughness > smooth && bowl.explains_most(roughness);
-    let flatness = if is_bent { 0.0 } else { ramp(share, FLAT) };
-    let main_plane = plane.lerp(main_plane, flatness);
+    let (main_plane, flatness) = if is_bent {
+        (plane, 0.0)
+    } else {
+        let (main_plane, share) = plane.of_most(heights(), roughness, smooth);
+        let flatness = ramp(share, FLAT);
+        (plane.lerp(main_plane, flatness), flatness)
+    };
     let above_plane = |height| main_plane.residual(height);
     let most = (1.0 - flatness) * MOST_LOW;
     let low = |height| (-above_plane(height) / roughness.max(smooth)).min(most);
@@ -376,6 +380,24 @@ mod tests {
                 let is_near = |&k: &usize| points[k].middle().distance(corner) < 1.5;
                 assert!(found.iter().any(is_near), "{turn}: {found:?}");
             }
+        }
+    }
+
+    /// Of many points the patch keeps four, the deepest among them where it is deeper by more than they scatter.
+    #[test]
+    fn patches_keep_corners_and_what_is_deeper() {
+        let mut points: Vec<ContactPoint> = (0..25)
+            .map(|k| Vec3::new((k % 5) as f32, 0.0, (k / 5) as f32))
+            .map(|p| point(p, 0.0))
+            .collect();
+        for (depth, is_kept) in [(0.5, true), (0.005, false)] {
+            points[12].gap = -depth;
+            let patch = ContactPatch::bearing(Vec3::Y, &points, 0.01);
+            assert_eq!(patch.points.len(), PATCH_POINTS, "{depth}");
+            assert_eq!(patch.points.contains(&points[12]), is_kept, "{depth}");
+            let corners = [0, 4, 20, 24].map(|k| patch.points.contains(&points[k]));
+            let kept = corners.iter().filter(|kept| **kept).count();
+            assert_eq!(kept, 4 - usize::from(is_kept), "{depth}");
         }
     }
 
