@@ -129,9 +129,9 @@ impl Bowl {
         self.left < UNEXPLAINED * roughness
     }
 
-    /// The place of the lowest point, above a plane that rises by `slope` in a standard deviation of each place, and
-    /// its height above the middle of the plane. `None` unless it is a bowl in both directions, lowest among its
-    /// points, and most of the `roughness` about the plane.
+    /// The place of the lowest point, and its height above the middle of a plane that rises by `slope` in a standard
+    /// deviation of each place. `None` unless the bowl widens in both directions, is lowest among its points, and explains
+    /// most of the `roughness` about the plane.
     pub(crate) fn lowest(&self, slope: Vec2, roughness: f32) -> Option<(Vec2, f32)> {
         let place = -0.5 * slope / self.widening;
         let is_bowl = self.explains_most(roughness)
@@ -164,8 +164,8 @@ impl Bowl {
 }
 
 /// Error of the slope of the gaps, metres over a standard deviation of the places. `off` says how far each gap is off
-/// the fit through its neighbours, metres; smooth surfaces are off by less than `smooth`. 0 where that is no noise, or too
-/// few gaps tell.
+/// the fit through its neighbours, metres; on smooth surfaces this is less than `smooth`. 0 without noise, or of fewer than
+/// [`MANY`] gaps.
 pub(crate) fn slope_error(off: impl Iterator<Item = f32>, smooth: f32) -> f32 {
     let (squares, count) = off.fold((0.0, 0.0), |(sum, n), off| (sum + off * off, n + 1.0));
     if count < MANY {
@@ -176,8 +176,8 @@ pub(crate) fn slope_error(off: impl Iterator<Item = f32>, smooth: f32) -> f32 {
 }
 
 /// Relative radius of curvature along `radius`, from how the normals turn: a vector, metres. Second: share (0 to 1) of the
-/// normals' variance that a linear turn explains.
-/// What the gaps of a ball tell is up to a fifth too much or too little, by how far up they are known.
+/// normals' variance that a linear turn explains. `radius` is what the gaps tell: of a ball up to a fifth too much or too
+/// little, depending on how far up gaps are known.
 pub(crate) fn relative_radius<'c>(
     radius: Vec3,
     centre: Vec3,

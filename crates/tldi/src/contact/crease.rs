@@ -1,9 +1,9 @@
 //! How deep a contact is at an edge or a corner.
 //!
 //! Pixels see such a contact beside its lowest place, and a fit through them is rounded: edges
-//! would be 0.1 pixels too high, corners 0.2. Their normals tell the faces, and the contact is
+//! would be 0.1 pixels too high, corners 0.2. The normals of the pixels tell the faces, and the contact is
 //! where the planes of the faces meet. An edge that is rounded by less than two pixels counts as
-//! sharp, because in its pixels all edges are round.
+//! sharp, because at that size pixels show every edge as round.
 
 use crate::ContactPixel;
 use crate::contact::ramp::ramp;
@@ -94,8 +94,8 @@ impl ContactPlane {
     }
 }
 
-/// How far the contact of `pixels` is below `deepest_gap`, that of the lowest of the points that were fitted to them, metres;
-/// negative: above. `tangents` is overwritten.
+/// How far the contact of `pixels` is below `deepest_gap`, the gap of the lowest point that was fitted to them, metres;
+/// negative: above. `tangents` is scratch.
 pub(crate) fn lower_by<'a>(
     pixels: impl Iterator<Item = &'a ContactPixel> + Clone,
     plane: &ContactPlane,
@@ -129,7 +129,7 @@ pub(crate) fn lower_by<'a>(
     sure * (deepest_gap - vertex.gap)
 }
 
-/// The faces that meet, by slopes that are as far apart as there are.
+/// The faces that meet. The search starts from the slopes that are farthest apart.
 fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_FACES> {
     let count = tangents.len() as f32;
     let mean = tangents.iter().map(|face| face.slope).sum::<Vec2>() / count;

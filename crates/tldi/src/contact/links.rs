@@ -77,14 +77,15 @@ impl Links {
         find_roots(contacts, self.pairs.iter().copied(), roots);
     }
 
-    /// Leaves the penetrations of `result` that are proven; from these, `collides` and `gap` follow. `roots` is
-    /// overwritten.
+    /// Keeps the penetrations of `result` that are proven, and sets `collides` and `gap` by them. `roots` is scratch.
     ///
-    /// Contact pixels deeper than a layer need neighbours that confirm them, and go with their links if they have too
-    /// few; others still touch. If nothing tells the inside, what is deep may be the space between two limbs, too. Then deep
-    /// pixels count if they continue others at which the surfaces are apart. Where no confirmed penetration of more than
-    /// `least_proof` metres does, all count if the surfaces were seen to cross (`result.collides`). `None`: a surface tells
-    /// its inside.
+    /// A contact pixel deeper than a layer needs neighbours that confirm it. With too few it is dropped, and its links with
+    /// it. A shallower one is cut to the depth that its neighbours confirm.
+    ///
+    /// `least_proof` is `None` if a surface tells its inside. Otherwise a deep place may also be the space between two limbs.
+    /// Then deep pixels count if they *lead out*: links join them with pixels at which the surfaces are apart. If no
+    /// confirmed penetration of more than `least_proof` metres leads out, but the surfaces were seen to cross
+    /// (`result.collides`), all deep pixels count.
     pub(crate) fn confirm(
         &mut self,
         result: &mut PairResult,
@@ -134,9 +135,9 @@ impl Links {
         }
     }
 
-    /// Sets `marks` to [`NONE`] for the contact pixels that are deep and do not continue others at which the surfaces
-    /// are apart: from within an overlap the gap passes through zero, the space between limbs ends where they meet.
-    /// Returns whether any penetration of more than `least_proof` does so that its neighbours confirm.
+    /// Sets `marks` to [`NONE`] for the contact pixels that are deep and do not lead out. On the way out of an overlap the gap
+    /// passes through zero; the space between limbs ends where they meet.
+    /// Returns whether a penetration of more than `least_proof` leads out that its neighbours confirm.
     fn mark_unproven(
         &mut self,
         contacts: &[ContactPixel],

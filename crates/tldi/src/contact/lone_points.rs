@@ -1,9 +1,9 @@
 //! Points that stand alone beside a surface: flying pixels, dust.
 //!
-//! Splats around a few points are no surface. A point stands alone if its fourth nearest neighbour
-//! is much farther away than the fourth neighbour of one of these four is from that one. By this
-//! rule, the points of a wire, of a coarse part of a scan and of a body of few points do not stand
-//! alone.
+//! Splats around a few points are no surface. For each point, take the distance to its fourth nearest
+//! neighbour. A point stands alone if its own distance is much larger than that of one of its four
+//! neighbours. So the points of a wire, of a coarse part of a scan and of a body of few points do not
+//! stand alone.
 
 use crate::contact::links::{Groups, Links};
 use crate::contact::neighbors::{Culled, NEIGHBORS, REACH, Surroundings};
@@ -11,8 +11,8 @@ use crate::contact::retain_by_index;
 use crate::{ContactPixel, PairQuery, PairResult, PointCloud, Surface};
 use glamx::{Pose3, Vec3};
 
-/// A point stands alone if its fourth neighbour is at least this many times as far away as the fourth neighbour of one
-/// of its neighbours. At the corner of a grid it is twice as far. Half or twice: no change.
+/// A point stands alone if the distance to its fourth neighbour is at least this many times that of one of its
+/// neighbours. At the corner of a grid it is twice as large. Half or twice: no change.
 const ALONE: f32 = 2.5;
 
 /// Points closer to each other than this share of the mean radius are the same point. Half or twice: no row changes.
@@ -67,8 +67,8 @@ impl LonePoints {
         lone_point(around, cloud, place).is_some()
     }
 
-    /// Removes them from the contact pixels of `result`, which `links` joins; `false` where there are
-    /// none. `culled` are all points of each cloud where the surfaces can touch, if they are at hand.
+    /// Removes the contact pixels that lone points make from `result`, which `links` joins. Returns whether there were any.
+    /// `culled` are all points of each cloud where the surfaces can touch, if they are at hand.
     pub(crate) fn drop(
         &mut self,
         result: &mut PairResult,
@@ -146,9 +146,8 @@ fn middle(
     nearest.unwrap_or(mean)
 }
 
-/// Whether the middle of a component belongs to a point that stands alone, and so do most of its
-/// pixels. At the rim of a large splat, or where fine points border on coarse ones, some do not, or
-/// do. If so, `found` gets these points.
+/// Whether the middle of a component and most of its pixels belong to points that stand alone. (At the rim of a large splat,
+/// or where fine points border on coarse ones, single pixels tell nothing.) If so, `found` gets these points.
 fn made_by_lone_points(
     around: &mut Surroundings,
     cloud: &PointCloud,

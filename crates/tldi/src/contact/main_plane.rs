@@ -7,17 +7,17 @@ use glamx::{Mat3, Vec2, Vec3};
 /// change.
 pub(crate) const LEAST_PLANE: usize = 12;
 
-/// Most heights that are used, every n-th of them: so many tell a plane to a twentieth of their deviation. Half or
+/// Most heights that are used; of more, every n-th. So many tell a plane to a twentieth of their deviation. Half or
 /// twice: no change.
 const MOST_HEIGHTS: usize = 384;
 
-/// Rounds of the fit, and the factor by which the deviation that counts shrinks in each: 20 in all, from all heights to
+/// Rounds of the fit, and the factor by which the scale of the weights shrinks in each round: to a 20th in all, but not below
 /// `near`. Half or twice the rounds, or the root or the square of the factor: no change.
 const ROUNDS: i32 = 6;
 const NARROWER: f32 = 0.6;
 
-/// Least information about a plane in the heights that count, as a share of that in as many heights of unit variance.
-/// Heights in a row leave a slope undetermined. Half or twice: no change.
+/// Least information about a plane in the weighted heights, as a share of that in as many heights of unit variance. Heights
+/// in a row leave a slope undetermined. Half or twice: no change.
 const LEAST_KNOWN: f32 = 1e-3;
 
 /// A plane over places: its height at the origin, and its slopes.
@@ -39,8 +39,9 @@ impl GapPlane {
         Self(self.0.lerp(other.0, share))
     }
 
-    /// The plane on which most of `heights` lie, and the share of them within twice `near` of it, as if [`LEAST_PLANE`]
-    /// more lay elsewhere. Begins with `self`: the plane that fits all best, with a standard deviation of `spread`.
+    /// The plane on which most of `heights` lie, and the share of heights within twice `near` of it. The share counts
+    /// [`LEAST_PLANE`] more heights that lie elsewhere, so that few heights are no plane. The search begins with `self`, the
+    /// plane that fits all best, with a standard deviation of `spread`.
     ///
     /// Least squares, weighted anew in each round with ever narrower Geman–McClure weights (Blake and
     /// Zisserman's graduated non-convexity, doi 10.7551/mitpress/7132.001.0001). Places should have about

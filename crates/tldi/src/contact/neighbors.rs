@@ -10,12 +10,12 @@ use std::ops::Range;
 /// Neighbours that tell how dense points are. Clouds of fewer have no lone points.
 pub(crate) const NEIGHBORS: usize = 4;
 
-/// How far neighbours are looked for, in mean radii of the cloud. What has none within that is not known to stand
-/// alone. Half or twice: no row changes.
+/// How far neighbours are looked for, in mean radii of the cloud. A point with fewer than [`NEIGHBORS`] within this is not
+/// taken to stand alone. Half or twice: no row changes.
 pub(crate) const REACH: f32 = 32.0;
 
-/// How far neighbours are looked for first, in a grid of the points around, in mean radii. With the paper's radii (0.65 of
-/// the distance to the seventh neighbour) the fourth is at about a third of it. Only speed depends on it.
+/// Edge of a grid cell in which neighbours are looked for first, in mean radii. With the paper's radii (0.65 of the distance
+/// to the seventh neighbour) the fourth neighbour is at about a third of it. Only speed depends on it.
 const CELL: f32 = 4.0;
 
 /// The points nearest to a place: squares of their distances in metres, and where they are.
@@ -54,8 +54,8 @@ pub(crate) struct Surroundings {
     wide: Wide,
 }
 
-/// All points of the cloud in a box, for what the grid around the places does not tell: points that stand alone have their
-/// neighbours far away.
+/// All points of the cloud in a wider box. It is asked where the grid around the places holds too few neighbours, as around
+/// points that stand alone.
 #[derive(Debug)]
 struct Wide {
     /// Where points are known; empty until it is asked.
@@ -79,8 +79,8 @@ impl Default for Wide {
 }
 
 impl Surroundings {
-    /// Finds those around `places` among the `culled` ones or, without these, in `cloud`. Cost: a pass over these, or
-    /// over the points of the blocks around; and a counting sort of what is found.
+    /// Finds the points around `places`, among the `culled` ones or else in `cloud`. Cost: a pass over the culled points, or
+    /// over the points of the blocks around the places; and a counting sort of the points that are found.
     pub(crate) fn find(
         &mut self,
         cloud: &PointCloud,
@@ -129,9 +129,9 @@ impl Surroundings {
             .min(depth(*other_from_frame * place, other_bounds))
     }
 
-    /// The points of `cloud` nearest to `place`, from `beyond` to `reach` metres away, in ascending
-    /// order. Cost: the points of 27 cells. Where these are too few, those of the cells up to there, once all points
-    /// within a few [`REACH`] of all such places were sorted into cells.
+    /// The points of `cloud` nearest to `place`, from `beyond` to `reach` metres away, in ascending order. Cost: the points of
+    /// 27 cells. Where these hold too few, all points within a few [`REACH`] are sorted into cells once, and cells are visited
+    /// outwards.
     pub(crate) fn nearest(
         &mut self,
         cloud: &PointCloud,

@@ -130,7 +130,7 @@ impl Shape {
         members.partition_point(|&m| !behind(m))
     }
 
-    /// The patch's points: the lowest of a bowl, the ends of a valley's floor, or support points.
+    /// The patch of the part. Its points are the lowest point of a bowl, the ends of a valley's floor, or support points.
     pub(crate) fn patch(
         &self,
         members: &[u32],
@@ -210,7 +210,8 @@ impl Part<'_> {
         self.in_band().map(|(contact, _)| contact)
     }
 
-    /// How much lower than the lowest of the fitted points faces meet; negative: higher.
+    /// How far below `lowest_gap`, that of the lowest fitted point, the faces of an edge or corner meet, metres; negative:
+    /// above. 0 where no faces meet.
     fn lower(&self, lowest_gap: f32, tangents: &mut Vec<Face>) -> f32 {
         let Shape {
             normal,
@@ -232,8 +233,9 @@ impl Part<'_> {
         lower_by(pixels, &plane, lowest_gap, self.pixel_size, tangents)
     }
 
-    /// The lowest point of a bowl. Around it the surfaces have other normals: points there would stop what rolls. Where noise
-    /// leaves open where it is, points as far apart let a ball lie that would otherwise roll about.
+    /// The lowest point of a bowl. Around it the surfaces have other normals, so further points would stop a body that rolls.
+    /// Where noise hides the lowest point, four points stand around it, as far away as it may be: on one that jumps about, a
+    /// ball would never lie still.
     fn on_bowl(&self, lowest: &Lowest, roughness: f32, tangents: &mut Vec<Face>) -> ContactPatch {
         let shape = self.shape;
         let Lowest {
@@ -259,7 +261,7 @@ impl Part<'_> {
         }
     }
 
-    /// The ends of a valley's floor; none where two faces meet at an edge, where the normals turn at once.
+    /// The ends of a valley's floor. `None` where two faces meet at an edge: there, the normals turn all at once.
     fn on_valley(&self, Floor { ends, radius }: Floor, roughness: f32) -> Option<ContactPatch> {
         let shape = self.shape;
         let (radius, steady) = relative_radius(radius, shape.centre, self.contacts_in_band());
@@ -282,14 +284,14 @@ impl Part<'_> {
     ) -> ContactPatch {
         let shape = self.shape;
         let roughness = supports.roughness_about_bowl;
-        // Where the gaps do not rise, or but for the rim of a face, contacts lie on a plane: chosen for being low, the points
-        // are lower by what gaps scatter by, or by what rims are bent.
+        // Where the gaps do not rise, or only at the rim of a face, contacts lie on a plane. The points were chosen for being
+        // low, so they are too low by as much as gaps scatter, or as rims are bent.
         let flatness = if rises { supports.flatness } else { 1.0 };
         let scatter = if rises { 0.0 } else { roughness };
         let bent = DEEPER * self.pixel_size;
         let off_plane = scatter.max(supports.flatness * bent);
-        // A pixel at the rim of a cloud's face stands out beyond its points, by half a pixel on average. The mean of it
-        // and its linked neighbours is as far inwards, at a corner, too, and does not move pixels within.
+        // A pixel at the rim of a cloud's face stands out beyond its points, by half a pixel on average. The mean of such a
+        // pixel and its linked neighbours is as far inwards, also at a corner. Within a face the mean is where the pixel is.
         let is_face = self.pixels.end_in_discs && points.len() >= LEAST_PLANE;
         let inwards = if is_face { flatness } else { 0.0 };
         let in_plane = |(k, above): (usize, f32)| {

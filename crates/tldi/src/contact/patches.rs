@@ -35,10 +35,9 @@ const SPLIT_BELOW: f32 = 0.97;
 /// Splits in a row: at most eight parts a group. Half or twice: no change.
 const MAX_SPLITS: u32 = 3;
 
-/// Cosine of the angle (10°) within which normals belong to one plane: such parts share a patch, wherever they are. A
-/// solver needs the supports of one plane together to choose the few that it takes (rapier merges manifolds within 5.1°
-/// and keeps the deepest points, which need not be those that bear the load). Half the angle: a ball in a groove fails
-/// with 2 of 6 seeds instead of none; twice: no change.
+/// Cosine of the angle (10°) between normals of one plane. Parts on one plane share a patch, wherever they are, so that its few
+/// points are chosen among all. (Rapier merges manifolds within 5.1° and keeps the deepest points, which need not be those
+/// that bear the load.) Half the angle: a ball in a groove fails with 2 of 6 seeds instead of none; twice: no change.
 pub const SAME_PLANE: f32 = 0.985;
 
 /// Memory of [`PatchScratch::reduce`], kept from call to call.
@@ -71,13 +70,13 @@ struct GroupPart {
 }
 
 impl PatchScratch {
-    /// Confirms the contact pixels of `result`, derives `collides` and `gap` from them as if
-    /// normals told inside from outside, and fills the patches, deepest first.
+    /// Confirms the contact pixels of `result`, sets `collides` and `gap` by them as if normals told inside from outside, and
+    /// fills the patches, deepest first.
     ///
-    /// The contact pixels may come in any order. Those beyond the prediction tell the shape of patches, and are dropped then.
-    /// Afterwards they are ordered by view, row and column; of one pixel, the greatest gap comes first. Where `result` has
-    /// several axes, they are those of the pixels' views. Cost: linear in their number, except for sorting the groups, and the
-    /// pixels if needed.
+    /// The contact pixels may come in any order. Afterwards they are ordered by view, row and column; of one pixel, the
+    /// greatest gap comes first. Those beyond the prediction tell the shape of patches and are dropped afterwards. The axes of
+    /// `result` are those of the pixels' views. Cost: linear in the pixels, except for sorting the groups, and the pixels if
+    /// needed.
     pub fn reduce(&mut self, result: &mut PairResult, params: &Params) {
         let _stage = stage!("patches");
         self.end_in_discs = true;
@@ -86,8 +85,8 @@ impl PatchScratch {
     }
 
     /// [`reduce`](Self::reduce) without the contact pixels of points that stand alone: flying pixels
-    /// of a depth camera, dust. A point stands alone if its fourth nearest neighbour is 2.5 times as
-    /// far away as that of one of these four is from it. Cost beside that of `reduce`: where there
+    /// of a depth camera, dust. A point stands alone if the distance to its fourth nearest neighbour is 2.5
+    /// times that of one of these four neighbours. Cost beside that of `reduce`: where there
     /// are components of few contact pixels, a pass over the points of the blocks around them.
     ///
     /// Returns whether there were such points. They hide what lies behind them, so the CPU backend then compares the pair
@@ -113,9 +112,9 @@ impl PatchScratch {
         are_lone_points
     }
 
-    /// [`reduce`](Self::reduce) of the contact pixels of a first look, in which nothing stands alone. The surfaces are
-    /// taken to cross: the caller has to prove it. A large pixel may hold surfaces that only touch, so overlaps of less than
-    /// a layer prove nothing: where bodies coincide, they are all over.
+    /// [`reduce`](Self::reduce) of the contact pixels of a first look, in which no point stands alone. The surfaces are
+    /// taken to cross; the caller has to prove it. A large pixel may hold surfaces that only touch, and where bodies coincide
+    /// such pixels are everywhere. So overlaps of less than a layer prove nothing.
     pub(crate) fn reduce_coarse(&mut self, result: &mut PairResult, query: &PairQuery) {
         let _stage = stage!("patches");
         result.collides = true;
@@ -294,7 +293,7 @@ fn smaller_is_exact(query: &PairQuery) -> bool {
 
 /// Drops contact pixels of faces that do not face each other, if another view sees one of the faces
 /// better. An example is a floor's edge and the wall behind it, which are far apart along the view
-/// and near beside it. Where they are half of all or more there is nothing better.
+/// and near beside it. If half of all contact pixels or more are like that, they stay: nothing better was seen.
 fn drop_between_faces(result: &mut PairResult) {
     let PairResult { axes, contacts, .. } = result;
     let is_between = |contact: &ContactPixel| {

@@ -8,8 +8,8 @@ use glamx::{Vec2, Vec3};
 /// changes.
 const LEAST_WIDTH: f32 = 1e-6;
 
-/// How far from the floor of a valley points tell how low it is, in standard deviations across it. Half or twice: no
-/// row changes.
+/// Largest distance, in standard deviations across the valley, from which points tell how low its floor is. Half or twice:
+/// no row changes.
 const NEAR_FLOOR: f32 = 0.4;
 
 /// The main axes of points on one plane.
@@ -53,7 +53,7 @@ impl MainAxes {
         self.along(point.middle()) / self.sigma
     }
 
-    /// The contact at a place, with this gap. The surfaces bend away from the plane: it is as high as the nearest of
+    /// The contact at a place, with this gap. As the surfaces bend away from the plane, its height is that of the nearest of
     /// `points`.
     pub(super) fn contact_at(
         &self,

@@ -5,10 +5,9 @@ use crate::contact::gap_fit::GapFit;
 use crate::contact::links::Links;
 use glamx::Vec3;
 
-/// Variance (1 − mean length) that a surface's normals are taken to have at least, 1.4°: keeps the weights
-/// of two perfectly flat surfaces finite. Were it 0.01, a box's sides, which a moving view sees as
-/// well, would tilt the normal by 0.6°, and a floor brake what slides over it by 2 % more. Half: normals 17 % better,
-/// no more stability rows fail; twice: normals 36 % worse.
+/// Least variance (1 − mean length) of a surface's normals, 1.4°: it keeps the weights of two perfectly flat surfaces finite.
+/// With 0.01, the sides of a box, which a moving view sees as well, would tilt the normal by 0.6°, and a floor would brake a
+/// sliding box by 2 % more. Half: normals 17 % better, no more stability rows fail; twice: normals 36 % worse.
 const LEAST_VARIANCE: f32 = 3e-4;
 
 /// A contact pixel after averaging over its linked neighbours.
@@ -21,7 +20,7 @@ pub(crate) struct Smooth {
     pub(crate) normal: Vec3,
 }
 
-/// Appends each contact pixel with normals averaged over linked neighbours, and the gap that `gap_fit` tells. A third of a
+/// Appends each contact pixel to `out`, with normals averaged over linked neighbours and the gap of `gap_fit`. A third of a
 /// sensor's noise is left.
 pub(crate) fn smooth(
     contacts: &[ContactPixel],
@@ -47,9 +46,8 @@ pub(crate) fn smooth(
     }
 }
 
-/// Unit normal from the first surface towards the second. It is the mean of both surfaces' mean
-/// normals, weighted by the inverse of their variances. So a face decides at an edge, and the
-/// smooth side decides on a noisy scan.
+/// Unit normal from the first surface towards the second: the mean of both surfaces' mean normals, weighted by the inverse
+/// of their variances. So where an edge meets a face, the face decides, and on a noisy scan the smoother surface does.
 pub(crate) fn common_normal(mean_a: Vec3, mean_b: Vec3) -> Option<Vec3> {
     let weighted = |mean: Vec3| {
         let spread = (1.0 - mean.length()).max(0.0);

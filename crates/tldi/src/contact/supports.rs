@@ -14,8 +14,8 @@ use std::f32::consts::SQRT_2;
 pub(crate) struct Supports {
     /// Indices of up to [`PATCH_POINTS`] of the points.
     pub(crate) indices: ArrayVec<usize, PATCH_POINTS>,
-    /// Their gaps, in metres, about the plane that fits all gaps best. The flatter the gaps are,
-    /// the more it is the plane on which most of them lie.
+    /// Their gaps above a plane, in metres: the plane that fits all gaps best, or, the flatter the gaps are,
+    /// the one on which most of them lie.
     pub(crate) above_plane: ArrayVec<f32, PATCH_POINTS>,
     /// 1 if so many gaps lie on one plane that the others count as errors, as at the rim of a face
     /// with estimated normals. 0 if the gaps bend, or too few are on any plane.
@@ -45,10 +45,10 @@ const MOST_LOW: f32 = 2.5;
 /// are 0.02 mean radii off.
 const FLAT: [f32; 2] = [0.35, 0.5];
 
-/// Which of `points`, on one plane with the unit normal `normal`, a body would rest on. Each of four directions gives
-/// the point that is farthest out and lowest: one standard deviation of extent counts as much as √2 of roughness, which
-/// is at least `smooth` metres. The directions lead to the corners: they are those in which the points reach out
-/// farthest if their extents along both main axes are made equal.
+/// Chooses those of `points`, on one plane with the unit normal `normal`, on which a body would rest: for each of four
+/// directions, the point that is farthest out and lowest. One standard deviation of extent counts as much as √2 of
+/// roughness, which is at least `smooth` metres. The directions lead to the corners: in them the points reach out
+/// farthest once their extents along both main axes are made equal.
 ///
 /// Heights are measured from the plane that fits the gaps. So the choice does not depend on the
 /// tilt of the body, and a lifted edge remains. Cost: linear in points.
@@ -131,7 +131,7 @@ impl ContactPatch {
     }
 }
 
-/// Those of many `points` on which a body would rest, lowest first, and the deepest, unless it is deeper by less than `scatter`.
+/// The `points` on which a body would rest, lowest first, and the deepest point if it is deeper than these by `scatter` or more.
 fn bearing(
     points: &[ContactPoint],
     normal: Vec3,
@@ -149,9 +149,9 @@ fn bearing(
     kept
 }
 
-/// Indices of the places that are farthest out in one of four directions. How low a place is counts, too. Places are in
-/// standard deviations along both axes; `extents` are these, their product being 1. How far out a place is goes by
-/// metres: a pixel that is missing at the corner of a rod must not cost many pixels of its length.
+/// Indices of the places that are farthest out and lowest in four directions. Places are in standard deviations along both
+/// axes. `extents` are these deviations, scaled so that their product is 1: how far out a place is goes by metres, so that a
+/// pixel that is missing at the corner of a rod does not cost many pixels of its length.
 fn farthest_out(
     lows: impl ExactSizeIterator<Item = (Vec2, f32)> + Clone,
     extents: Vec2,
@@ -178,8 +178,8 @@ fn farthest_out(
 }
 
 /// Angle of the first of four directions, at right angles to each other, in which `places` reach out
-/// farthest: where their fourth powers, as complex numbers, have their mean. The main axes of a square
-/// are anywhere, this is at its corners.
+/// farthest: a quarter of the angle of the mean of their fourth powers, as complex numbers. For a square this
+/// leads to its corners, where main axes would be arbitrary.
 fn corner_angle(places: impl Iterator<Item = Vec2>) -> f32 {
     let fourth_power = |z: Vec2| {
         let square = z.rotate(z);

@@ -1,8 +1,8 @@
 //! The least way out decides how deep surfaces are in each other.
 //!
-//! A view from the side of a shallow overlap sees its width: true, but not how deep it is. Along the way that such a
+//! A view from the side of a shallow overlap sees its width, which is more than its depth. Along the way on which such a
 //! contact pixel would push the bodies apart, another view sees them overlap by much less. And no overlap is deeper than the
-//! way on which all that a view shows comes apart.
+//! way by which one body must move for everything in a view to come apart.
 
 use crate::contact::retain_by_index;
 use crate::view::camera_policy::MAX_VIEWS;
@@ -14,7 +14,7 @@ use arrayvec::ArrayVec;
 /// instead of 4; twice: no row changes.
 const LEAST_ELSEWHERE: f32 = 0.5;
 
-/// Most places along a contact's ray that are looked up in another view, so that the cost does not grow with the depth.
+/// Most places along a contact's ray that are looked up in another view, so that deep contacts cost no more.
 /// With 4, twice as many clouds with normals are told to be much too deep. Half or twice: no row changes.
 const MOST_PLACES: f32 = 16.0;
 
