@@ -6,16 +6,16 @@
 //! sharp, because at that size pixels show every edge as round.
 
 use crate::ContactPixel;
-use crate::contact::ramp::ramp;
+use crate::contact::beyond::beyond;
 use arrayvec::ArrayVec;
 use glamx::{Mat3, Vec2, Vec3};
 
 /// Most faces that meet. A corner has three, or three of its faces suffice.
 const MOST_FACES: usize = 3;
 
-/// Difference between the slopes of the gaps over two faces at which they begin to count as two,
-/// and at which they fully do. Halved: 10 of 636 stability rows fail instead of 3; doubled: depths 26 % worse.
-const APART: [f32; 2] = [0.5, 1.0];
+/// Difference between the slopes of the gaps over two faces [`beyond`] which they count as two. Half: 10 of 636 stability rows
+/// fail instead of 3; twice: depths 26 % worse.
+const APART: f32 = 0.5;
 
 /// Largest difference between the slope of the gaps in a pixel and that over its face, while the
 /// face is searched and once it is found. Steep faces are allowed more. `NEAR_FACE`: half: depths 25 % worse;
@@ -24,23 +24,22 @@ const APART: [f32; 2] = [0.5, 1.0];
 const NEAR_FACE: f32 = 0.3;
 const OF_FACE: f32 = 0.15;
 
-/// Least share of the pixels that a face needs. And the share of the pixels of all faces at which faces begin to explain the
-/// contact, and at which they fully do. Noise has normals of all kinds. `LEAST_FACE`: none: bodies in corners of a tray
-/// have contacts that are 2 to 10 r̄ too deep; twice: bare sharp corners are 0.05 r̄ off in place of 0.02. `OF_FACES`:
-/// halved: corners rounded by r̄ scatter by 0.34 r̄ in place of 0.20, bare sharp ones are 28 % better; doubled: depths of
-/// edges 2 to 10 times as wrong.
+/// Least share of the pixels that a face needs: noise has normals of all kinds. None: bodies in corners of a tray have contacts
+/// that are 2 to 10 r̄ too deep; twice: bare sharp corners are 0.05 r̄ off in place of 0.02.
 const LEAST_FACE: f32 = 0.025;
-const OF_FACES: [f32; 2] = [0.4, 0.6];
 
-/// Height in pixels of the lowest pixel above all faces at which faces begin to fail as an
-/// explanation, and at which they do fail. A round surface is above its tangents. Both halved or doubled: no change in any
-/// suite; none: a rim that pierces a plate is told to be 3 r̄ too deep.
-const ROUND: [f32; 2] = [0.1, 0.25];
+/// Share of the pixels that all faces have together [`beyond`] which faces explain the contact. A third less: corners rounded by
+/// r̄ scatter by 0.34 r̄ in place of 0.20; a third more: bare sharp corners are up to 0.05 r̄ off in place of 0.04.
+const OF_FACES: f32 = 0.3;
 
-/// Distance in pixels from where faces meet to the nearest pixel at which faces begin to fail as an explanation, and at which
-/// they do fail: half the diagonal of a pixel, and half more. Faces that meet where the surfaces do not are those of noise.
-/// Half: bare sharp corners are 0.16 r̄ off in place of 0.02; twice: a cast meets the edge of a turning bar 0.7 r̄ early.
-const OFF_VERTEX: [f32; 2] = [0.71, 1.06];
+/// Height in pixels of the lowest pixel above all faces [`beyond`] which these are no explanation: a round surface is above its
+/// tangents. Half or twice: no change in any suite; none: a rim that pierces a plate is told to be 3 r̄ too deep.
+const ROUND: f32 = 0.17;
+
+/// Square of the distance in pixels from where faces meet to the nearest pixel [`beyond`] which they are no explanation. Within
+/// a pixel it is at most 0.5 from the middle; faces that meet where there is no pixel are those of noise. Half: bare sharp
+/// corners are 0.16 r̄ off in place of 0.02; twice: a cast meets the edge of a turning bar 1.2 r̄ early.
+const OFF_VERTEX: f32 = 0.5;
 
 /// The gap over a face, in metres, at a place on the plane of a contact: `at_origin + slope · place`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -117,15 +116,16 @@ pub(crate) fn lower_by<'a>(
     };
     let faces_there = vertex.faces.iter().map(|face| face.at(place));
     let above = plane.gap(lowest) - faces_there.fold(f32::NEG_INFINITY, f32::max);
-    let beside = |contact: &ContactPixel| plane.place(contact.middle()).distance(vertex.place);
-    let (count, beside) = pixels.fold((0.0, f32::INFINITY), |(count, nearest), contact| {
-        (count + 1.0, beside(contact).min(nearest))
+    let off_vertex =
+        |contact: &ContactPixel| plane.place(contact.middle()).distance_squared(vertex.place);
+    let (count, nearest) = pixels.fold((0.0, f32::INFINITY), |(count, nearest), contact| {
+        (count + 1.0, off_vertex(contact).min(nearest))
     });
     let of_faces: f32 = faces.iter().map(|face| face.pixels).sum();
-    let sure = ramp(vertex.apart, APART)
-        * ramp(of_faces / count, OF_FACES)
-        * (1.0 - ramp(above / pixel_size, ROUND))
-        * (1.0 - ramp(beside / pixel_size, OFF_VERTEX));
+    let sure = beyond(vertex.apart / APART)
+        * beyond(of_faces / count / OF_FACES)
+        * (1.0 - beyond(above / pixel_size / ROUND))
+        * (1.0 - beyond(nearest / pixel_size.powi(2) / OFF_VERTEX));
     sure * (deepest_gap - vertex.gap)
 }
 
@@ -146,7 +146,7 @@ fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_FACES> {
             .map(|face| (off(face.slope), face.slope))
             .max_by(|m, n| m.0.total_cmp(&n.0));
         match farthest {
-            Some((off, slope)) if seeds.is_empty() || off >= APART[0] => seeds.push(slope),
+            Some((off, slope)) if seeds.is_empty() || off >= APART => seeds.push(slope),
             _ => break,
         }
     }
@@ -174,7 +174,7 @@ fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_FACES> {
         // From the extremes to where most are.
         let near = around(around(seed, NEAR_FACE).slope, NEAR_FACE);
         let face = around(near.slope, OF_FACE);
-        let is_new = |known: &Face| known.slope.distance(face.slope) >= APART[0];
+        let is_new = |known: &Face| known.slope.distance(face.slope) >= APART;
         if face.pixels > LEAST_FACE * count && faces.iter().all(is_new) {
             faces.push(face);
         }

@@ -1,5 +1,6 @@
 //! Contacts: from contact pixels to the few points that a solver takes. On the CPU for every backend.
 
+pub(crate) mod beyond;
 pub(crate) mod bowl;
 pub(crate) mod crease;
 pub(crate) mod gap_fit;
@@ -12,7 +13,6 @@ pub(crate) mod part_shape;
 pub(crate) mod patch_types;
 pub(crate) mod patches;
 mod point_axes;
-pub(crate) mod ramp;
 pub(crate) mod smooth;
 pub(crate) mod supports;
 pub(crate) mod way_out;

@@ -1,9 +1,9 @@
 //! Which of many contact points the solver gets.
 
+use crate::contact::beyond::beyond;
 use crate::contact::bowl::{Bowl, Floor, Lowest};
 use crate::contact::main_plane::GapPlane;
 use crate::contact::point_axes::MainAxes;
-use crate::contact::ramp::ramp;
 use crate::{ContactPatch, ContactPoint, PATCH_POINTS};
 use arrayvec::ArrayVec;
 use glamx::{Vec2, Vec3};
@@ -39,11 +39,10 @@ pub(crate) struct Supports {
 /// seeds instead of one; twice: no change.
 const MOST_LOW: f32 = 2.5;
 
-/// Share of points on one plane at which gaps begin to count as flat, and at which they fully do.
-/// Measured: faces of 10 × 10 points have 0.6 on a plane and 0.43 on each other, where their rims
-/// meet. Halved: 17 of 636 stability rows fail instead of 3; doubled: depths of boxes on ramps, exact now,
-/// are 0.02 mean radii off.
-const FLAT: [f32; 2] = [0.35, 0.5];
+/// Share of points on one plane [`beyond`] which gaps count as flat. Measured: faces of 10 × 10 points have 0.6 on a plane and
+/// 0.43 on each other, where their rims meet. Half: 17 of 636 stability rows fail instead of 3; twice: depths of boxes on
+/// ramps, exact now, are 0.02 mean radii off.
+const FLAT: f32 = 0.33;
 
 /// Chooses those of `points`, on one plane with the unit normal `normal`, on which a body would rest: for each of four
 /// directions, the point that is farthest out and lowest. One standard deviation of extent counts as much as √2 of
@@ -72,7 +71,7 @@ pub(crate) fn supports(points: &[ContactPoint], normal: Vec3, smooth: f32) -> Su
         (plane, 0.0)
     } else {
         let (main_plane, share) = plane.of_most(heights(), roughness, smooth);
-        let flatness = ramp(share, FLAT);
+        let flatness = beyond(share / FLAT);
         (plane.lerp(main_plane, flatness), flatness)
     };
     let above_plane = |height| main_plane.residual(height);

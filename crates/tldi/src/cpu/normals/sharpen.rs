@@ -6,7 +6,6 @@
 //! second pass takes what the neighbours have taken. Where a surface bends or is noisy, nothing is
 //! flat, and normals stay as they are.
 
-use crate::contact::ramp::ramp;
 use crate::cpu::lanes::multiversioned;
 use crate::cpu::normals::estimate::NormalScratch;
 use crate::cpu::normals::near_values::NearValues;
@@ -125,7 +124,8 @@ pub(crate) fn sharpen(
                 let Some((face, weight)) = mean(point, own, limits, flat_around) else {
                     continue;
                 };
-                let share = ramp(own.variance / on_plane, [1.0, OFF_PLANE]) * weight.min(1.0);
+                let off_plane = (own.variance / on_plane - 1.0) / (OFF_PLANE - 1.0);
+                let share = off_plane.clamp(0.0, 1.0) * weight.min(1.0);
                 adopted.push((k, own.towards(&face, share)));
             }
         }
