@@ -126,8 +126,8 @@ pub(crate) const KNOWN_FAILURES: &[KnownFailure] = &[
     known(
         "tunnelling",
         "waves",
-        (7, 48_877, Tries::Hits),
-        "of small bodies in troughs hardly wider than they are, where a wave rises faster than rapier undoes \
+        (8, 48_867, Tries::Hits),
+        "of bodies of 2.7 to 4.1 r̄ in troughs hardly wider than they are, where a wave rises faster than rapier undoes \
          penetrations, or their first contacts push to both sides.",
         ANY_SHARE,
     ),
