@@ -13,11 +13,6 @@
 // Steps of a weight: MAX_CANDIDATES = 512 of them stay below 2^31.
 const WEIGHT_STEPS: f32 = 1048576.0;
 
-// From 0 at the start to 1 at the end.
-fn ramp(value: f32, start: f32, end: f32) -> f32 {
-    return clamp((value - start) / (end - start), 0.0, 1.0);
-}
-
 // The plane of survivor `i` after the pass.
 fn sharpened(i: u32, is_second: bool) -> Plane {
     var own = planes[i];
@@ -80,7 +75,8 @@ fn sharpened(i: u32, is_second: bool) -> Plane {
     let normal = vec3f(normals);
     let weight = f32(weights);
     if weight > 0.0 && dot(normal, normal) > 0.0 {
-        let share = ramp(own.variance / most, 1.0, OFF_PLANE) * min(weight / WEIGHT_STEPS, 1.0);
+        let off_plane = (own.variance / most - 1.0) / (OFF_PLANE - 1.0);
+        let share = clamp(off_plane, 0.0, 1.0) * min(weight / WEIGHT_STEPS, 1.0);
         let mean = vec2f(offs) / weight * vec2f(flat * flat, flat);
         if share >= 1.0 {
             // Nothing of its own is left. It may be INFINITE, beside which some drivers' `mix` loses all else.
