@@ -16,8 +16,8 @@ struct Column {
     is_body: bool,
     near: f32,
     far: f32,
-    // Whether the image shows little but an edge: there the surface ends, at `far` where it is in front.
-    shows_edge: bool,
+    // The layer at which the surface ends in its rim, or NONE; at `far` where it is in front.
+    rim: u32,
     is_in_front: bool,
 }
 
@@ -35,24 +35,20 @@ fn column(s: u32, pixel: u32) -> Column {
     var c: Column;
     c.begin = atomicLoad(&work[begin_at(s, pixel)]);
     c.end = atomicLoad(&work[end_at(s, pixel)]);
+    c.rim = NONE;
     return c;
 }
 
-// Whether layer `k` is an end of a surface that shows little but an edge. See the CPU's.
-fn is_end(c: Column, k: u32) -> bool {
-    return c.shows_edge && is_edge_on(layers[k].normal);
-}
-
 fn depth_of(c: Column, k: u32) -> f32 {
-    return select(layers[k].depth, select(layers[k].near, layers[k].far, c.is_in_front), is_end(c, k));
+    return select(layers[k].depth, select(layers[k].near, layers[k].far, c.is_in_front), k == c.rim);
 }
 
 fn normal_of(c: Column, k: u32) -> vec3f {
-    return select(layers[k].normal, vec3f(0.0, 0.0, 1.0), is_end(c, k));
+    return select(layers[k].normal, vec3f(0.0, 0.0, 1.0), k == c.rim);
 }
 
 fn facing_of(c: Column, k: u32) -> i32 {
-    return select(layers[k].facing, UNKNOWN, c.is_turned || is_end(c, k));
+    return select(layers[k].facing, UNKNOWN, c.is_turned || k == c.rim);
 }
 
 fn is_best_seen(look: ptr<function, Look>, normal: vec3f) -> bool {
@@ -177,11 +173,11 @@ fn facing_camera(normal: vec3f, sign: f32) -> vec3f {
     return select(normal, -normal, normal.z * sign < 0.0);
 }
 
-// How much the normal of a layer counts for a body. See the CPU's.
+// How much the normal of a layer counts for a body. A rim has none. See the CPU's.
 fn share_of(c: Column, k: u32, side: f32) -> f32 {
     let agreement = layers[k].agreement;
-    let is_edge = agreement * side * normal_of(c, k).z > 0.0;
-    return select(1.0, abs(agreement), is_edge);
+    let is_edge = agreement * side * layers[k].normal.z > 0.0;
+    return select(select(1.0, abs(agreement), is_edge), 0.0, k == c.rim);
 }
 
 fn opposed(entry: vec3f, leaving: vec3f) -> bool {
@@ -354,41 +350,29 @@ fn is_beyond(pair: u32, view: u32) -> bool {
     return unordered(back) > FARTHEST * max(way_on, moved) + pairs[pair].params.thickness;
 }
 
-// Whether most pixels that show anything of a side show it edge-on. See the CPU's.
-fn shows_edge(s: u32, view: u32) -> bool {
-    return bitcast<i32>(atomicLoad(&work[batch.views_at + view * VIEW_WORDS + EDGES + s])) > 0;
-}
-
 // The column with what is known of its side.
 fn of_side(c: Column, s: u32, view: u32) -> Column {
     var known = c;
     known.is_body = (views[view].flags & (BODY << s)) != 0u;
     known.near = select(-INFINITE, views[view].near[s], known.is_body);
     known.far = select(INFINITE, views[view].far[s], known.is_body);
-    known.shows_edge = shows_edge(s, view);
     return known;
 }
 
-// `met` is what the layers face that the other surface can meet.
-fn turned_column(c: Column, met: i32, from_behind: bool) -> Column {
+// The column of side `s` as the body that rays leave where they enter the other one, or the other way round.
+fn met_column(c: Column, s: u32, is_in_front: bool, from_behind: bool, place: Place, view: u32) -> Column {
     var column = c;
+    column.is_in_front = is_in_front;
+    let outermost = select(c.begin, c.end - 1u, is_in_front);
+    if is_rim(s, outermost, is_in_front, place, view) {
+        column.rim = outermost;
+    }
     column.is_turned = from_behind;
     for (var k = c.begin; k < c.end; k++) {
-        column.is_turned = column.is_turned && facing_of(c, k) != met;
+        let is_met = k != column.rim && layers[k].facing == met_facing(is_in_front);
+        column.is_turned = column.is_turned && !is_met;
     }
     return column;
-}
-
-// As the body that rays leave where they enter the other one.
-fn in_front(c: Column, from_behind: bool) -> Column {
-    var column = c;
-    column.is_in_front = true;
-    return turned_column(column, EXIT, from_behind);
-}
-
-// As the body that rays enter where they leave the other one.
-fn at_back(c: Column, from_behind: bool) -> Column {
-    return turned_column(c, ENTRY, from_behind);
 }
 
 @compute @workgroup_size(256)
@@ -429,8 +413,8 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     }
     let size = views[view].rect_size;
     let pixel = vec2u(in_image % size.x, in_image / size.x);
+    let place = Place(vec2i(pixel), vec2i(size), k - in_image);
     if atomicLoad(&found[pair * PAIR_WORDS + CROSSINGS]) < CROSSED {
-        let place = Place(vec2i(pixel), vec2i(size), k - in_image);
         var crossings = PIERCED * u32(pierces(a, b, place, look.params.thickness));
         if pixel.x + 1u < size.x {
             crossings += SWAPPED
@@ -451,13 +435,18 @@ fn compare(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     b = of_side(b, 1u, view);
     let behind = (vec2u(flags) & vec2u(FROM_BEHIND, FROM_BEHIND << 1u)) != vec2u();
     let at = views[view].rect_origin + vec2i(pixel);
-    if look.is_beyond {
-        contact_pixels(&look, in_front(a, behind.x), at_back(b, behind.y), false, view, at);
+    let is_a_in_front = look.is_beyond;
+    let met_a = met_column(a, 0u, is_a_in_front, behind.x, place, view);
+    let met_b = met_column(b, 1u, !is_a_in_front, behind.y, place, view);
+    if is_a_in_front {
+        contact_pixels(&look, met_a, met_b, false, view, at);
     } else {
-        contact_pixels(&look, in_front(b, behind.y), at_back(a, behind.x), false, view, at);
+        contact_pixels(&look, met_b, met_a, false, view, at);
     }
     let facts = &pairs[pair].sides;
     if ((*facts)[0].flags & (*facts)[1].flags & ORIENTED) != 0u {
-        contact_pixels(&look, in_front(a, false), at_back(b, false), true, view, at);
+        let front = met_column(a, 0u, true, false, place, view);
+        let back = met_column(b, 1u, false, false, place, view);
+        contact_pixels(&look, front, back, true, view, at);
     }
 }

@@ -17,10 +17,6 @@ fn are_finite(v: vec4f) -> bool {
     return all((bitcast<vec4u>(v) & vec4u(0x7fffffffu)) < vec4u(0x7f800000u));
 }
 
-fn is_within(p: vec3f, low: vec3f, high: vec3f) -> bool {
-    return all(p >= low) && all(p <= high);
-}
-
 @compute @workgroup_size(256)
 fn cull(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let item_index = group_index(group);

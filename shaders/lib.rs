@@ -69,7 +69,12 @@ const ALLOC: &str = shader!("shared/pixels.wgsl", "alloc.wgsl");
 const SPLAT: &str = shader!("shared/pixels.wgsl", "splat.wgsl");
 const SWEEP: &str = shader!("shared/pixels.wgsl", "shared/view_of.wgsl", "sweep.wgsl");
 const WAYS_OUT: &str = shader!("shared/pixels.wgsl", "shared/view_of.wgsl", "ways_out.wgsl");
-const COMPARE: &str = shader!("shared/pixels.wgsl", "shared/view_of.wgsl", "compare.wgsl");
+const COMPARE: &str = shader!(
+    "shared/pixels.wgsl",
+    "shared/view_of.wgsl",
+    "rims.wgsl",
+    "compare.wgsl"
+);
 
 const fn stage(name: &'static str, source: &'static str, bindings: &'static [u32]) -> Stage {
     Stage {

@@ -72,8 +72,8 @@ numbers! {
     /// Words of a side in the arena.
     SIDE_WORDS = 8;
     /// Words of a view in the arena: greatest and least coordinates of what is seen of each side, as ordered numbers (the
-    /// least ones negated), the touching tiles' bounds likewise, and what of each side is edge-on.
-    VIEW_WORDS = 18;
+    /// least ones negated), and the touching tiles' bounds likewise.
+    VIEW_WORDS = 16;
 
     /// Words of a pair in what is read back.
     PAIR_WORDS = 29;

@@ -13,9 +13,6 @@ const MOST_FRAGMENTS: u32 = 1024u;
 
 var<workgroup> total: atomic<u32>;
 var<workgroup> base: u32;
-// Where it is counted what the first pixel's image shows edge-on, and the group's part of it.
-var<workgroup> main_at: u32;
-var<workgroup> main_edges: atomic<i32>;
 
 fn sift(begin: u32, start: u32, count: u32) {
     var root = start;
@@ -207,10 +204,9 @@ fn layer_of(start: u32, end: u32, oriented: bool, knows_faces: bool, view: u32) 
     return layer;
 }
 
-// Writes the layers of a pixel, in order of depth, then of facing. 1 if all of them are edge-on, -1 if not.
-fn write_layers(begin: u32, end: u32, first_layer: u32, view: u32, s: u32) -> i32 {
+// Writes the layers of a pixel, in order of depth, then of facing.
+fn write_layers(begin: u32, end: u32, first_layer: u32, view: u32, s: u32) {
     let merge_steps = pairs[view / MAX_VIEWS].sides[s].merge_steps;
-    var are_edge_on = true;
     let flags = pairs[view / MAX_VIEWS].sides[s].flags;
     let oriented = (flags & (HAS_NORMALS | ORIENTED)) == (HAS_NORMALS | ORIENTED);
     // Estimated ones are sharpened.
@@ -234,17 +230,10 @@ fn write_layers(begin: u32, end: u32, first_layer: u32, view: u32, s: u32) -> i3
                 place--;
             }
             layers[place] = layer;
-            are_edge_on = are_edge_on && is_edge_on(layer.normal);
             slot++;
             start = i + 1u;
         }
     }
-    return select(-1, 1, are_edge_on);
-}
-
-// Where it is counted what is edge-on.
-fn edges_at(view: u32, s: u32) -> u32 {
-    return batch.views_at + view * VIEW_WORDS + EDGES + s;
 }
 
 @compute @workgroup_size(256)
@@ -287,7 +276,6 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
     workgroupBarrier();
     if lane == 0u {
         base = atomicAdd(&work[LAYERS], atomicLoad(&total));
-        main_at = select(NONE, edges_at(view, s), exists);
     }
     workgroupBarrier();
     let first_layer = base + own;
@@ -297,15 +285,6 @@ fn sweep(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
         atomicStore(&work[end_at(s, pixel)], select(first_layer, first_layer + count, fitting));
     }
     if exists && fitting && count > 0u {
-        let surplus = write_layers(begin, end, first_layer, view, s);
-        if edges_at(view, s) == main_at {
-            atomicAdd(&main_edges, surplus);
-        } else {
-            atomicAdd(&work[edges_at(view, s)], bitcast<u32>(surplus));
-        }
-    }
-    workgroupBarrier();
-    if lane == 0u && main_at != NONE {
-        atomicAdd(&work[main_at], bitcast<u32>(atomicLoad(&main_edges)));
+        write_layers(begin, end, first_layer, view, s);
     }
 }

@@ -38,6 +38,10 @@ fn turned(x: vec4f, y: vec4f, z: vec4f, v: vec3f) -> vec3f {
     return vec3f(dot(x.xyz, v), dot(y.xyz, v), dot(z.xyz, v));
 }
 
+fn is_within(p: vec3f, low: vec3f, high: vec3f) -> bool {
+    return all(p >= low) && all(p <= high);
+}
+
 // See `tldi::plan::is_aim_sample`.
 fn hash(index: u32) -> u32 {
     var h = (index ^ (index >> 16u)) * 0x7feb352du;
@@ -69,6 +73,10 @@ fn splat_radius(radius: f32, pixel_size: f32) -> f32 {
 
 fn is_edge_on(normal: vec3f) -> bool {
     return abs(normal.z) < EDGE_ON;
+}
+
+fn is_steep(normal: vec3f) -> bool {
+    return abs(normal.z) < STEEP;
 }
 
 // Length of a motion, metres, if it is along the axis; else 0.

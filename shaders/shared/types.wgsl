@@ -276,10 +276,6 @@ const SAMPLE_COUNT: u32 = 4u;
 // Words of a view in the arena from which on the bounds of its touching tiles are.
 const TOUCHED: u32 = 12u;
 
-// Words of a view in the arena, of `a` and of `b`: how many more of the pixels that show anything show it edge-on than not,
-// as an `i32`.
-const EDGES: u32 = 16u;
-
 // Steps of the sum of radii, in shares of the largest: 2^20.
 const RADIUS_STEPS: f32 = 1048576.0;
 

@@ -84,7 +84,8 @@ impl GapAlongView {
     fn of(contact: &ContactPixel, axis: Vec3) -> Self {
         let normal = contact.normal();
         let axis = if normal.dot(axis) < 0.0 { -axis } else { axis };
-        let normals = [contact.normal_a, -contact.normal_b].map(Vec3::normalize_or_zero);
+        // A rim, which has no normal, is a point across the view.
+        let normals = [contact.normal_a, -contact.normal_b].map(|normal| normal.normalize_or(axis));
         let [cos_a, cos_b] = normals.map(|normal| normal.dot(axis).max(LEAST_COSINE));
         let [across_a, across_b] = normals.map(|normal| normal.reject_from_normalized(axis));
         let cosine = normal.dot(axis).max(LEAST_COSINE);

@@ -17,6 +17,9 @@ const SAME_SURFACE_PX: f32 = 3.0;
 /// instead of none.
 const CONFIRMING: u32 = 5;
 
+/// The same where a surface ends in its rim, which is a line of pixels. 1: TODO; 3: TODO.
+const CONFIRMING_RIM: u32 = 2;
+
 /// From a pixel to its neighbours that come after it, row by row: columns and rows.
 const AFTER: [[i64; 2]; 4] = [[1, 0], [-1, 1], [0, 1], [1, 1]];
 
@@ -99,11 +102,15 @@ impl Links {
         self.marks.clear();
         let counted = self.counts.iter().zip(&mut result.contacts);
         self.marks.extend(counted.map(|(&count, contact)| {
-            if count < CONFIRMING {
+            let confirming = match contact.is_at_rim() {
+                true => CONFIRMING_RIM,
+                false => CONFIRMING,
+            };
+            if count < confirming {
                 if is_deep(contact) {
                     return NONE;
                 }
-                let confirmed = count as f32 / CONFIRMING as f32 * params.thickness;
+                let confirmed = count as f32 / confirming as f32 * params.thickness;
                 contact.gap = contact.gap.max(-confirmed);
             }
             0

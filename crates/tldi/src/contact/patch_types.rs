@@ -16,7 +16,7 @@ pub struct ContactPixel {
     /// Point on the second surface, metres; on the same ray as `point_a`.
     pub point_b: Vec3,
     /// Outward normal of the first surface, towards the second. It has unit length on a face and is
-    /// shorter at an edge ([`Layer::agreement`](crate::Layer::agreement)).
+    /// shorter at an edge ([`Layer::agreement`](crate::Layer::agreement)). It is zero where a surface ends in its rim.
     pub normal_a: Vec3,
     /// Outward normal of the second surface, towards the first, with its length as for `normal_a`.
     pub normal_b: Vec3,
@@ -35,6 +35,11 @@ impl ContactPixel {
     /// Midway between the surfaces, metres.
     pub fn middle(&self) -> Vec3 {
         0.5 * (self.point_a + self.point_b)
+    }
+
+    /// Whether a surface ends there in its rim.
+    pub(crate) fn is_at_rim(&self) -> bool {
+        self.normal_a == Vec3::ZERO || self.normal_b == Vec3::ZERO
     }
 }
 

@@ -4,9 +4,11 @@
 //! one through which they enter the first; and the other way round where the normals of both tell what is outside.
 
 use super::crossings::{Crossings, best_seen};
+use super::cull::Region;
 use super::fold::ViewFold;
-use super::pixel_column::{PixelColumn, Span, shows_edge};
-use super::sweep::{is_edge_on, share_of};
+use super::pixel_column::{PixelColumn, Span};
+use super::rims::{End, SurfacePixel};
+use super::sweep::is_edge_on;
 use super::ways_out::WaysOut;
 use crate::stage::stage;
 use crate::view::camera_policy::MAX_VIEWS;
@@ -33,6 +35,8 @@ pub(crate) struct Seen<'a> {
     pub(crate) moved: Option<f32>,
     /// Of the columns and rows of both images, if they are folded.
     pub(crate) fold: Option<&'a ViewFold>,
+    /// Which points of `a`, and of `b`, are in the images; `None` where an image does not show rims.
+    pub(crate) regions: [Option<&'a Region>; 2],
 }
 
 impl Seen<'_> {
@@ -62,7 +66,6 @@ pub(crate) fn compare(
     let [width, height] = a.size;
     let frame_from_view = a.camera.view_from_frame.inverse();
     let others = seen.others(&a.camera);
-    let [a_shows_edge, b_shows_edge] = [a, b].map(shows_edge);
     let shows_contacts = seen.view < result.axes.len();
     let ways = shows_contacts.then(|| WaysOut::of_all(a, b)).flatten();
     let is_beyond = shows_contacts
@@ -93,17 +96,25 @@ pub(crate) fn compare(
                 others: &others,
                 is_beyond,
             };
-            let [behind_a, behind_b] = seen.from_behind;
-            let of_a = PixelColumn::new(la, seen.bodies[0], a_shows_edge);
-            let of_b = PixelColumn::new(lb, seen.bodies[1], b_shows_edge);
-            let (back, front) = match is_beyond {
-                false => (of_a.at_back(behind_a), of_b.in_front(behind_b)),
-                true => (of_b.at_back(behind_b), of_a.in_front(behind_a)),
+            let column = |side: usize, end: End, from_behind: bool| {
+                let pixel = SurfacePixel {
+                    image: [a, b][side],
+                    at: [i, j],
+                    in_view: at.pixel,
+                    region: seen.regions[side],
+                };
+                let ends_in_rim = pixel.ends_in_rim(end, params);
+                let column = PixelColumn::new([la, lb][side], seen.bodies[side]);
+                column.met_at(end, from_behind, ends_in_rim)
             };
-            contact_pixels([front, back], Order::OfAxis, &at, params, result);
+            let [front, back] = if is_beyond { [0, 1] } else { [1, 0] };
+            let columns = [(front, End::Far), (back, End::Near)]
+                .map(|(side, end)| column(side, end, seen.from_behind[side]));
+            contact_pixels(columns, Order::OfAxis, &at, params, result);
             if seen.tells_facing {
-                let (front, back) = (of_a.in_front(false), of_b.at_back(false));
-                contact_pixels([front, back], Order::Reversed, &at, params, result);
+                let columns = [(0, End::Far), (1, End::Near)];
+                let columns = columns.map(|(side, end)| column(side, end, false));
+                contact_pixels(columns, Order::Reversed, &at, params, result);
             }
         }
     }
@@ -181,7 +192,7 @@ fn contact_pixels(
                     }
                 }
             });
-        let Some((_, ref entry, _)) = entry else {
+        let Some((kb, ref entry, _)) = entry else {
             continue;
         };
         // Outward normals in the view frame: the ray leaves the front body and enters the other.
@@ -203,8 +214,14 @@ fn contact_pixels(
         let in_frame = |v: Vec3| at.frame_from_view.rotation * v;
         let [u, v] = at.pixel.map(|c| c as f32 + 0.5);
         let point = |layer: &Layer| *at.frame_from_view * at.camera.view_at(u, v, layer.depth);
-        let of_back = (point(entry), share_of(entry, -1.0) * in_frame(normal_back));
-        let of_front = (point(exit), share_of(exit, 1.0) * in_frame(normal_front));
+        let of_back = (
+            point(entry),
+            back.share_of(kb, -1.0) * in_frame(normal_back),
+        );
+        let of_front = (
+            point(exit),
+            front.share_of(kf, 1.0) * in_frame(normal_front),
+        );
         let ((point_a, normal_a), (point_b, normal_b)) =
             match at.is_beyond || order == Order::Reversed {
                 false => (of_back, of_front),
@@ -285,14 +302,7 @@ mod tests {
 
     /// So many equal rows of three pixels.
     fn image_of(rows: u32, columns: [Option<Layer>; 3]) -> Tldi {
-        let camera = VirtualCamera::along(Vec3::Z, 1.0);
-        let mut image = Tldi::default();
-        image.begin(&camera, [0, 0], [3, rows]);
-        for column in (0..rows).flat_map(|_| columns) {
-            image.layers.extend(column);
-            image.offsets.push(image.layers.len() as u32);
-        }
-        image
+        Tldi::of_rows(rows, &columns.each_ref().map(Option::as_slice))
     }
 
     /// A sheet that falls through a level one from the first column to the second, or is where it is.

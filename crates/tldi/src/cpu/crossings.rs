@@ -144,22 +144,30 @@ fn is_on_both_sides(
     pixel: [u32; 2],
     params: &Params,
 ) -> bool {
-    let [width, height] = image.size;
-    let goes_on = |[di, dj]: [i32; 2]| {
-        let at = [0, 1].map(|axis| pixel[axis].checked_add_signed([di, dj][axis]));
-        let [Some(i), Some(j)] = at else { return true };
-        i >= width
-            || j >= height
-            || image.layers_at(i, j).iter().any(|next| {
-                (next.depth - layer.depth).abs() <= params.thickness
-                    || (next.near..=next.far).contains(&layer.depth)
-            })
+    let continues = |next: &Layer| {
+        (next.depth - layer.depth).abs() <= params.thickness
+            || (next.near..=next.far).contains(&layer.depth)
     };
-    let beside = BESIDE * across.length();
     [across, -across].into_iter().all(|side| {
-        AROUND
-            .into_iter()
-            .filter(|&[di, dj]| side.dot(Vec2::new(di as f32, dj as f32)) >= beside)
-            .any(goes_on)
+        let mut beside = neighbors_toward(image, pixel, side);
+        beside.any(|next| next.is_none_or(|layers| layers.iter().any(continues)))
+    })
+}
+
+/// The layers of the pixels next to one that are on the `side` of it; `None` beyond the image.
+pub(super) fn neighbors_toward(
+    image: &Tldi,
+    pixel: [u32; 2],
+    side: Vec2,
+) -> impl Iterator<Item = Option<&[Layer]>> {
+    let least = BESIDE * side.length();
+    let is_beside = move |step: &[i32; 2]| {
+        let [di, dj] = step.map(|k| k as f32);
+        side.dot(Vec2::new(di, dj)) >= least
+    };
+    AROUND.into_iter().filter(is_beside).map(move |step| {
+        let at = [0, 1].map(|axis| pixel[axis].checked_add_signed(step[axis]));
+        let [Some(i), Some(j)] = at else { return None };
+        (i < image.size[0] && j < image.size[1]).then(|| image.layers_at(i, j))
     })
 }

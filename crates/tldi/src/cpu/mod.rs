@@ -20,6 +20,7 @@ pub(crate) mod normals;
 mod pair;
 mod pixel_column;
 pub(crate) mod rect;
+mod rims;
 pub(crate) mod room;
 mod scratch;
 mod side;

@@ -1,7 +1,8 @@
 //! What the ray of a pixel passes of one surface: part of the stage `compare`.
 
-use super::sweep::is_edge_on;
-use crate::{Facing, Layer, Params, Tldi};
+use super::rims::End;
+use super::sweep::{is_edge_on, share_of};
+use crate::{Facing, Layer, Params};
 use glamx::Vec3;
 
 /// Depths between which a body lies, by its bounds, where its size says that it is one.
@@ -26,76 +27,62 @@ impl Span {
 pub(super) struct PixelColumn<'a> {
     layers: &'a [Layer],
     body: Option<Span>,
-    /// Whether the image [shows little but an edge](shows_edge).
-    shows_edge: bool,
-    is_in_front: bool,
+    /// Where the surface ends in its rim, if it does: the outermost layer there stands for it.
+    rim: Option<End>,
     /// A sheet seen from behind: what its layers face says nothing.
     is_turned: bool,
 }
 
-/// Whether most pixels of an image that show anything show it edge-on, as of a card that falls edge first. There is no depth
-/// at such a pixel, and beside the faces of a body it tells nothing: the walls of a box go on above its bottom. But where a
-/// surface shows little else, it ends there.
-pub(super) fn shows_edge(image: &Tldi) -> bool {
-    let pixels = (0..image.pixel_count()).map(|k| image.layers_of(k));
-    let surplus = pixels.filter(|layers| !layers.is_empty()).map(|layers| {
-        match layers.iter().all(is_edge_on) {
-            true => 1,
-            false => -1,
-        }
-    });
-    surplus.sum::<i32>() > 0
-}
-
 impl<'a> PixelColumn<'a> {
-    pub(super) fn new(layers: &'a [Layer], body: Option<Span>, shows_edge: bool) -> Self {
+    pub(super) fn new(layers: &'a [Layer], body: Option<Span>) -> Self {
         Self {
             layers,
             body,
-            shows_edge,
-            is_in_front: false,
+            rim: None,
             is_turned: false,
         }
     }
 
-    /// As the body that rays leave where they enter the other one.
-    pub(super) fn in_front(self, from_behind: bool) -> Self {
+    /// As the body that the other one meets at this `end`.
+    pub(super) fn met_at(self, end: End, from_behind: bool, ends_in_rim: bool) -> Self {
         let column = Self {
-            is_in_front: true,
+            rim: ends_in_rim.then_some(end),
             ..self
         };
-        column.turned(Facing::Exit, from_behind)
-    }
-
-    /// As the body that rays enter where they leave the other one.
-    pub(super) fn at_back(self, from_behind: bool) -> Self {
-        self.turned(Facing::Entry, from_behind)
-    }
-
-    /// `met` is what the layers face that the other surface can meet.
-    fn turned(self, met: Facing, from_behind: bool) -> Self {
-        let is_turned = from_behind && self.all().all(|layer| layer.facing != met);
-        Self { is_turned, ..self }
+        let is_turned = from_behind && column.all().all(|layer| layer.facing != end.met());
+        Self {
+            is_turned,
+            ..column
+        }
     }
 
     pub(super) fn len(&self) -> usize {
         self.layers.len()
     }
 
-    /// Of an edge, where it ends, across the view.
+    /// The rim of a surface is where it ends, across the view.
     pub(super) fn layer(&self, k: usize) -> Layer {
         let layer = self.layers[k];
-        if !self.shows_edge || !is_edge_on(&layer) {
-            return layer;
-        }
-        Layer {
-            depth: match self.is_in_front {
-                true => layer.far,
-                false => layer.near,
+        match self.rim_at(k) {
+            Some(end) => Layer {
+                depth: end.depth(&layer),
+                normal: Vec3::Z,
+                facing: Facing::Unknown,
+                ..layer
             },
-            normal: Vec3::Z,
-            facing: Facing::Unknown,
-            ..layer
+            None => layer,
+        }
+    }
+
+    fn rim_at(&self, k: usize) -> Option<End> {
+        self.rim.filter(|end| end.outermost(self.len()) == k)
+    }
+
+    /// Weight of the normal of layer `k`: see [`share_of`]. A rim has none.
+    pub(super) fn share_of(&self, k: usize, side: f32) -> f32 {
+        match self.rim_at(k) {
+            Some(_) => 0.0,
+            None => share_of(&self.layers[k], side),
         }
     }
 
@@ -178,10 +165,9 @@ mod tests {
         let exit = |depth| layer(depth, Facing::Exit);
         let unknown = |depth| layer(depth, Facing::Unknown);
         let entered_in = |layers: &[Layer], body| {
-            PixelColumn::new(layers, body, false).entered_at(layers.len() - 1, &params)
+            PixelColumn::new(layers, body).entered_at(layers.len() - 1, &params)
         };
-        let left_in =
-            |layers: &[Layer], body| PixelColumn::new(layers, body, false).left_at(0, &params);
+        let left_in = |layers: &[Layer], body| PixelColumn::new(layers, body).left_at(0, &params);
         let entered = |layers: &[Layer]| entered_in(layers, None);
         assert_eq!(entered(&[entry(1.0), exit(9.0)]), 1.0);
         assert_eq!(entered(&[exit(9.0)]), f32::NEG_INFINITY);

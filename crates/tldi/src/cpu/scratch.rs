@@ -198,7 +198,7 @@ impl Scratch {
     pub(super) fn seen<'a>(
         &self,
         query: &PairQuery,
-        plan: &PairPlan,
+        plan: &'a PairPlan,
         camera: &VirtualCamera,
         axes: &'a [Vec3],
         view: usize,
@@ -224,6 +224,10 @@ impl Scratch {
             tells_facing: query.a.is_oriented() && query.b.is_oriented(),
             moved: (!is_told).then(|| moved_along(plan.approach.motion, axes[view])),
             fold: None,
+            regions: [(query.a, 0), (query.b, 1)].map(|(surface, side)| match surface {
+                Surface::Cloud(_) => Some(&plan.sides[side].region),
+                Surface::Exact(_) | Surface::Device(_) => None,
+            }),
         }
     }
 

@@ -21,7 +21,7 @@ pub(crate) const EDGE_ON: f32 = 0.2;
 
 /// |n·v| below which a splat is steep (37°). Its depth varies so much within a pixel that fragments within one thickness
 /// of each other count as one layer. Half or twice the angle: no change.
-const STEEP: f32 = 0.8;
+pub(crate) const STEEP: f32 = 0.8;
 
 /// Depth steps in a surface's thickness. Depths are summed as integers, so that the order of the points does not change
 /// a sum. Half or twice: no change.

@@ -56,7 +56,7 @@ impl WaysOut {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Facing, VirtualCamera};
+    use crate::Facing;
     use glamx::Vec3;
 
     fn layer(near: f32, far: f32, normal: Vec3) -> Layer {
@@ -71,18 +71,6 @@ mod tests {
         }
     }
 
-    /// A row of pixels with these layers.
-    fn image_of(columns: &[&[Layer]]) -> Tldi {
-        let mut image = Tldi::default();
-        let size = [columns.len() as u32, 1];
-        image.begin(&VirtualCamera::along(Vec3::Z, 1.0), [0, 0], size);
-        for column in columns {
-            image.layers.extend_from_slice(column);
-            image.offsets.push(image.layers.len() as u32);
-        }
-        image
-    }
-
     /// `a` is from 10 to 20, `b` from 6 to 13: it goes back by 3 and on by 14. A wall in another pixel, from 0 to 30, is only in
     /// the way of all layers.
     #[test]
@@ -91,8 +79,8 @@ mod tests {
         let wall = layer(0.0, 30.0, Vec3::X);
         let (a, b) = ([face(10.0), face(20.0)], [face(6.0), face(13.0)]);
         let lower = [face(8.0), face(11.0)];
-        let image_a = image_of(&[&a, &a, &[wall], &a, &[]]);
-        let image_b = image_of(&[&lower, &b, &b, &[], &b]);
+        let image_a = Tldi::of_rows(1, &[&a, &a, &[wall], &a, &[]]);
+        let image_b = Tldi::of_rows(1, &[&lower, &b, &b, &[], &b]);
         let faces = WaysOut {
             back: 3.0,
             on: 14.0,
@@ -104,7 +92,7 @@ mod tests {
         };
         assert_eq!(WaysOut::of_all(&image_a, &image_b), Some(all));
         assert_eq!(
-            WaysOut::of_all(&image_of(&[&a, &[]]), &image_of(&[&[], &b])),
+            WaysOut::of_all(&Tldi::of_rows(1, &[&a, &[]]), &Tldi::of_rows(1, &[&[], &b])),
             None
         );
     }

@@ -91,6 +91,19 @@ impl Tldi {
         self.offsets.push(0);
     }
 
+    /// So many equal rows of pixels with these layers, a metre wide, seen along z.
+    #[cfg(test)]
+    pub(crate) fn of_rows(rows: u32, columns: &[&[Layer]]) -> Self {
+        let mut image = Self::default();
+        let size = [columns.len() as u32, rows];
+        image.begin(&VirtualCamera::along(Vec3::Z, 1.0), [0, 0], size);
+        for column in (0..rows).flat_map(|_| columns) {
+            image.layers.extend_from_slice(column);
+            image.offsets.push(image.layers.len() as u32);
+        }
+        image
+    }
+
     /// The layers of the `k`-th pixel, row by row.
     pub(crate) fn layers_of(&self, k: usize) -> &[Layer] {
         &self.layers[self.offsets[k] as usize..self.offsets[k + 1] as usize]

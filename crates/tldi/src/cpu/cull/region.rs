@@ -39,15 +39,20 @@ impl Region {
     /// The region of the points of a radius, metres.
     pub(super) fn of_radius(&self, radius: f32) -> Self {
         let beyond = self.ring.beyond(self.included, radius);
+        self.loosened(beyond)
+    }
+
+    /// Both boxes loosened by `distance` metres.
+    pub(crate) fn loosened(&self, distance: f32) -> Self {
         Self {
-            overlap: self.overlap.loosened(beyond),
-            other_bounds: self.other_bounds.loosened(beyond),
+            overlap: self.overlap.loosened(distance),
+            other_bounds: self.other_bounds.loosened(distance),
             ..*self
         }
     }
 
     /// Whether a point, in the frame of the query, is in it.
-    pub(super) fn contains(&self, point: Vec3) -> bool {
+    pub(crate) fn contains(&self, point: Vec3) -> bool {
         self.overlap.contains(point) && self.other_bounds.contains(self.other_from_frame * point)
     }
 

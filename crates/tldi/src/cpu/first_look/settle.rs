@@ -275,6 +275,7 @@ impl Scratch {
             fold: Some(&self.shared.fold),
             // Planes of large pixels at walls that are seen edge-on tell nothing.
             tells_facing: false,
+            regions: [None; 2],
             ..self.seen(query, plan, camera, axes, view)
         };
         let [a, b] = [&self.a.image, &self.b.image];
