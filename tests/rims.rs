@@ -4,7 +4,7 @@ use rapier3d::prelude::{ColliderBuilder, PhysicsWorld, RigidBodyBuilder};
 use rapier3d_tldi::prelude::{TldiConfig, TldiPipeline};
 use std::f32::consts::{PI, TAU};
 use tldi::glamx::{Pose3, Quat, Vec3};
-use tldi::{CpuBackend, PairQuery, PointCloud};
+use tldi::{CpuBackend, ImpactQuery, PairQuery, Params, PointCloud, Surface};
 use tldi_tests::{
     Samples, aimed_clouds, compare_on, deepest_contact, gpu_backend, sampled_box, sampled_plane,
     sampled_sphere,
@@ -158,6 +158,41 @@ fn open_bodies_stand() {
                         "{name}, cuboid {is_cuboid}: {low}"
                     );
                 }
+            }
+        }
+    }
+}
+
+/// Rays enter a shade with outward normals, and do not leave it. It meets a floor all the same where it moves far.
+#[test]
+fn open_bodies_do_not_fall_through_in_one_step() {
+    let mut rng = fastrand::Rng::with_seed(53);
+    let floor = sampled_plane(1.2, R, &mut rng).bare_cloud(R);
+    for lean in [20.0_f32, 40.0, 60.0] {
+        let shade = lampshade(lean.to_radians(), &mut rng);
+        for (shade, is_bare) in [(shade.bare_cloud(R), true), (shade.cloud(R), false)] {
+            for _ in 0..10 {
+                let turn = Quat::from_rotation_y(TAU * rng.f32());
+                let height = R * (1.0 + 30.0 * rng.f32());
+                let pose = Pose3::from_parts(height * Vec3::Y, turn);
+                let impact = CpuBackend::new().impact(&ImpactQuery {
+                    a: Surface::Cloud(&floor),
+                    b: Surface::Cloud(&shade),
+                    a_from_b: pose,
+                    motion: -Vec3::Y,
+                    touching: 0.0,
+                    core_only: false,
+                    penetration: None,
+                    turned: &[],
+                    params: Params::for_radius(R),
+                });
+                let impact = impact.expect("the query is valid").expect("they meet");
+                // As much too early as splats reach over the rim, and later by the rise in a pixel.
+                let late = (impact.distance - height) / R;
+                assert!(
+                    (-0.8..=2.0).contains(&late),
+                    "{lean}°, bare {is_bare}: {late}"
+                );
             }
         }
     }

@@ -155,7 +155,7 @@ fn is_on_both_sides(
 }
 
 /// The layers of the pixels next to one that are on the `side` of it; `None` beyond the image.
-pub(super) fn neighbors_toward(
+pub(crate) fn neighbors_toward(
     image: &Tldi,
     pixel: [u32; 2],
     side: Vec2,

@@ -6,6 +6,7 @@
 
 use crate::cloud::reach::Ring;
 use crate::contact::lone_points::LonePoints;
+use crate::cpu::crossings::neighbors_toward;
 use crate::cpu::cull::{self, PointRadii, Region};
 use crate::cpu::exact::placed::Placed;
 use crate::cpu::fold::ViewFold;
@@ -18,7 +19,7 @@ use crate::pair::plan::ring;
 use crate::pair::sampling::stride;
 use crate::stage::stage;
 use crate::{Aabb, Facing, Impact, ImpactQuery, Layer, Penetration, Surface, Tldi, VirtualCamera};
-use glamx::{Pose3, Vec3};
+use glamx::{Pose3, Vec2, Vec3};
 
 /// Normals are averaged over the pixels whose distance is within this many pixels of the least. Half or twice: no row
 /// changes.
@@ -228,7 +229,13 @@ impl Motion<'_> {
             return None;
         }
         let (layers, moving) = (a.layers_of(pixel), b.layers_of(pixel));
-        let leading = (0..moving.len()).filter(|&l| is_leading(moving, l));
+        let width = b.size[0];
+        let at = [pixel as u32 % width, pixel as u32 / width];
+        let are_left = || {
+            let mut beside = neighbors_toward(b, at, Vec2::ZERO).flatten().flatten();
+            beside.any(|layer| layer.facing == Facing::Exit)
+        };
+        let leading = (0..moving.len()).filter(|&l| is_leading(moving, l, are_left));
         let met = |l: usize| {
             (0..layers.len())
                 .filter(|&k| !leaves_solid(&layers[..=k]))
@@ -325,12 +332,13 @@ fn leaves_solid(layers: &[Layer]) -> bool {
 }
 
 /// Whether a ray leaves the moving surface at this layer. If its side is unknown, the ray leaves at every second layer and
-/// at the last.
-fn is_leading(layers: &[Layer], index: usize) -> bool {
+/// at the last. `are_left` tells whether rays leave it beside this one.
+fn is_leading(layers: &[Layer], index: usize, are_left: impl Fn() -> bool) -> bool {
     let is_last = index + 1 == layers.len();
     match layers[index].facing {
         _ if is_edge_on(&layers[index]) => is_last,
-        Facing::Entry => false,
+        // An open body, which rays enter and do not leave.
+        Facing::Entry => is_last && !are_left(),
         Facing::Exit => true,
         Facing::Unknown => {
             let before = layers[..index].iter().filter(|layer| !is_edge_on(layer));
