@@ -2,7 +2,7 @@
 //! certain that is.
 
 use crate::{ContactPixel, ContactPoint};
-use glamx::{Vec2, Vec3};
+use glamx::{Mat3, Vec2, Vec3};
 
 /// Largest share of the roughness that a bowl may leave: noise of a quarter of a radius leaves a third of a ball's. Half: a
 /// ball on new samples each frame fails with each of 6 seeds instead of none; twice: depths of boxes on ramps, exact now,
@@ -26,9 +26,9 @@ const OUTERMOST: f32 = 1.5;
 /// twice: a ball on new samples each frame fails with 2 of 6 seeds instead of none.
 const LEAST_ALIKE: f32 = 0.3;
 
-/// Fewest points of a bowl. It has five unknowns, so a bowl fits any five points, with its lowest point anywhere. Half: no
+/// Fewest points of a bowl. It has six unknowns, so a bowl fits any six points, with its lowest point anywhere. Half: no
 /// change; twice: a cube that spins fast without friction on a rough floor is slowed by 3 %.
-const BOWL_POINTS: f32 = 6.0;
+const BOWL_POINTS: f32 = 7.0;
 
 /// Least spread of the squares of places, as a share of that in a disc, and least part of it that the axes do not have
 /// in common. If places differ less, rounding decides the bend. Half or twice: no change.
@@ -53,7 +53,7 @@ const ALIKE_RADII: f32 = 2.0;
 pub(crate) struct Lowest {
     /// The point, and the gap there.
     pub(crate) point: ContactPoint,
-    /// Displacement of the lowest point along each main axis, metres, for each metre of error in the slope: the gap over one
+    /// Displacement of the lowest point along each axis of the bowl, metres, for each metre of error in the slope: the gap over one
     /// standard deviation of the places.
     pub(crate) aside: [Vec3; 2],
     /// Along the same axes, vectors as long as the bowl's radii of curvature, metres.
@@ -72,18 +72,19 @@ pub(crate) struct Floor {
 /// Where gaps around the contact of a cylinder are lowest.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Valley {
-    /// The main axis across it.
-    pub(crate) across: usize,
-    /// Where its floor is along that axis, in standard deviations.
+    /// Where its floor is along the bowl's first axis, which leads across it, in standard deviations.
     pub(crate) place: f32,
     /// Rise of the gaps with the square of the distance from there, metres; distances in standard
     /// deviations.
     pub(crate) bend: f32,
 }
 
-/// A paraboloid that widens along the main axes, or does not bend, above a plane.
+/// A paraboloid that widens along two axes, or does not bend, above a plane. Its axes are those of its curvature. Where the
+/// points extend as far in all directions, their main axes are arbitrary.
 pub(crate) struct Bowl {
-    /// By how much it rises with the square of the place, in standard deviations along the main axes.
+    /// From the main axes of the points to its own: the cosine and the sine of the angle.
+    pub(crate) turn: Vec2,
+    /// By how much it rises with the square of the place along its own axes, in standard deviations along these.
     widening: Vec2,
     /// Standard deviation of the heights about it, metres.
     pub(crate) left: f32,
@@ -91,37 +92,60 @@ pub(crate) struct Bowl {
 }
 
 impl Bowl {
-    /// The bowl that fits `count` heights above a plane best, at places in standard deviations along the
-    /// main axes.
-    pub(crate) fn fit(heights: impl Iterator<Item = (Vec2, f32)> + Clone, count: f32) -> Self {
-        // Squares of the places, less their mean.
-        let bend = |place: Vec2| place * place - Vec2::ONE;
-        let (mut squares, mut mixed, mut moment) = (Vec2::ZERO, 0.0, Vec2::ZERO);
+    /// The bowl that fits heights above a plane best. They are at places along the main axes, in standard deviations, which
+    /// are `sigma` metres.
+    pub(crate) fn fit(heights: impl Iterator<Item = (Vec2, f32)> + Clone, sigma: Vec2) -> Self {
+        let (mut matrix, mut moments, mut count) = (Mat3::ZERO, Vec3::ZERO, 0.0);
         for (place, height) in heights.clone() {
-            let bend = bend(place);
-            squares += bend * bend;
-            mixed += bend.x * bend.y;
-            moment += height * bend;
+            // Squares of the places, less their mean.
+            let basis = (place * place - Vec2::ONE).extend(place.x * place.y);
+            matrix += Mat3::from_cols(basis.x * basis, basis.y * basis, basis.z * basis);
+            moments += height * basis;
+            count += 1.0;
         }
-        let determinant = squares.x * squares.y - mixed * mixed;
+        let squares = Vec3::new(matrix.x_axis.x, matrix.y_axis.y, matrix.z_axis.z);
         let is_known = count >= BOWL_POINTS
             && squares.min_element() > KNOWN_BEND * count
-            && determinant > KNOWN_BEND * squares.x * squares.y;
-        let widening = if is_known {
-            let widening = Vec2::new(
-                moment.x * squares.y - moment.y * mixed,
-                moment.y * squares.x - moment.x * mixed,
-            );
-            (widening / determinant).max(Vec2::ZERO)
-        } else {
-            Vec2::ZERO
-        };
-        let left = heights.map(|(place, height)| (height - widening.dot(bend(place))).powi(2));
-        Self {
-            widening,
-            left: (left.sum::<f32>() / count).sqrt(),
-            count,
+            && matrix.determinant() > KNOWN_BEND * squares.element_product();
+        if !is_known {
+            let left = heights.map(|(_, height)| height * height).sum::<f32>();
+            return Self {
+                turn: Vec2::X,
+                widening: Vec2::ZERO,
+                left: (left / count).sqrt(),
+                count,
+            };
         }
+        // With the squares and the product of places in metres.
+        let rise = matrix.inverse() * moments;
+        let [x, y, mixed] = [
+            rise.x / sigma.x.powi(2),
+            rise.y / sigma.y.powi(2),
+            rise.z / (sigma.x * sigma.y),
+        ];
+        let turn = Vec2::from_angle(0.5 * mixed.atan2(x - y));
+        let (mean, off) = (0.5 * (x + y), 0.5 * (x - y).hypot(mixed));
+        let bends = Vec2::new(mean + off, mean - off).max(Vec2::ZERO);
+        let variance = |along: Vec2| (along * along).dot(sigma * sigma);
+        let widening = bends * Vec2::new(variance(turn), variance(turn.perp()));
+        let mut bowl = Self {
+            turn,
+            widening,
+            left: 0.0,
+            count,
+        };
+        let above = |place: Vec2| {
+            let own = bowl.own(place * sigma);
+            bends.dot(own * own) - widening.element_sum()
+        };
+        let left = heights.map(|(place, height)| (height - above(place)).powi(2));
+        bowl.left = (left.sum::<f32>() / count).sqrt();
+        bowl
+    }
+
+    /// A vector along the main axes as one along the bowl's own.
+    pub(crate) fn own(&self, along_main: Vec2) -> Vec2 {
+        Vec2::new(self.turn.dot(along_main), self.turn.perp_dot(along_main))
     }
 
     /// Whether it explains most of the `roughness` about the plane.
@@ -129,8 +153,8 @@ impl Bowl {
         self.left < UNEXPLAINED * roughness
     }
 
-    /// The place of the lowest point, and its height above the middle of a plane that rises by `slope` in a standard
-    /// deviation of each place. `None` unless the bowl widens in both directions, is lowest among its points, and explains
+    /// The place of the lowest point along its own axes, and its height above the middle of a plane that rises by `slope` in a
+    /// standard deviation along each of them. `None` unless the bowl widens in both directions, is lowest among its points, and explains
     /// most of the `roughness` about the plane.
     pub(crate) fn lowest(&self, slope: Vec2, roughness: f32) -> Option<(Vec2, f32)> {
         let place = -0.5 * slope / self.widening;
@@ -142,19 +166,14 @@ impl Bowl {
         is_bowl.then_some((place, above))
     }
 
-    /// The floor of a valley, above a plane that rises by `slope`. `None` unless it widens along one main axis only.
+    /// The floor of a valley, above a plane that rises by `slope` as for [`lowest`](Self::lowest). `None` unless it widens
+    /// along one axis only.
     pub(crate) fn valley(&self, slope: Vec2) -> Option<Valley> {
-        let across = usize::from(self.widening.y > self.widening.x);
-        let bend = self.widening[across];
-        let place = -0.5 * slope[across] / bend;
-        let is_valley = self.count >= MANY
-            && self.widening[1 - across] < LEAST_ALIKE * bend
-            && place.abs() <= OUTERMOST;
-        is_valley.then_some(Valley {
-            across,
-            place,
-            bend,
-        })
+        let bend = self.widening.x;
+        let place = -0.5 * slope.x / bend;
+        let is_valley =
+            self.count >= MANY && self.widening.y < LEAST_ALIKE * bend && place.abs() <= OUTERMOST;
+        is_valley.then_some(Valley { place, bend })
     }
 
     /// How far the lowest place moves, for each metre of error in the slope.
@@ -238,7 +257,7 @@ mod tests {
                 heights.iter().map(|(p, h)| axis(p) * h).sum::<f32>() / count
             };
             let fitted = slope + Vec2::new(slope_of(|p| p.x), slope_of(|p| p.y));
-            let bowl = Bowl::fit(heights.iter().copied(), count);
+            let bowl = Bowl::fit(heights.iter().copied(), Vec2::ONE);
             let (lowest, _) = bowl.lowest(fitted, 10.0 * sigma).expect("a bowl");
             squares += (lowest + 0.5 * slope / widening).powf(2.0);
             told += sigma / count.sqrt() * bowl.place_per_slope();
@@ -260,10 +279,10 @@ mod tests {
                 .map(|p| (*p, 0.4 * (*p * *p - Vec2::ONE).element_sum()))
                 .map(|(p, height)| (p, height + 0.1 * normal(&mut rng)))
                 .collect();
-            let bowl = Bowl::fit(heights.iter().copied(), places.len() as f32);
+            let bowl = Bowl::fit(heights.iter().copied(), Vec2::ONE);
             let roughness = 0.45;
             assert!(
-                (0.15..0.4).contains(&(bowl.left / roughness)),
+                (0.1..0.4).contains(&(bowl.left / roughness)),
                 "{}",
                 bowl.left
             );
@@ -283,7 +302,7 @@ mod tests {
                 let heights: Vec<(Vec2, f32)> = (places.iter())
                     .map(|p| (*p, height(p) + 0.08 * normal(&mut rng)))
                     .collect();
-                let bowl = Bowl::fit(heights.iter().copied(), places.len() as f32);
+                let bowl = Bowl::fit(heights.iter().copied(), Vec2::ONE);
                 let lowest = bowl.lowest(Vec2::ZERO, 1.0);
                 assert!(lowest.is_none() || across > 0.0);
                 round += usize::from(lowest.is_some());

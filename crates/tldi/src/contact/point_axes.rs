@@ -12,17 +12,19 @@ const LEAST_WIDTH: f32 = 1e-6;
 /// no row changes.
 const NEAR_FLOOR: f32 = 0.4;
 
-/// The main axes of points on one plane.
-pub(super) struct MainAxes {
+/// Two axes of points on one plane, at right angles.
+#[derive(Clone, Copy)]
+pub(super) struct PlaneAxes {
     centre: Vec3,
     normal: Vec3,
-    /// Unit vectors; the points extend the most along the first.
+    /// Unit vectors.
     pub(super) axes: [Vec3; 2],
     /// Standard deviations along them, metres.
     pub(super) sigma: Vec2,
 }
 
-impl MainAxes {
+impl PlaneAxes {
+    /// The main axes: the points extend the most along the first, and have no covariance.
     pub(super) fn of(points: &[ContactPoint], normal: Vec3) -> Self {
         let middles = || points.iter().map(ContactPoint::middle);
         let count = points.len() as f32;
@@ -40,6 +42,21 @@ impl MainAxes {
         // Points in a row, or a single one, have no extent across.
         own.sigma = sigma.max(Vec2::splat(f32::MIN_POSITIVE.max(LEAST_WIDTH * sigma.x)));
         own
+    }
+
+    /// Main axes turned by the angle with the cosine and the sine of `turn`.
+    pub(super) fn turned(&self, turn: Vec2) -> Self {
+        let [x, y] = self.axes;
+        let variance = self.sigma * self.sigma;
+        let turned = Vec2::new(
+            variance.dot(turn * turn),
+            variance.dot(turn.perp() * turn.perp()),
+        );
+        Self {
+            axes: [turn.x * x + turn.y * y, turn.x * y - turn.y * x],
+            sigma: Vec2::new(turned.x.sqrt(), turned.y.sqrt()),
+            ..*self
+        }
     }
 
     /// Coordinates from the centre along the axes, metres.
@@ -70,8 +87,8 @@ impl MainAxes {
         ContactPoint::about(middle + above * self.normal, gap, self.normal)
     }
 
-    /// The floor of a valley whose gaps rise by `slope` in a standard deviation of each place; `None` if no two points
-    /// are near it.
+    /// The floor of a valley across the first axis, whose gaps rise by `slope` in a standard deviation of each place; `None`
+    /// if no two points are near it.
     pub(super) fn floor(
         &self,
         valley: Valley,
@@ -79,28 +96,24 @@ impl MainAxes {
         points: &[ContactPoint],
     ) -> Option<Floor> {
         let Valley {
-            across,
             place: lowest,
             bend,
         } = valley;
-        let along = 1 - across;
         let near = (points.iter().map(|p| (self.place(p), p.gap)))
-            .filter(|(place, _)| (place[across] - lowest).abs() <= NEAR_FLOOR);
+            .filter(|(place, _)| (place.x - lowest).abs() <= NEAR_FLOOR);
         let (mut ends, mut sum, mut count) = ([f32::INFINITY, f32::NEG_INFINITY], 0.0, 0.0);
         for (place, gap) in near {
-            let at = place[along];
-            ends = [ends[0].min(at), ends[1].max(at)];
-            sum += gap - slope[along] * at - bend * (place[across] - lowest).powi(2);
+            ends = [ends[0].min(place.y), ends[1].max(place.y)];
+            sum += gap - slope.y * place.y - bend * (place.x - lowest).powi(2);
             count += 1.0;
         }
-        let end = |at: f32| {
-            let mut place = Vec2::splat(at);
-            place[across] = lowest;
-            self.contact_at(place, sum / count + slope[along] * at, points)
+        let end = |along: f32| {
+            let gap = sum / count + slope.y * along;
+            self.contact_at(Vec2::new(lowest, along), gap, points)
         };
         (ends[0] < ends[1]).then(|| Floor {
             ends: ends.map(end),
-            radius: 0.5 / bend * self.sigma[across].powi(2) * self.axes[across],
+            radius: 0.5 / bend * self.sigma.x.powi(2) * self.axes[0],
         })
     }
 }

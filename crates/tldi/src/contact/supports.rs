@@ -3,7 +3,7 @@
 use crate::contact::beyond::beyond;
 use crate::contact::bowl::{Bowl, Floor, Lowest};
 use crate::contact::main_plane::GapPlane;
-use crate::contact::point_axes::MainAxes;
+use crate::contact::point_axes::PlaneAxes;
 use crate::{ContactPatch, ContactPoint, PATCH_POINTS};
 use arrayvec::ArrayVec;
 use glamx::{Vec2, Vec3};
@@ -23,7 +23,7 @@ pub(crate) struct Supports {
     /// Standard deviation, in metres, of the gaps about the plane that fits them best.
     pub(crate) roughness: f32,
     /// Standard deviation, in metres, of the gaps about the bowl that fits them best: a paraboloid
-    /// that widens along the main axes, or does not bend. What is left of the roughness where the
+    /// that widens along two axes, or does not bend. What is left of the roughness where the
     /// surfaces are round.
     pub(crate) roughness_about_bowl: f32,
     /// The lowest point of that bowl. It is set if the gaps bend in both directions, the point is
@@ -52,7 +52,7 @@ const FLAT: f32 = 0.33;
 /// Heights are measured from the plane that fits the gaps. So the choice does not depend on the
 /// tilt of the body, and a lifted edge remains. Cost: linear in points.
 pub(crate) fn supports(points: &[ContactPoint], normal: Vec3, smooth: f32) -> Supports {
-    let axes = MainAxes::of(points, normal);
+    let axes = PlaneAxes::of(points, normal);
     let count = points.len() as f32;
     let heights = || points.iter().map(|p| (axes.place(p), p.gap));
     // Along the main axes the slopes of the gaps are separate.
@@ -63,7 +63,7 @@ pub(crate) fn supports(points: &[ContactPoint], normal: Vec3, smooth: f32) -> Su
     let residuals = || heights().map(|height| (height.0, plane.residual(height)));
     let squares = residuals().map(|(_, off)| off.powi(2)).sum::<f32>();
     let roughness = (squares / count).sqrt();
-    let bowl = Bowl::fit(residuals(), count);
+    let bowl = Bowl::fit(residuals(), axes.sigma);
     // A perfectly flat patch has none, by which nothing can be divided.
     let smooth = smooth.max(f32::MIN_POSITIVE);
     let is_bent = roughness > smooth && bowl.explains_most(roughness);
@@ -80,7 +80,9 @@ pub(crate) fn supports(points: &[ContactPoint], normal: Vec3, smooth: f32) -> Su
     let lows = heights().map(|height| (height.0, low(height)));
     let stretch = (axes.sigma.x / axes.sigma.y).sqrt();
     let indices = farthest_out(lows, Vec2::new(stretch, stretch.recip()));
-    let [longest, across] = axes.axes;
+    // Of the bowl: its gaps bend along one of them independently of the other.
+    let own = axes.turned(bowl.turn);
+    let own_slope = bowl.own(slope / axes.sigma) * own.sigma;
     Supports {
         above_plane: (indices.iter())
             .map(|&k| above_plane((axes.place(&points[k]), points[k].gap)))
@@ -89,18 +91,17 @@ pub(crate) fn supports(points: &[ContactPoint], normal: Vec3, smooth: f32) -> Su
         flatness,
         roughness,
         roughness_about_bowl: bowl.left.min(roughness),
-        lowest_of_bowl: bowl.lowest(slope, roughness).map(|(place, above)| {
-            let aside = bowl.place_per_slope() * axes.sigma;
+        lowest_of_bowl: (bowl.lowest(own_slope, roughness)).map(|(place, above)| {
+            let aside = bowl.place_per_slope() * own.sigma;
+            let radii = aside * own.sigma;
             Lowest {
-                point: axes.contact_at(place, mean_gap + above, points),
-                aside: [aside.x * longest, aside.y * across],
-                radii: [
-                    aside.x * axes.sigma.x * longest,
-                    aside.y * axes.sigma.y * across,
-                ],
+                point: own.contact_at(place, mean_gap + above, points),
+                aside: [0, 1].map(|k| aside[k] * own.axes[k]),
+                radii: [0, 1].map(|k| radii[k] * own.axes[k]),
             }
         }),
-        floor_of_valley: (bowl.valley(slope)).and_then(|valley| axes.floor(valley, slope, points)),
+        floor_of_valley: (bowl.valley(own_slope))
+            .and_then(|valley| own.floor(valley, own_slope, points)),
     }
 }
 
