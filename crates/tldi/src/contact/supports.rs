@@ -281,6 +281,34 @@ mod tests {
         assert_eq!(trough(|i| i.abs() >= 3).floor_of_valley, None);
     }
 
+    /// Points that extend equally in all directions do not tell the axes of what bends: the gaps do. A trough stays a trough in
+    /// any direction, and an oblong bowl has the radii of its own axes.
+    #[test]
+    fn square_patches_bend_along_axes_of_their_own() {
+        let square: Vec<Vec3> = (0..144)
+            .map(|k| Vec3::new((k % 12) as f32 - 5.5, 0.0, (k / 12) as f32 - 5.5))
+            .collect();
+        for degrees in 0..18 {
+            let axis = Vec2::from_angle((10.0 * degrees as f32).to_radians());
+            let bent = |along: f32, across: f32| {
+                let gap = |p: Vec2| along * p.dot(axis).powi(2) + across * p.perp_dot(axis).powi(2);
+                let points = square.iter().map(|p| point(*p, gap(Vec2::new(p.x, p.z))));
+                supports(&points.collect::<Vec<_>>(), Vec3::Y, 1e-4)
+            };
+            let axis = Vec3::new(axis.x, 0.0, axis.y);
+            let trough = bent(0.05, 0.0).floor_of_valley.expect("a floor");
+            assert!(
+                (trough.radius.dot(axis).abs() - 10.0).abs() < 0.01,
+                "{trough:?}"
+            );
+            let bowl = bent(0.05, 0.03).lowest_of_bowl.expect("a bowl");
+            assert!(bowl.point.middle().length() < 1e-3, "{bowl:?}");
+            let [first, second] = bowl.radii;
+            assert!((first.dot(axis).abs() - 10.0).abs() < 0.01, "{bowl:?}");
+            assert!((second.length() - 16.667).abs() < 0.02, "{bowl:?}");
+        }
+    }
+
     /// A face whose rim dips on two sides and is lifted on the others is as flat as its middle, and its
     /// supports tell so; what bends is not flat, along one axis neither.
     #[test]
