@@ -54,8 +54,8 @@ const ALIKE_RADII: f32 = 2.0;
 pub(crate) struct Lowest {
     /// The point, and the gap there.
     pub(crate) point: ContactPoint,
-    /// Displacement of the lowest point along each axis of the bowl, metres, for each metre of error in the slope: the gap over one
-    /// standard deviation of the places.
+    /// Displacement of the lowest point along each axis of the bowl, metres, for each metre of error in the slope: the gap over
+    /// one standard deviation of the places.
     pub(crate) aside: [Vec3; 2],
     /// Along the same axes, vectors as long as the bowl's radii of curvature, metres.
     pub(crate) radii: [Vec3; 2],
@@ -155,8 +155,8 @@ impl Bowl {
     }
 
     /// The place of the lowest point along its own axes, and its height above the middle of a plane that rises by `slope` in a
-    /// standard deviation along each of them. `None` unless the bowl widens in both directions, is lowest among its points, and explains
-    /// most of the `roughness` about the plane.
+    /// standard deviation along each of them. `None` unless the bowl widens in both directions, is lowest among its points, and
+    /// explains most of the `roughness` about the plane.
     pub(crate) fn lowest(&self, slope: Vec2, roughness: f32) -> Option<(Vec2, f32)> {
         let place = -0.5 * slope / self.widening;
         let is_bowl = self.explains_most(roughness)
