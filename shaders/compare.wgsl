@@ -253,7 +253,9 @@ fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_ot
     let entered = entered_at(front, kf, thickness);
     for (var kb = back.begin; kb < back.end; kb++) {
         let left = left_at(back, kb, thickness);
-        if facing_of(back, kb) == EXIT || is_edge_on(normal_of(back, kb)) || entered > left {
+        // Where two rims cross, neither tells a normal.
+        let are_rims = kf == front.rim && kb == back.rim;
+        if facing_of(back, kb) == EXIT || is_edge_on(normal_of(back, kb)) || entered > left || are_rims {
             continue;
         }
         let depth = depth_of(front, kf) - depth_of(back, kb);

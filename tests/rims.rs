@@ -4,7 +4,7 @@ use rapier3d::prelude::{ColliderBuilder, PhysicsWorld, RigidBodyBuilder};
 use rapier3d_tldi::prelude::{TldiConfig, TldiPipeline};
 use std::f32::consts::{PI, TAU};
 use tldi::glamx::{Pose3, Quat, Vec3};
-use tldi::{CpuBackend, ImpactQuery, PairQuery, Params, PointCloud, Surface};
+use tldi::{CpuBackend, ImpactQuery, PairQuery, Params, PointCloud, Surface, View, VirtualCamera};
 use tldi_tests::{
     Samples, aimed_clouds, compare_on, deepest_contact, gpu_backend, sampled_box, sampled_plane,
     sampled_sphere,
@@ -195,5 +195,22 @@ fn open_bodies_do_not_fall_through_in_one_step() {
                 );
             }
         }
+    }
+}
+
+/// Where two rims meet, neither tells a normal: one upright card on another does not touch it, and no depth is made up.
+#[test]
+fn rims_that_meet_make_up_no_depth() {
+    let mut rng = fastrand::Rng::with_seed(54);
+    let card = sampled_plane(0.3, R, &mut rng).moved(&Pose3::rotation(0.5 * PI * Vec3::Z));
+    let card = card.bare_cloud(R);
+    for _ in 0..20 {
+        let gap = R * (0.5 - 2.0 * rng.f32());
+        let query = PairQuery {
+            view: View::Fixed(VirtualCamera::along(-Vec3::Y, R)),
+            ..aimed_clouds(&card, &card, Pose3::translation(0.0, 0.3 + gap, 0.0), R)
+        };
+        let result = &compare_on(&mut CpuBackend::new(), &[query])[0];
+        assert!(result.patches.is_empty(), "{gap}: {:?}", result.patches);
     }
 }

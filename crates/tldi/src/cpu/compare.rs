@@ -166,6 +166,8 @@ fn contact_pixels(
         let entry = (0..back.len())
             .map(|kb| (kb, back.layer(kb)))
             .filter(|(_, layer)| back.facing(layer) != Facing::Exit && !is_edge_on(layer))
+            // Where two rims cross, neither tells a normal.
+            .filter(|(kb, _)| !(front.is_rim(kf) && back.is_rim(*kb)))
             .map(|(kb, layer)| (kb, layer, back.left_at(kb, params)))
             .filter(|(_, _, left)| entered <= *left)
             .find(|(kb, layer, left)| {

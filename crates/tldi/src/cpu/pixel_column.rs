@@ -78,11 +78,16 @@ impl<'a> PixelColumn<'a> {
         self.rim.filter(|end| end.outermost(self.len()) == k)
     }
 
+    /// Whether the surface ends in its rim at layer `k`.
+    pub(super) fn is_rim(&self, k: usize) -> bool {
+        self.rim_at(k).is_some()
+    }
+
     /// Weight of the normal of layer `k`: see [`share_of`]. A rim has none.
     pub(super) fn share_of(&self, k: usize, side: f32) -> f32 {
-        match self.rim_at(k) {
-            Some(_) => 0.0,
-            None => share_of(&self.layers[k], side),
+        match self.is_rim(k) {
+            true => 0.0,
+            false => share_of(&self.layers[k], side),
         }
     }
 
