@@ -27,8 +27,8 @@ const OUTERMOST: f32 = 1.5;
 /// is wide, changes from one point to two when it lands, and rocks on.
 const LEAST_ALIKE: f32 = 0.4;
 
-/// Fewest points of a bowl. It has six unknowns, so a bowl fits any six points, with its lowest point anywhere. Half: no
-/// change; twice: a cube that spins fast without friction on a rough floor is slowed by 3 %.
+/// Fewest points of a bowl. It has six unknowns, so a bowl fits any six points, with its lowest point anywhere. Half: six
+/// unknowns of fewer points; twice: no test of `patches` and `bodies` fails.
 const BOWL_POINTS: f32 = 7.0;
 
 /// Least spread of the squares of places, as a share of that in a disc, and least part of it that the axes do not have

@@ -11,7 +11,7 @@ use crate::{Facing, Layer, Params, Tldi};
 use glamx::Vec2;
 
 /// One of the two ends of what a pixel shows of a surface.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 pub(super) enum End {
     /// Where rays enter it first. The other surface is in front.
     Near,
@@ -20,19 +20,19 @@ pub(super) enum End {
 }
 
 impl End {
-    /// How far out a layer reaches, metres.
-    fn reach(self, layer: &Layer) -> f32 {
-        match self {
-            Self::Near => -layer.near,
-            Self::Far => layer.far,
-        }
-    }
-
-    /// The depth of a layer's end.
+    /// Depth at which a layer ends there, metres.
     pub(super) fn depth(self, layer: &Layer) -> f32 {
         match self {
             Self::Near => layer.near,
             Self::Far => layer.far,
+        }
+    }
+
+    /// 1 if depths grow towards it, else -1.
+    fn sign(self) -> f32 {
+        match self {
+            Self::Near => -1.0,
+            Self::Far => 1.0,
         }
     }
 
@@ -66,9 +66,9 @@ pub(super) struct SurfacePixel<'a> {
 }
 
 impl SurfacePixel<'_> {
-    /// Whether the outermost layer is a rim. It is steep, and nothing of the surface goes on beyond it down the slope. Neither
-    /// in this pixel nor beside it is a face at its end, nor anything whose outward normal says that the other surface can
-    /// meet it: a silhouette of a closed body, where rays miss a layer now and then, is no rim.
+    /// Whether the outermost layer is a rim. It is steep, and nothing of the surface goes on beyond it: down the slope at the
+    /// far end, up at the near one. Neither in this pixel nor beside it is a face at its end, nor anything whose outward normal
+    /// says that the other surface can meet it: a silhouette of a closed body, where rays miss a layer now and then, is no rim.
     ///
     /// What was not culled is missing from the image, too. But that is more than a thickness beyond what can touch.
     pub(super) fn ends_in_rim(&self, end: End, params: &Params) -> bool {
@@ -80,7 +80,7 @@ impl SurfacePixel<'_> {
         if !is_steep(layer) {
             return false;
         }
-        let beyond = |other: &Layer| end.reach(other) - end.reach(layer);
+        let beyond = |other: &Layer| end.sign() * (end.depth(other) - end.depth(layer));
         let is_met = |other: &Layer| {
             other.facing == end.met() || !is_steep(other) && beyond(other) > -params.thickness
         };
@@ -89,8 +89,7 @@ impl SurfacePixel<'_> {
             let beside = neighbors_toward(image, at, side).flatten();
             beside.chain([layers]).flatten()
         };
-        let out = -layer.normal.z.signum() * layer.normal.truncate();
-        let down = if end == End::Far { out } else { -out };
+        let down = -end.sign() * layer.normal.z.signum() * layer.normal.truncate();
         if here_or_beside(Vec2::ZERO).any(is_met)
             || here_or_beside(down).any(goes_on)
             // A wall that is seen edge-on may lean to either side.
