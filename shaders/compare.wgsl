@@ -180,10 +180,15 @@ fn share_of(c: Column, k: u32, side: f32) -> f32 {
     return select(select(1.0, abs(agreement), is_edge), 0.0, k == c.rim);
 }
 
-fn opposed(entry: vec3f, leaving: vec3f) -> bool {
-    let n = facing_camera(entry, -1.0);
-    let m = facing_camera(leaving, 1.0);
-    return n.z <= -FACING && m.z >= FACING && dot(n, m) <= -FACING;
+// Whether layer `kf` of the body in front and `kb` of the other one face each other: see the CPU's.
+fn opposed(front: Column, kf: u32, back: Column, kb: u32) -> bool {
+    let n = facing_camera(normal_of(back, kb), -1.0);
+    let m = facing_camera(normal_of(front, kf), 1.0);
+    let is_edge_n = share_of(back, kb, -1.0) < 1.0;
+    let is_edge_m = share_of(front, kf, 1.0) < 1.0;
+    return (is_edge_n || n.z <= -FACING)
+        && (is_edge_m || m.z >= FACING)
+        && (is_edge_n || is_edge_m || dot(n, m) <= -FACING);
 }
 
 // Depth at which the ray entered the part of a body that it leaves through layer `last`.
@@ -262,7 +267,7 @@ fn met_by(look: ptr<function, Look>, front: Column, back: Column, kf: u32, is_ot
         let is_sure = facing_of(front, kf) == EXIT && facing_of(back, kb) == ENTRY;
         let other_way = left - entered;
         let is_too_far = is_sure && is_far_longer(depth, other_way, thickness);
-        let is_opposed = opposed(normal_of(back, kb), normal_of(front, kf));
+        let is_opposed = opposed(front, kf, back, kb);
         let is_within = depth > 0.0
             && ((facing_of(back, kb) == ENTRY && is_entered_at(front, kf, left))
                 || (facing_of(front, kf) == EXIT && is_left_at(back, kb, entered)));

@@ -135,20 +135,45 @@ fn normal_sum(sum: Sum) -> vec3f {
     return vec3f(sum.normal_high) * 4096.0 + vec3f(sum.normal_low);
 }
 
-// Length of the mean of the unit normals.
-fn agreement_of(sum: Sum) -> f32 {
-    return length(normal_sum(sum)) / (NORMAL_STEPS * f32(sum.weight));
+// Square of the length of the mean of the unit normals.
+fn agreement_squared(sum: Sum) -> f32 {
+    let mean = normal_sum(sum) / (NORMAL_STEPS * f32(sum.weight));
+    return dot(mean, mean);
 }
 
-// The splat of the heaviest fragment.
-fn face_of(start: u32, end: u32) -> u32 {
-    var heaviest = start;
-    for (var k = start + 1u; k < end; k++) {
-        if is_lighter(fragments[heaviest], fragments[k]) {
-            heaviest = k;
+fn is_on_face(splat: u32, face: u32) -> bool {
+    let cosine = f32(dot(normal_of(face), normal_of(splat)));
+    return cosine >= SAME_FACE * (NORMAL_STEPS * NORMAL_STEPS);
+}
+
+// The splats of the heaviest fragments of each face, the heaviest first.
+struct Faces {
+    splats: vec3u,
+    count: u32,
+}
+
+fn faces_of(start: u32, end: u32) -> Faces {
+    var faces: Faces;
+    // Ends: `count` rises, or nothing is left.
+    while faces.count < MOST_FACES {
+        var heaviest = end;
+        for (var k = start; k < end; k++) {
+            let splat = splat_of(fragments[k]);
+            var is_left = true;
+            for (var face = 0u; face < faces.count; face++) {
+                is_left = is_left && !is_on_face(splat, faces.splats[face]);
+            }
+            if is_left && (heaviest == end || is_lighter(fragments[heaviest], fragments[k])) {
+                heaviest = k;
+            }
         }
+        if heaviest == end {
+            break;
+        }
+        faces.splats[faces.count] = splat_of(fragments[heaviest]);
+        faces.count++;
     }
-    return splat_of(fragments[heaviest]);
+    return faces;
 }
 
 // 1 at an edge, -1 in a groove.
@@ -165,15 +190,32 @@ fn sign_of_bend(start: u32, end: u32, face: u32) -> f32 {
 }
 
 fn sum_of_face(start: u32, end: u32, face: u32) -> Sum {
-    let normal = normal_of(face);
     var sum: Sum;
     for (var k = start; k < end; k++) {
-        let f = fragments[k];
-        if f32(dot(normal, normal_of(splat_of(f)))) >= SAME_FACE * (NORMAL_STEPS * NORMAL_STEPS) {
-            add(&sum, f, depth_of(fragments[start].x));
+        if is_on_face(splat_of(fragments[k]), face) {
+            add(&sum, fragments[k], depth_of(fragments[start].x));
         }
     }
     return sum;
+}
+
+// Above that of the first fragment, in steps.
+fn mean_depth(sum: Sum) -> f32 {
+    return (f32(sum.depth_high) * 65536.0 + f32(sum.depth_low)) / f32(sum.weight);
+}
+
+// Sum over the fragments on the face that the ray meets: see the CPU's.
+fn sum_of_face_met(start: u32, end: u32, faces: Faces, bend: f32, weight: u32) -> Sum {
+    let towards_camera = select(1.0, -1.0, normal_of(faces.splats[0]).z > 0);
+    var met = sum_of_face(start, end, faces.splats[0]);
+    for (var face = 1u; face < faces.count; face++) {
+        let sum = sum_of_face(start, end, faces.splats[face]);
+        let inwards = towards_camera * bend * (mean_depth(sum) - mean_depth(met));
+        if f32(sum.weight) >= LEAST_OF_LAYER * f32(weight) && inwards > 0.0 {
+            met = sum;
+        }
+    }
+    return met;
 }
 
 // The layer of the fragments from `start` to before `end`.
@@ -184,19 +226,19 @@ fn layer_of(start: u32, end: u32, oriented: bool, knows_faces: bool, view: u32) 
         add(&sum, fragments[k], first_depth);
     }
     var agreement = 1.0;
-    if knows_faces && agreement_of(sum) < CREASED {
-        let face = face_of(start, end);
-        agreement = agreement_of(sum) * sign_of_bend(start, end, face);
-        sum = sum_of_face(start, end, face);
+    if knows_faces && agreement_squared(sum) < CREASED {
+        let faces = faces_of(start, end);
+        let bend = sign_of_bend(start, end, faces.splats[0]);
+        agreement = sqrt(agreement_squared(sum)) * bend;
+        sum = sum_of_face_met(start, end, faces, bend, sum.weight);
     }
     let class_of_run = fragments[start].x >> DEPTH_BITS;
     let step = pairs[view / MAX_VIEWS].depth_step;
     let zero = views[view].depth_zero;
-    let mean = (f32(sum.depth_high) * 65536.0 + f32(sum.depth_low)) / f32(sum.weight);
     var layer: Layer;
     layer.near = zero + f32(first_depth) * step;
     layer.far = zero + f32(depth_of(fragments[end - 1u].x)) * step;
-    layer.depth = zero + (f32(first_depth) + mean) * step;
+    layer.depth = zero + (f32(first_depth) + mean_depth(sum)) * step;
     layer.agreement = agreement;
     layer.normal = unit_or(normal_sum(sum), vec3f(0.0, 0.0, -1.0));
     layer.facing = select(UNKNOWN, EXIT, class_of_run == 1u && oriented);

@@ -96,9 +96,10 @@ fn rounded_box(half: Vec3, radius: f32, rng: &mut fastrand::Rng) -> Samples {
     samples
 }
 
-/// Edges as round as points are apart are neither sharp nor seen to be round. Yet they are as deep after a slide of less than a
-/// spacing as before. Measured: nine in ten of 30 edges are up to 0.21 r̄ off, those of 0.5 r̄ because they count as sharp, and
-/// scatter by up to 0.09 r̄; the limits are a fifth above.
+/// Edges as round as points are apart are neither sharp nor seen to be round. Yet they are about as deep after a slide of less
+/// than a spacing as before. Measured: nine in ten of 30 edges are up to 0.16 r̄ off, and scatter by up to 0.14 r̄; the limits
+/// are a fifth above. (Edges that are hardly ever taken for sharp ones scatter by 0.08 r̄. But then sharp edges of bare clouds
+/// are 0.07 r̄ off in place of 0.01.)
 #[test]
 fn rounded_edges() {
     let half = Vec3::new(0.10, 0.08, 0.12);
@@ -140,7 +141,7 @@ fn rounded_edges() {
                 values[poses * 9 / 10]
             });
             assert!(
-                off < 0.25 && scatter < 0.105,
+                off < 0.2 && scatter < 0.17,
                 "radius {radius}, normals {with_normals}: {off} r̄ off, scatter {scatter} r̄"
             );
         }

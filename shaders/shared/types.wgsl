@@ -17,6 +17,8 @@ override LEAST_RADIUS_PX: f32;
 override EDGE_ON: f32;
 override NORMAL_STEPS: f32;
 override CREASED: f32;
+override LEAST_OF_LAYER: f32;
+override MOST_FACES: u32;
 override BEND_STEPS: f32;
 override MOST_ASIDE: f32;
 override BEND_SHIFT: u32;

@@ -1,7 +1,7 @@
 //! Brute-force counterparts of the stages, written from their descriptions and sharing no code
 //! with them.
 
-use tldi::glamx::{DVec3, Vec3};
+use tldi::glamx::{DVec2, DVec3, Vec3};
 use tldi::{Params, PointCloud};
 
 /// One splat in one pixel, as the description of the oriented variant has it.
@@ -13,6 +13,8 @@ pub struct OracleFragment {
     pub weight: f64,
     /// 0 entry, 1 exit or unoriented, 2 edge-on.
     pub class: u8,
+    /// Where the splat's point is, pixels.
+    pub centre: DVec2,
     /// Unit normal.
     pub normal: DVec3,
 }
@@ -28,7 +30,7 @@ pub struct OracleLayer {
     pub surface: OracleSurface,
 }
 
-/// The mean of the fragments of a layer or, where their normals differ, of those on the heaviest one's face.
+/// The mean of the fragments of a layer or, where their normals differ, of those on the face that the ray meets.
 #[derive(Clone, Copy, Debug)]
 pub struct OracleSurface {
     /// Metres.
@@ -121,23 +123,69 @@ fn surface(run: &[OracleFragment]) -> OracleSurface {
         normal: DVec3::NAN,
     };
     let all: Vec<_> = run.iter().collect();
+    let total = run.iter().map(weight).sum::<f64>();
     let normal: DVec3 = run.iter().map(|f| f.weight * f.normal).sum();
-    let length = normal.length() / run.iter().map(weight).sum::<f64>();
-    if (length - 0.97).abs() < 0.005 {
+    let length = normal.length() / total;
+    // Two faces that differ by 35°, the smaller with 0.3 of the weight.
+    let (least, cosine) = (0.3, 0.82);
+    let creased = f64::sqrt(1.0 - 2.0 * least * (1.0 - least) * (1.0 - cosine));
+    if (length - creased).abs() < 0.002 {
         return unclear;
     }
-    if length > 0.97 {
+    if length > creased {
         return mean(&all);
     }
-    let most = run.iter().map(weight).fold(0.0, f64::max);
-    let heaviest: Vec<_> = run.iter().filter(|f| f.weight > most - 1.01).collect();
-    let face = heaviest[0].normal;
-    let is_unclear = |f: &OracleFragment| (f.normal.dot(face) - 0.82).abs() < 0.001;
-    if heaviest.len() > 1 || run.iter().any(is_unclear) {
-        return unclear;
+    let mut faces: Vec<OracleFragment> = Vec::new();
+    for _ in 0..3 {
+        let is_left = |f: &&OracleFragment| faces.iter().all(|g| f.normal.dot(g.normal) < cosine);
+        let left: Vec<_> = run.iter().filter(is_left).collect();
+        let most = left.iter().map(|f| f.weight).fold(0.0, f64::max);
+        let heaviest: Vec<_> = left.iter().filter(|f| f.weight > most - 1.01).collect();
+        match heaviest[..] {
+            [] => break,
+            [face] => faces.push(**face),
+            _ => return unclear,
+        }
+        let face = faces[faces.len() - 1].normal;
+        let is_unclear = |f: &OracleFragment| (f.normal.dot(face) - cosine).abs() < 0.001;
+        if run.iter().any(is_unclear) {
+            return unclear;
+        }
     }
-    let of_face: Vec<_> = run.iter().filter(|f| f.normal.dot(face) > 0.82).collect();
-    mean(&of_face)
+    // Normals that lean apart, as at an edge, or together.
+    let heaviest = faces[0];
+    let bend: f64 = run
+        .iter()
+        .map(|f| {
+            let aside = (f.centre - heaviest.centre).clamp(DVec2::splat(-4.0), DVec2::splat(4.0));
+            aside.dot((f.normal - heaviest.normal).truncate())
+        })
+        .sum();
+    // Places count in sixteenths of a pixel, normals in 256ths.
+    let is_bend_unclear = bend.abs() < 0.05 * (run.len() as f64).sqrt();
+    let (first, last) = (run[0].depth, run[run.len() - 1].depth);
+    let (mut met, mut is_unclear) = (None::<OracleSurface>, false);
+    for face in faces {
+        let on_face = |f: &&OracleFragment| f.normal.dot(face.normal) > cosine;
+        let of_face: Vec<_> = run.iter().filter(on_face).collect();
+        let share = of_face.iter().map(|f| f.weight).sum::<f64>() / total;
+        let of_face = mean(&of_face);
+        let Some(so_far) = met else {
+            met = Some(of_face);
+            continue;
+        };
+        // At an edge the ray passes the planes of the other faces outside the body, in a groove inside.
+        let outwards = bend * heaviest.normal.z;
+        let is_inwards = (of_face.depth - so_far.depth) * outwards < 0.0;
+        // Weights count in 255ths.
+        let is_close = (of_face.depth - so_far.depth).abs() < 0.01 * (last - first);
+        is_unclear |=
+            (share - least).abs() < 0.003 || share > least && (is_close || is_bend_unclear);
+        if share > least && is_inwards {
+            met = Some(of_face);
+        }
+    }
+    met.filter(|_| !is_unclear).unwrap_or(unclear)
 }
 
 /// The outer `None` is "too close to tell".
@@ -186,6 +234,7 @@ fn fragment(
         depth: p.z + slope_share * rise,
         weight: (1.0 + 254.0 * share.max(0.0) * n.z.abs()).floor(),
         class,
+        centre: p.truncate() / pixel,
         normal: n,
     }))
 }

@@ -2,43 +2,47 @@
 //!
 //! Pixels see such a contact beside its lowest place, and a fit through them is rounded: edges
 //! would be 0.1 pixels too high, corners 0.2. The normals of the pixels tell the faces, and the contact is
-//! where the planes of the faces meet. An edge that is rounded by less than two pixels counts as
-//! sharp, because at that size pixels show every edge as round.
+//! where the planes of the faces meet: down from the lowest pixel to an edge, and along the edge to a
+//! corner. No contact is below any of the faces. An edge that is rounded by about a pixel counts as sharp
+//! at some places, because at that size pixels show every edge as round.
 
 use crate::ContactPixel;
 use crate::contact::beyond::beyond;
+use crate::cpu::sweep::MOST_FACES;
 use arrayvec::ArrayVec;
-use glamx::{Mat3, Vec2, Vec3};
-
-/// Most faces that meet. A corner has three, or three of its faces suffice.
-const MOST_FACES: usize = 3;
+use glamx::{FloatExt, Vec2, Vec3};
 
 /// Difference between the slopes of the gaps over two faces [`beyond`] which they count as two. Half: 10 of 636 stability rows
 /// fail instead of 3; twice: depths 26 % worse.
 const APART: f32 = 0.5;
 
 /// Largest difference between the slope of the gaps in a pixel and that over its face, while the
-/// face is searched and once it is found. Steep faces are allowed more. `NEAR_FACE`: half: depths 25 % worse;
-/// twice: 51 % worse. `OF_FACE`: half: depths 13 % worse; twice: a bunny on new samples each frame fails with each
-/// of 6 seeds instead of one.
-const NEAR_FACE: f32 = 0.3;
-const OF_FACE: f32 = 0.15;
+/// face is searched and once it is found. Steep faces are allowed more. `NEAR_FACE`: half: rounded edges scatter by 0.17 r̄ in
+/// place of 0.13; twice: bare sharp corners are 0.27 r̄ off in place of 0.03. `OF_FACE`: half: 0.10 r̄; twice: rounded edges
+/// scatter by 0.16 r̄.
+const NEAR_FACE: f32 = 0.4;
+const OF_FACE: f32 = 0.1;
 
-/// Least share of the pixels that a face needs: noise has normals of all kinds. None: bodies in corners of a tray have contacts
-/// that are 2 to 10 r̄ too deep; twice: bare sharp corners are 0.05 r̄ off in place of 0.02.
+/// Most slopes that faces are looked for from, and of faces found. Noise has slopes of its own. Half: bare sharp corners are
+/// 0.05 r̄ off in place of 0.03; twice: no change.
+const MOST_SEARCHED: usize = 10;
+
+/// Least share of the pixels that a face needs: noise has normals of all kinds. Half: rounded edges scatter by 0.18 r̄ in place
+/// of 0.13; twice: bare sharp corners are 0.05 r̄ off in place of 0.03.
 const LEAST_FACE: f32 = 0.025;
 
-/// Share of the pixels that all faces have together [`beyond`] which faces explain the contact. A third less: corners rounded by
-/// r̄ scatter by 0.34 r̄ in place of 0.20; a third more: bare sharp corners are up to 0.05 r̄ off in place of 0.04.
+/// Share of the pixels that all faces have together [`beyond`] which faces explain the contact. Half: no change; twice: bare
+/// sharp corners are 0.13 r̄ off in place of 0.03.
 const OF_FACES: f32 = 0.3;
 
-/// Height in pixels of the lowest pixel above all faces [`beyond`] which these are no explanation: a round surface is above its
-/// tangents. Half or twice: no change in any suite; none: a rim that pierces a plate is told to be 3 r̄ too deep.
+/// Height in pixels above faces [`beyond`] which these are no explanation, of the pixel that is nearest to where they meet: a
+/// round surface is above its tangents. Half: deep corners with normals are 1.4 % off in place of 1.0 %; twice: no change; none:
+/// the end of a bar that turns into a floor is not met.
 const ROUND: f32 = 0.17;
 
 /// Square of the distance in pixels from where faces meet to the nearest pixel [`beyond`] which they are no explanation. Within
-/// a pixel it is at most 0.5 from the middle; faces that meet where there is no pixel are those of noise. Half: bare sharp
-/// corners are 0.16 r̄ off in place of 0.02; twice: a cast meets the edge of a turning bar 1.2 r̄ early.
+/// a pixel it is at most 0.5 from the middle; faces that meet where there is no pixel are those of noise. Twice: the end of a
+/// bar that turns is told to be 0.9 r̄ too deep in place of 0.5.
 const OFF_VERTEX: f32 = 0.5;
 
 /// The gap over a face, in metres, at a place on the plane of a contact: `at_origin + slope · place`.
@@ -110,50 +114,33 @@ pub(crate) fn lower_by<'a>(
     let Some(lowest) = pixels.clone().min_by(|m, n| gap(m).total_cmp(&gap(n))) else {
         return 0.0;
     };
-    let (place, slope) = (plane.place(lowest.middle()), plane.face(lowest).slope);
-    let Some(vertex) = Vertex::of(&faces, place, slope) else {
-        return 0.0;
-    };
-    let faces_there = vertex.faces.iter().map(|face| face.at(place));
-    let above = plane.gap(lowest) - faces_there.fold(f32::NEG_INFINITY, f32::max);
-    let off_vertex =
-        |contact: &ContactPixel| plane.place(contact.middle()).distance_squared(vertex.place);
-    let (count, nearest) = pixels.fold((0.0, f32::INFINITY), |(count, nearest), contact| {
-        (count + 1.0, off_vertex(contact).min(nearest))
-    });
+    let mut lower = 0.0;
+    for vertex in vertices(&faces, plane.place(lowest.middle())) {
+        let off = |contact: &ContactPixel| {
+            let place = plane.place(contact.middle());
+            place.distance_squared(vertex.place) / pixel_size.powi(2)
+        };
+        let nearest = pixels.clone().min_by(|m, n| off(m).total_cmp(&off(n)));
+        let nearest = nearest.unwrap_or(lowest);
+        let above = plane.gap(nearest) - gap_over(&vertex.faces, plane.place(nearest.middle()));
+        let sure = beyond(vertex.apart / APART)
+            * (1.0 - beyond(above / pixel_size / ROUND))
+            * (1.0 - beyond(off(nearest) / OFF_VERTEX));
+        lower = lower.lerp(deepest_gap - gap_over(&faces, vertex.place), sure);
+    }
     let of_faces: f32 = faces.iter().map(|face| face.pixels).sum();
-    let sure = beyond(vertex.apart / APART)
-        * beyond(of_faces / count / OF_FACES)
-        * (1.0 - beyond(above / pixel_size / ROUND))
-        * (1.0 - beyond(nearest / pixel_size.powi(2) / OFF_VERTEX));
-    sure * (deepest_gap - vertex.gap)
+    beyond(of_faces / pixels.count() as f32 / OF_FACES) * lower
 }
 
-/// The faces that meet. The search starts from the slopes that are farthest apart.
-fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_FACES> {
+/// The gap over faces that go on for ever: that over the highest one.
+fn gap_over(faces: &[Face], place: Vec2) -> f32 {
+    let gaps = faces.iter().map(|face| face.at(place));
+    gaps.fold(f32::NEG_INFINITY, f32::max)
+}
+
+/// The faces that meet. Each is looked for from the slope that is farthest from all where it was looked for before.
+fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_SEARCHED> {
     let count = tangents.len() as f32;
-    let mean = tangents.iter().map(|face| face.slope).sum::<Vec2>() / count;
-    let mut seeds = ArrayVec::<Vec2, MOST_FACES>::new();
-    while !seeds.is_full() {
-        let off = |slope: Vec2| match seeds.is_empty() {
-            true => slope.distance(mean),
-            false => seeds
-                .iter()
-                .map(|seed| slope.distance(*seed))
-                .fold(f32::INFINITY, f32::min),
-        };
-        let farthest = (tangents.iter())
-            .map(|face| (off(face.slope), face.slope))
-            .max_by(|m, n| m.0.total_cmp(&n.0));
-        match farthest {
-            Some((off, slope)) if seeds.is_empty() || off >= APART => seeds.push(slope),
-            _ => break,
-        }
-    }
-    let mut faces = ArrayVec::<Face, MOST_FACES>::new();
-    if seeds.len() < 2 {
-        return faces;
-    }
     let around = |slope: Vec2, tolerance: f32| {
         let reach = tolerance * (1.0 + slope.length());
         let near = tangents
@@ -170,72 +157,84 @@ fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_FACES> {
             ..sum
         }
     };
-    for seed in seeds {
+    let mean = tangents.iter().map(|face| face.slope).sum::<Vec2>() / count;
+    let mut searched = ArrayVec::<Vec2, MOST_SEARCHED>::new();
+    let mut faces = ArrayVec::new();
+    while !searched.is_full() {
+        let off = |slope: Vec2| {
+            let off = searched.iter().map(|other| slope.distance(*other));
+            off.reduce(f32::min).unwrap_or(slope.distance(mean))
+        };
+        let farthest = (tangents.iter())
+            .map(|face| (off(face.slope), face.slope))
+            .max_by(|m, n| m.0.total_cmp(&n.0));
+        let Some((off, slope)) = farthest else {
+            break;
+        };
+        if off < APART && !searched.is_empty() {
+            break;
+        }
+        searched.push(slope);
         // From the extremes to where most are.
-        let near = around(around(seed, NEAR_FACE).slope, NEAR_FACE);
+        let near = around(around(slope, NEAR_FACE).slope, NEAR_FACE);
         let face = around(near.slope, OF_FACE);
         let is_new = |known: &Face| known.slope.distance(face.slope) >= APART;
         if face.pixels > LEAST_FACE * count && faces.iter().all(is_new) {
             faces.push(face);
+            let _ = searched.try_push(face.slope);
         }
     }
     faces
 }
 
-/// Where faces meet.
+/// Where two or three faces meet.
 struct Vertex {
     place: Vec2,
-    gap: f32,
     faces: ArrayVec<Face, MOST_FACES>,
     /// By how much the slopes over them differ at the least.
     apart: f32,
 }
 
-impl Vertex {
-    /// Where three faces meet at a point. Or else where the face of the pixel at `place`, by the `slope` there, meets another one on
-    /// the way of steepest descent.
-    fn of(faces: &[Face], place: Vec2, slope: Vec2) -> Option<Self> {
-        if let [f, g, h] = faces {
-            let columns = [f, g, h].map(|face| face.slope.extend(1.0));
-            let [x, y, z] = columns;
-            let inverse = Mat3::from_cols(x, y, z).inverse();
-            let weights = inverse * Vec3::Z;
-            if weights.is_finite() && weights.min_element() >= 0.0 {
-                let apart = [f.slope - g.slope, g.slope - h.slope, h.slope - f.slope];
-                let at_origin = Vec3::new(f.at_origin, g.at_origin, h.at_origin);
-                return Some(Self {
-                    place: -(inverse.transpose() * at_origin).truncate(),
-                    gap: weights.dot(at_origin),
-                    faces: faces.iter().copied().collect(),
-                    apart: apart
-                        .map(Vec2::length)
-                        .into_iter()
-                        .fold(f32::INFINITY, f32::min),
-                });
-            }
-        }
-        let off = |face: &&Face| face.slope.distance(slope);
-        let f = faces.iter().min_by(|f, g| off(f).total_cmp(&off(g)))?;
-        let mut highest: Option<Self> = None;
-        for g in faces {
-            let across = (f.slope - g.slope).normalize_or_zero();
-            let (down, up) = (g.slope.dot(across), f.slope.dot(across));
-            if down >= 0.0 || up <= 0.0 {
-                continue;
-            }
-            let place = place + (g.at(place) - f.at(place)) / (up - down) * across;
-            let gap = f.at(place);
-            if highest.as_ref().is_none_or(|highest| gap > highest.gap) {
-                highest = Some(Self {
-                    place,
-                    gap,
-                    faces: [*f, *g].into_iter().collect(),
-                    apart: up - down,
-                });
-            }
-        }
-        highest
-    }
+/// The way down from a `place`: over the highest face there to the edge, where it meets one that rises; and along the edge to
+/// the corner, where a third one rises.
+fn vertices(faces: &[Face], place: Vec2) -> ArrayVec<Vertex, 2> {
+    let mut vertices = ArrayVec::new();
+    let higher = |f: &&Face, g: &&Face| f.at(place).total_cmp(&g.at(place));
+    let Some(f) = faces.iter().max_by(higher) else {
+        return vertices;
+    };
+    let edge_with = |g: &Face| {
+        let (across, apart) = (f.slope - g.slope).normalize_and_length();
+        let is_lowest = g.slope.dot(across) < 0.0 && f.slope.dot(across) > 0.0;
+        is_lowest.then(|| Vertex {
+            place: place + (g.at(place) - f.at(place)) / apart * across,
+            faces: [*f, *g].into_iter().collect(),
+            apart,
+        })
+    };
+    let by_gap = |m: &Vertex, n: &Vertex| f.at(m.place).total_cmp(&f.at(n.place));
+    let Some(edge) = faces.iter().filter_map(edge_with).max_by(by_gap) else {
+        return vertices;
+    };
+    let along = (f.slope - edge.faces[1].slope).normalize_or_zero().perp();
+    let along = if f.slope.dot(along) > 0.0 {
+        -along
+    } else {
+        along
+    };
+    let corner_with = |h: &Face| {
+        let [down, up] = [f.slope, h.slope].map(|slope| slope.dot(along));
+        let reach = (f.at(edge.place) - h.at(edge.place)) / (up - down);
+        let apart = edge.faces.iter().map(|face| face.slope.distance(h.slope));
+        (up > 0.0 && reach > 0.0).then(|| Vertex {
+            place: edge.place + reach * along,
+            faces: edge.faces.iter().copied().chain([*h]).collect(),
+            apart: apart.fold(edge.apart, f32::min),
+        })
+    };
+    let corner = faces.iter().filter_map(corner_with).max_by(by_gap);
+    vertices.extend([edge].into_iter().chain(corner));
+    vertices
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::cull::Region;
 use super::fold::ViewFold;
 use super::pixel_column::{PixelColumn, Span};
 use super::rims::{End, SurfacePixel};
-use super::sweep::is_edge_on;
+use super::sweep::{is_edge_on, share_of};
 use super::ways_out::WaysOut;
 use crate::stage::stage;
 use crate::view::camera_policy::MAX_VIEWS;
@@ -263,13 +263,17 @@ fn is_far_longer(way: f32, other: f32, params: &Params) -> bool {
     way > FARTHEST * other.max(params.thickness)
 }
 
-/// Whether two layers face each other and the view, as surfaces do that push bodies apart.
+/// Whether two layers face each other and the view, as surfaces do that push bodies apart. At an edge a surface faces
+/// everything between its faces.
 fn opposed(entry: &Layer, exit: &Layer) -> bool {
     let (n, m) = (
         facing_camera(entry.normal, -1.0),
         facing_camera(exit.normal, 1.0),
     );
-    n.z <= -FACING && m.z >= FACING && n.dot(m) <= -FACING
+    let is_edge = [share_of(entry, -1.0), share_of(exit, 1.0)].map(|share| share < 1.0);
+    (is_edge[0] || n.z <= -FACING)
+        && (is_edge[1] || m.z >= FACING)
+        && (is_edge.contains(&true) || n.dot(m) <= -FACING)
 }
 
 /// `normal` or its opposite, such that its z has the given sign.
