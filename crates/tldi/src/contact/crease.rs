@@ -109,13 +109,17 @@ pub(crate) fn lower_by<'a>(
     tangents.clear();
     let all = pixels.clone().map(|contact| plane.face(contact));
     tangents.extend(all.filter(|face| face.slope.is_finite()));
-    let faces = faces(tangents);
+    let mut faces = faces(tangents);
     let gap = |contact: &&ContactPixel| plane.gap(contact);
     let Some(lowest) = pixels.clone().min_by(|m, n| gap(m).total_cmp(&gap(n))) else {
         return 0.0;
     };
     let mut lower = 0.0;
-    for vertex in vertices(&faces, plane.place(lowest.middle())) {
+    let start = plane.place(lowest.middle());
+    // The lowest pixel reaches over an edge by a pixel at the most. Faces that are farther above it are those of noise.
+    let highest = |face: &Face| plane.gap(lowest) + pixel_size * (1.0 + face.slope.length());
+    faces.retain(|face| face.at(start) <= highest(face));
+    for vertex in vertices(&faces, start) {
         let off = |contact: &ContactPixel| {
             let place = plane.place(contact.middle());
             place.distance_squared(vertex.place) / pixel_size.powi(2)
@@ -126,7 +130,9 @@ pub(crate) fn lower_by<'a>(
         let sure = beyond(vertex.apart / APART)
             * (1.0 - beyond(above / pixel_size / ROUND))
             * (1.0 - beyond(off(nearest) / OFF_VERTEX));
-        lower = lower.lerp(deepest_gap - gap_over(&faces, vertex.place), sure);
+        // The way leads down. Faces that noise makes up may be far above its end.
+        let gap = gap_over(&faces, vertex.place).min(gap_over(&faces, start));
+        lower = lower.lerp(deepest_gap - gap, sure);
     }
     let of_faces: f32 = faces.iter().map(|face| face.pixels).sum();
     beyond(of_faces / pixels.count() as f32 / OF_FACES) * lower
