@@ -165,10 +165,12 @@ fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_SEARCHED> {
     };
     let mean = tangents.iter().map(|face| face.slope).sum::<Vec2>() / count;
     let mut searched = ArrayVec::<Vec2, MOST_SEARCHED>::new();
-    let mut faces = ArrayVec::new();
-    while !searched.is_full() {
+    let mut faces = ArrayVec::<Face, MOST_SEARCHED>::new();
+    while searched.len() + faces.len() < MOST_SEARCHED {
         let off = |slope: Vec2| {
-            let off = searched.iter().map(|other| slope.distance(*other));
+            let found = faces.iter().map(|face| face.slope);
+            let off = searched.iter().copied().chain(found);
+            let off = off.map(|other| slope.distance(other));
             off.reduce(f32::min).unwrap_or(slope.distance(mean))
         };
         let farthest = (tangents.iter())
@@ -187,7 +189,6 @@ fn faces(tangents: &[Face]) -> ArrayVec<Face, MOST_SEARCHED> {
         let is_new = |known: &Face| known.slope.distance(face.slope) >= APART;
         if face.pixels > LEAST_FACE * count && faces.iter().all(is_new) {
             faces.push(face);
-            let _ = searched.try_push(face.slope);
         }
     }
     faces
@@ -223,11 +224,7 @@ fn vertices(faces: &[Face], place: Vec2) -> ArrayVec<Vertex, 2> {
         return vertices;
     };
     let along = (f.slope - edge.faces[1].slope).normalize_or_zero().perp();
-    let along = if f.slope.dot(along) > 0.0 {
-        -along
-    } else {
-        along
-    };
+    let along = -along * f.slope.dot(along).signum();
     let corner_with = |h: &Face| {
         let [down, up] = [f.slope, h.slope].map(|slope| slope.dot(along));
         let reach = (f.at(edge.place) - h.at(edge.place)) / (up - down);
@@ -360,6 +357,25 @@ mod tests {
             found(&noisy),
         );
         assert_eq!(found, lowest + 0.3);
+    }
+
+    /// Few odd normals are the most extreme ones, and each is another's.
+    #[test]
+    fn odd_pixels_do_not_hide_a_face() {
+        let mut rng = fastrand::Rng::with_seed(4);
+        for _ in 0..50 {
+            let faces = [Vec2::new(0.4, 0.0), Vec2::new(-0.5, 0.0)];
+            let mut pixels = pixels(of_planes(&faces, Vec2::new(0.3, 0.0), 0.5));
+            for k in 0..4 {
+                let odd = rng.usize(0..pixels.len());
+                let slope = 3.0 * Vec2::from_angle(0.25 * TAU * (k as f32 + rng.f32()));
+                let contact = &mut pixels[odd];
+                contact.normal_b = Vec3::new(slope.x, -1.0, slope.y).normalize();
+                contact.gap = contact.point_b.y * contact.normal().y;
+            }
+            let off = found(&pixels) + 0.5;
+            assert!(off.abs() < 0.02, "{off}");
+        }
     }
 
     /// A slightly tilted face, of which two pixels have the normals of other faces. Where these meet it, it is half a pixel above its
